@@ -66,9 +66,9 @@ class BrowserDesk(QObject):
 
         A step from outside leads to its first or last.
         """
-        names, chosen = self.browser.listed, self._chosen()
+        names, name = self.browser.listed, self._chosen()
         if names:
-            index = names.index(chosen) if chosen in names else -1
+            index = names.index(name) if name in names else -1
             self._choose(names[(index + step) % len(names) if index >= 0 else (0 if step > 0 else -1)])
 
     def toggle_favourite(self, name: str) -> None:

@@ -320,11 +320,11 @@ class Controller(QObject):
 
     def play_or_stop(self) -> None:
         if self._abx is None:
-            played = self.patches.playing
+            was_playing = self.patches.playing
             self.patches.stop()
             if self.performance.playing:
                 self.performance.stop()
-            elif not played:  # in a rest of a file nothing rings
+            elif not was_playing:  # in a rest of a file nothing rings
                 self.pluck()
             self.window.transport.show_playing(self.performance.playing)
 
@@ -497,8 +497,8 @@ class Controller(QObject):
         drums = self.session.choices.drums
         if (key := self.instruments.drum_key) is not None:
             self.drum.show_key(key)
-        shown = self.string if drums is None else self.drum
-        self.window.show_on_stage(shown, shown.view)
+        stage_panel = self.string if drums is None else self.drum
+        self.window.show_on_stage(stage_panel, stage_panel.view)
         for panel in self.panels:
             if panel.of_strings:
                 panel.cover("" if drums is None else DRUMS_PLAYED)
@@ -509,8 +509,8 @@ class Controller(QObject):
         if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
             return
         self._struck = latest
-        if (played := drums.of_key(latest.event.key)) is not None:
-            self.drum.show_key(latest.event.key, latest.event.place or played.place)
+        if (drum := drums.of_key(latest.event.key)) is not None:
+            self.drum.show_key(latest.event.key, latest.event.place or drum.place)
 
     def _wake(self) -> None:
         """Run the timer at its full rate for LIVELY_S, as something may move."""

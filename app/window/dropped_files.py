@@ -96,13 +96,13 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
-        played = (
+        instrument = (
             SingleString(preset=name_text(path.stem)) if recipe.struck is None else recipe.struck.found()[0].patch
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")
-    choices = {"instrument": played, **restored_choices(recipe)}
+    choices = {"instrument": instrument, **restored_choices(recipe)}
     if recipe.through is not None:
         notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:

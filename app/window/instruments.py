@@ -126,22 +126,22 @@ class Instruments(QObject):
         What was chosen with the instrument stays, as what undo or a file restores.
         """
         self._own_timer.stop()
-        chosen, self._chosen = self._chosen, frozenset()
+        fields, self._chosen = self._chosen, frozenset()
         choices, before = self._session.choices, self._shown
         patch = choices.instrument
         self._shown = patch if isinstance(patch, Patch) else None
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
             return
         another = before is not None and is_another(patch, before)
-        takes_string = choices.string is None or (another and "string" not in chosen)
+        takes_string = choices.string is None or (another and "string" not in fields)
         if choices.string is not None and not takes_string and (another or before is None):
             self.latest_key = _key_of(patch, choices.string) or self.latest_key
-        if not takes_string and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
+        if not takes_string and (before is None or patch.pluck == before.pluck or (another and fields - {"string"})):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
             if (key_string := Strings(patch).of_key(*self.shown_key(patch))) is not None:
-                shown = asdict(on_string(key_string, patch.pluck.pluck(choices.velocity)))
-                self._session.play(**shown, **({"string": key_string.parameters} if takes_string else {}))
+                changes = asdict(on_string(key_string, patch.pluck.pluck(choices.velocity)))
+                self._session.play(**changes, **({"string": key_string.parameters} if takes_string else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
@@ -161,10 +161,10 @@ class Instruments(QObject):
     def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
         """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
-        shown: dict[str, Any] = {"string": string}
-        shown |= {} if drawn else asdict(request.pluck)
+        changes: dict[str, Any] = {"string": string}
+        changes |= {} if drawn else asdict(request.pluck)
         with self._lock:
-            self._reported |= shown
+            self._reported |= changes
 
     @property
     def drum_key(self) -> int | None:

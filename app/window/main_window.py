@@ -244,9 +244,9 @@ class MainWindow(QMainWindow):
         if view is before:
             return
         focused = self.focusWidget()
-        held = before is not None and focused is not None and before.isAncestorOf(focused)
+        had_focus = before is not None and focused is not None and before.isAncestorOf(focused)
         self._shown.setCurrentWidget(view)
-        if held:
+        if had_focus:
             focus.setFocus()
 
     def show_failed(self) -> None:
@@ -273,9 +273,9 @@ class MainWindow(QMainWindow):
             QWidget.setTabOrder(before, after)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        moved = super().focusNextPrevChild(forward)
+        has_moved = super().focusNextPrevChild(forward)
         self._tabbed_to = self.focusWidget()
-        return moved
+        return has_moved
 
     def _press_or_pluck(self) -> None:
         """Press the button, or open the box, that the Tab key went to; after a click elsewhere, Enter plucks."""
@@ -358,9 +358,9 @@ class MainWindow(QMainWindow):
         self._hold_rest()
         home, place = (self._facts_row, 2) if height >= HIGH else (self._head, 4)
         if home.indexOf(self._solo) < 0:
-            shown = not self._solo.isHidden()
+            solo_visible = not self._solo.isHidden()
             home.insertWidget(place, self._solo)
-            self._solo.setVisible(shown)
+            self._solo.setVisible(solo_visible)
 
     def show_rate(self, text: str, tip: str, fault: bool) -> None:
         """The sample rate, in the Lab; a fault of the sound output, in both faces."""
@@ -375,8 +375,8 @@ class MainWindow(QMainWindow):
 
     def _show_rate_label(self) -> None:
         fault = bool(self.rate_label.property("fault"))
-        known = bool(self.rate_label.text())
-        self.rate_label.setVisible(self._alive and known and (fault or self._shows("test")))
+        has_text = bool(self.rate_label.text())
+        self.rate_label.setVisible(self._alive and has_text and (fault or self._shows("test")))
 
     def show_through(self, text: str, *shorter: str) -> None:
         """Show the instrument that keys sound through in the Lab; "" where a string sounds alone."""

@@ -515,8 +515,8 @@ class PatchDesk(QObject):
         knobs = self._panel.knobs
         if isinstance(patch.strings, Drums):
             key = self._instruments.drum_key
-            played = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
-            knobs.show_facts(facts_of_drum(played))
+            drum = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
+            knobs.show_facts(facts_of_drum(drum))
             knobs.show_figures({})
             return None
         try:
@@ -591,8 +591,8 @@ class PatchDesk(QObject):
 
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
-            chosen = {**dict(self.patch.body), "name": name}
-            body = Body(**chosen) if chosen["mix"] > 0 else Body(name=name, size=chosen["size"])
+            body_fields = {**dict(self.patch.body), "name": name}
+            body = Body(**body_fields) if body_fields["mix"] > 0 else Body(name=name, size=body_fields["size"])
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
 
 

@@ -345,11 +345,11 @@ class Performance(QObject):
 
     def _is_chosen(self, note: Note | KeyNote) -> bool:
         """Return True if a note is of the chosen pluck."""
-        chosen, request = self._asked, note.request
+        chosen_request, request = self._asked, note.request
         return (
-            chosen is not None
+            chosen_request is not None
             and request is not None
-            and (request.preset, request.pluck) == (chosen.preset, chosen.pluck)
+            and (request.preset, request.pluck) == (chosen_request.preset, chosen_request.pluck)
         )
 
     def _is_of_chosen(self, take: Take) -> bool:

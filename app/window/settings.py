@@ -81,13 +81,13 @@ def load_settings(path: Path) -> tuple[Settings, str]:
             path.replace(aside)
         except OSError:
             aside = path
-        kept = _usable_settings(text) if isinstance(error, ValidationError) else None
+        usable = _usable_settings(text) if isinstance(error, ValidationError) else None
         why = explained(error) if isinstance(error, ValueError) else str(error)
         reason = (
-            f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
+            f"{'Some' if usable else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
         )
-        return kept or Settings(), one_line(reason)
+        return usable or Settings(), one_line(reason)
 
 
 def _read_bytes(path: Path) -> bytes:

@@ -91,10 +91,10 @@ class Song(QObject):
 
 def events_from(events: Sequence[TimedEvent], from_s: float) -> list[TimedEvent]:
     """Events from a time on, which becomes 0; pedals, wheels and others before it count at 0, notes do not."""
-    moved = []
+    later = []
     for timed_event in events:
         if timed_event.time_s >= from_s:
-            moved.append(TimedEvent(timed_event.time_s - from_s, timed_event.event))
+            later.append(TimedEvent(timed_event.time_s - from_s, timed_event.event))
         elif not isinstance(timed_event.event, NoteOn | NoteOff):
-            moved.append(TimedEvent(0.0, timed_event.event))
-    return moved
+            later.append(TimedEvent(0.0, timed_event.event))
+    return later

@@ -68,8 +68,8 @@ class Moment:
 
     def in_motion(self, choices: Choices) -> bool:
         """Return True if a picture shows the motion, not rest: in Play as long as its note rings."""
-        shown = self.audible or choices.face != "play"
-        return choices.motion and (self.playing or (self.position_s > 0 and shown))
+        in_lab_or_audible = self.audible or choices.face != "play"
+        return choices.motion and (self.playing or (self.position_s > 0 and in_lab_or_audible))
 
 
 class Panel(QWidget):

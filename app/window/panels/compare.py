@@ -222,18 +222,18 @@ class ComparePanel(Panel):
         entries = self._entries
         basis = self._basis
         present = self.session.choices.preset
-        chosen = {entry.name for entry in entries}
+        names = {entry.name for entry in entries}
         for name, action in self._actions.items():
             with QSignalBlocker(action):
-                action.setChecked(name in chosen)
-        shown = []
+                action.setChecked(name in names)
+        rows = []
         for entry in entries:
             computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
-            shown.append((row, computed == basis))
-        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in shown])
-        count, fresh = len(entries), sum(of_this for _, of_this in shown)
+            rows.append((row, computed == basis))
+        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in rows])
+        count, fresh = len(entries), sum(of_this for _, of_this in rows)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
-        former = any(row.mae is not None and not of_this for row, of_this in shown)
+        former = any(row.mae is not None and not of_this for row, of_this in rows)
         self._words.setText(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {basis.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")

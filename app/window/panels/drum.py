@@ -109,11 +109,11 @@ class DrumPanel(StagePanel):
 
     def _looks_like(self, blow: BlowTake) -> bool:
         """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""
-        if (played := self._drum) is None:
+        if (shown_drum := self._drum) is None:
             return False
-        drum, shown = blow.request.modes.drum, played.drum
-        alike = math.isclose(drum.width_m * shown.length_m, shown.width_m * drum.length_m, rel_tol=1e-6)
-        return alike and drum.shape == shown.shape
+        drum, view_drum = blow.request.modes.drum, shown_drum.drum
+        alike = math.isclose(drum.width_m * view_drum.length_m, view_drum.width_m * drum.length_m, rel_tol=1e-6)
+        return alike and drum.shape == view_drum.shape
 
     # Gestures
 

@@ -117,8 +117,8 @@ class EigenvaluesPanel(Panel):
             self.plane.clear_points()
             return
         layer = self._layer.currentData() if figure.layers > 1 else None
-        shown = np.ones(len(figure.learned), bool) if layer is None else figure.learned.layer == layer
-        self._shown = np.nonzero(shown)[0]
+        of_layer = np.ones(len(figure.learned), bool) if layer is None else figure.learned.layer == layer
+        self._shown = np.nonzero(of_layer)[0]
         musical = self._axes.currentData() == "musical"
         place = _musical_places if musical else _complex_places
         learned, string = place(figure.learned)[self._shown], place(figure.string)

@@ -83,8 +83,8 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._stored_errors = {}  # the model was validated on no drum
         if isinstance(take, Take):
             rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
-            stored = {"rmse": rmse, "mae": take.info.rel_mae}
-            self._stored_errors = {name: error for name, error in stored.items() if error is not None}
+            errors = {"rmse": rmse, "mae": take.info.rel_mae}
+            self._stored_errors = {name: error for name, error in errors.items() if error is not None}
         for curve in self._curves.values():
             curve.setData([], [])
         for name, line in self._stored.items():
@@ -103,9 +103,9 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
 
     def _draw(self, figures: ErrorWindows) -> None:
         ready = figures.ready
-        shown = (figures, ready, self.quantities.key)
-        if ready and shown != self._shown:
-            self._shown = shown
+        drawn_state = (figures, ready, self.quantities.key)
+        if ready and drawn_state != self._shown:
+            self._shown = drawn_state
             self.show_curves(
                 figures.middle_s[:ready], {name: values[:ready] for name, values in figures.curves.items()}
             )
@@ -113,13 +113,13 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
     def show_curves(self, time_s: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> None:
         """Relative errors "rmse" and perhaps "mae", and "level_db", (windows,) each at `time_s`."""
         if self._level:
-            drawn = {"level_db": curves["level_db"]}
+            levels = {"level_db": curves["level_db"]}
         else:
             with np.errstate(divide="ignore"):  # no error at all lies below the axis
-                drawn = {name: np.log10(curves[name]) for name in ("rmse", "mae") if name in curves}
-        for name, values in drawn.items():
+                levels = {name: np.log10(curves[name]) for name in ("rmse", "mae") if name in curves}
+        for name, values in levels.items():
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
-        self._fit(list(drawn.values()))
+        self._fit(list(levels.values()))
 
     def _words(self, figures: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
         window = int(time_s / figures.window_s)
@@ -145,9 +145,9 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._fit([])
         self._show_legend()
 
-    def _fit(self, shown: list[NDArray[np.float64]]) -> None:
+    def _fit(self, curves: list[NDArray[np.float64]]) -> None:
         """Widen the axis to whole decades, or a span in dB, around what is shown."""
-        finite = [values[np.isfinite(values)] for values in shown]
+        finite = [values[np.isfinite(values)] for values in curves]
         values = np.concatenate([*finite, self._always_in_view()])
         if self._level:
             largest_db = 1.1 * float(np.abs(values).max())
@@ -166,8 +166,8 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
     def _always_in_view(self) -> NDArray[np.float64]:
         if self._level:
             return np.zeros(1)
-        stored = [math.log10(value) for value in self._stored_errors.values() if value > 0]
-        return np.array([-2.0, 0.0, *stored])
+        levels = [math.log10(value) for value in self._stored_errors.values() if value > 0]
+        return np.array([-2.0, 0.0, *levels])
 
     def _show_legend(self) -> None:
         measured = () if self._level else self._measured
@@ -175,8 +175,8 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._legend.setLabelTextColor(theme.FAINT)
         for name in measured:
             self._legend.addItem(self._curves[name], name.upper())
-        stored = [percent(self._stored_errors[name]) for name in measured if name in self._stored_errors]
-        self.readout.rest(f"⋯ validation {', '.join(stored)}" if stored else "")
+        texts = [percent(self._stored_errors[name]) for name in measured if name in self._stored_errors]
+        self.readout.rest(f"⋯ validation {', '.join(texts)}" if texts else "")
 
 
 def percent(error: float) -> str:

@@ -113,10 +113,10 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         quantity = self.quantities.key
         times_s = self.plot.times_s
         columns = self.plot.columns
-        shown = (figures, figures.take.ready_frames, figures.ready, quantity, times_s, columns)
-        if shown == self._shown:
+        drawn_state = (figures, figures.take.ready_frames, figures.ready, quantity, times_s, columns)
+        if drawn_state == self._shown:
             return
-        self._shown = shown
+        self._shown = drawn_state
         self._picture = seen = picture(figures, quantity, times_s, columns)
         if seen is None:  # nothing is computed yet of the times in view
             self._image.clear()

@@ -109,11 +109,11 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         return figures.listened is take.listened
 
     def _draw(self, figures: Spectrogram) -> None:
-        shown = (figures, self.quantities.key, self.logarithmic)
-        if shown != self._shown:
+        drawn_state = (figures, self.quantities.key, self.logarithmic)
+        if drawn_state != self._shown:
             if figures.ready == 0:
                 return  # the picture before stays until there is something new
-            self._shown = shown
+            self._shown = drawn_state
             bins = figures.window_frames // 2 + 1
             lowest_hz = LOWEST_HZ if self.logarithmic else 0.0
             self._rows = FrequencyRows(bins, figures.bin_hz, ROWS, lowest_hz, self.logarithmic)

@@ -178,10 +178,10 @@ class SpectrumPanel(Panel):
         signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
         rendered = [signal for signal in signals if signal.there]
         ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in rendered)
-        shown = (take.listened, ready, moment.position_s)
-        if shown == self._shown:
+        drawn_state = (take.listened, ready, moment.position_s)
+        if drawn_state == self._shown:
             return
-        self._shown = shown
+        self._shown = drawn_state
         self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
         for signal in signals:
             if signal in rendered:

@@ -111,10 +111,10 @@ class StringPanel(StagePanel):
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
         strobes = [motion.strobes(position_s) for motion in rendered]
-        shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
-        if not moment.playing and shown == self._shown:
+        drawn_state = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
+        if not moment.playing and drawn_state == self._shown:
             return
-        self._shown = shown
+        self._shown = drawn_state
         envelope = self._envelope if choices.envelope else None
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:

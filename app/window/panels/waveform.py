@@ -116,9 +116,9 @@ class WaveformPanel(Panel):
         if take is None or self._moments % EVERY:
             return
         choices = self.session.choices
-        there = take.progress, choices
-        if there != self._caught_up:
-            self._caught_up = () if self._follow(take) else there
+        progress = take.progress, choices
+        if progress != self._caught_up:
+            self._caught_up = () if self._follow(take) else progress
         ready = {name: drawn.ready for name, drawn in self._drawn.items()}
         shown = (take.listened, ready, self.plot.times_s, self.plot.columns)
         if shown != self._shown:
@@ -130,18 +130,18 @@ class WaveformPanel(Panel):
 
         Whether there was anything to read: there may be more.
         """
-        choices, moved = self.session.choices, False
+        choices, has_grown = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            origin, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
+            origin, earlier = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
             if not origin.there:
                 continue  # another preset's model, not yet rendered
-            drawn = known if known is not None and known.origin == origin else _Drawn(origin)
-            moved |= drawn.catch_up()
+            drawn = earlier if earlier is not None and earlier.origin == origin else _Drawn(origin)
+            has_grown |= drawn.catch_up()
             self._drawn[source.source] = drawn
         if any(self._drawn.get(name) is not drawn for name, drawn in before.items()):
             self._full = 0.0  # something else is drawn: its own scale
-        return moved
+        return has_grown
 
     def _draw(self, take: Sounding) -> None:
         pickup = "pressure" if isinstance(take, BlowTake) else take.listened.ear.pickup
