@@ -183,7 +183,7 @@ class InstrumentPlayer:
         return state_events
 
     def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
-        """The factor of each of its sources; notes that ring fade to it.
+        """Set the factor of each of its sources; notes that ring fade to it.
 
         Args:
             compared: whether notes that begin have a voice of each source, to switch while they ring.

@@ -150,7 +150,7 @@ class Keys:
         self._follow_wish()
 
     def set_gains(self, gains: Mapping[str, float], compared: bool) -> None:
-        """The factor of each source, see `InstrumentPlayer.set_gains`."""
+        """Set the factor of each source, see `InstrumentPlayer.set_gains`."""
         with self._lock:
             self._gains, self._compared = gains, compared
             for player in self._playing:

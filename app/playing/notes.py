@@ -138,7 +138,7 @@ class Notes:
         self.keys.listen(ear)
 
     def choose(self, request: RenderRequest | None) -> None:
-        """The pluck that loops, seeks and the next pluck at a place start from."""
+        """Choose the pluck that loops, seeks and the next pluck at a place start from."""
         with self._lock:
             self._chosen = request
 

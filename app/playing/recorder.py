@@ -74,7 +74,7 @@ class EventRecorder:
                 )
 
     def end(self) -> list[TimedEvent]:
-        """The events as `played_from` has them. Those that were not fetched yet can be, up to here."""
+        """End the recording; return events as `played_from` has them. Those not fetched yet can be, up to here."""
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
             self.ended_s = time.monotonic() - self._began_s

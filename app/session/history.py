@@ -71,7 +71,7 @@ class History:
         return next((step for step in reversed(steps) if any(present[name] != step[name] for name in step)), None)
 
     def hold(self) -> None:
-        """A gesture begins: all changes until `release` are one step."""
+        """Begin a gesture: all changes until `release` are one step."""
         self._held = True
         self._open_fields = None
 

@@ -175,7 +175,7 @@ class StageView(QWidget):
 
 
 def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
-    """The gradient behind a string or a drum, with a frame."""
+    """Paint the gradient behind a string or a drum, with a frame."""
     gradient = QLinearGradient(0, 0, 0, height)
     gradient.setColorAt(0, QColor(theme.present.ground_top))
     gradient.setColorAt(1, QColor(theme.present.ground_bottom))
@@ -212,7 +212,7 @@ def paint_remark(painter: QPainter, width: float, text: str) -> None:
 
 
 def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> None:
-    """The foot of a listening point, below the picture."""
+    """Paint the foot of a listening point, below the picture."""
     painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.GOOD))
     painter.drawPolygon(

@@ -313,7 +313,7 @@ class Controller(QObject):
         self.instruments.strike(x, y, velocity)
 
     def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
-        """An event of the instrument; called in the thread of the event."""
+        """Handle an event of the instrument; called in the thread of the event."""
         if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
         return self.performance.notes.handle(event, due)

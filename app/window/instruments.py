@@ -159,7 +159,7 @@ class Instruments(QObject):
         self._begun.emit()
 
     def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
-        """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
+        """Show this string and its pluck in the session; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
         changes: dict[str, Any] = {"string": string}
         changes |= {} if drawn else asdict(request.pluck)

@@ -55,7 +55,7 @@ class Journaling(QObject):
         self._heard = source, difference_gain_db
 
     def end(self) -> Journal | None:
-        """The journal, with all of the recording, which has ended; None: it could not be begun."""
+        """End the journal, with all of the recording, and return it; None: it could not be begun."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()

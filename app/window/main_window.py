@@ -363,7 +363,7 @@ class MainWindow(QMainWindow):
             self._solo.setVisible(solo_visible)
 
     def show_rate(self, text: str, tip: str, fault: bool) -> None:
-        """The sample rate, in the Lab; a fault of the sound output, in both faces."""
+        """Show the sample rate, in the Lab; a fault of the sound output, in both faces."""
         label = self.rate_label
         if label.text() == text:
             return
@@ -394,7 +394,7 @@ class MainWindow(QMainWindow):
         self._show_outside()
 
     def show_error(self, error: float) -> None:
-        """The largest relative error of the pluck that is shown; not a number until it is measured."""
+        """Show the largest relative error of the pluck that is shown; not a number until it is measured."""
         self._error = error
         self._show_outside()
 
@@ -416,7 +416,7 @@ class MainWindow(QMainWindow):
         self.growth_sign.setVisible(self._shows("growth") and bool(self.growth_sign.toolTip()))
 
     def show_solo(self, mode: int) -> None:
-        """The soloed mode; 0: none, all are heard."""
+        """Show the soloed mode; 0: none, all are heard."""
         self._solo.setText(f"Mode {mode} solo  ✕")
         self._solo.setVisible(mode > 0)
 

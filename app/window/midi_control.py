@@ -115,7 +115,7 @@ class MidiControl(QObject):
             self._dialog.show_choices(self.choices.notes, controllers, self._learning)
 
     def show_patch(self, patch: Patch | None) -> None:
-        """The patch that is played; None for none."""
+        """Show the patch that is played; None for none."""
         self._patch = patch
         if self._dialog is not None:
             self._dialog.set_patch_turnable(patch is not None)

@@ -182,7 +182,7 @@ class Browser(QFrame):
     # What is shown
 
     def show_rows(self, rows: Sequence[Row], favourites: Collection[str], loaded: str, folder: str) -> None:
-        """All rows there are; which are favourites; which one is loaded; the user's own folder."""
+        """Show all rows there are; which are favourites; which one is loaded; the user's own folder."""
         self._folder = folder
         self._filling = True
         for number, box in enumerate(self.filters.values()):

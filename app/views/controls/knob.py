@@ -90,7 +90,7 @@ class Knob(QWidget):
         self.set_name(parameter.label, parameter.tip)
 
     def set_name(self, name: str, tip: str = "") -> None:
-        """The label and the tooltip, shown as plain text: both may come from a file."""
+        """Set the label and the tooltip, shown as plain text: both may come from a file."""
         self._name, self._tip = name, tip
         self.setAccessibleName(name)
         self._tell()

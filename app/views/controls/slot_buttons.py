@@ -61,7 +61,7 @@ class SlotButtons(QWidget):
         self.show_choices(self._choices)
 
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
-        """The presets that a slot may hold."""
+        """Set the presets that a slot may hold."""
         self._entries = entries
         self._show()
 

@@ -158,7 +158,7 @@ class TrialPage(QWidget):
             act()
 
     def show_trial(self, number: int, trials: int) -> None:
-        """A new trial, in which nothing has been heard."""
+        """Show a new trial, in which nothing has been heard."""
         self._number.setText(f"Trial {number} of {trials}")
         self._bar.setRange(0, trials)
         self._bar.setValue(number - 1)

@@ -97,7 +97,7 @@ class AudioDialog(QDialog):
         return SoundChoice(rate_hz=self._rate.currentData(), buffer=self._buffer.currentData())
 
     def show_devices(self, devices: Sequence[DeviceChoice], chosen: DeviceChoice | None) -> None:
-        """The connected outputs; the chosen one is listed even where it is not connected."""
+        """Show the connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
         selected = (chosen.name, chosen.host_api) if chosen else None
         with QSignalBlocker(self._device):

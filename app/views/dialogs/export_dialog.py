@@ -212,7 +212,7 @@ class ExportDialog(GrowingDialog):
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
-        """The job is over, with this result."""
+        """End the job, with this result."""
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)

@@ -121,7 +121,7 @@ class MidiDialog(QDialog):
         return grid
 
     def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
-        """The inputs that are connected, and the one that is open; `problem`: why there are none."""
+        """Show the inputs that are connected, and the one that is open; `problem`: why there are none."""
         with QSignalBlocker(self._inputs):
             self._inputs.clear()
             self._inputs.addItem("None" if names else "No MIDI input found", "")

@@ -64,7 +64,7 @@ class DrumView(StageView):
     # What is shown
 
     def set_drum(self, name: str, shape: Shape, sides: tuple[float, float]) -> None:
-        """The drum that a click strikes; `sides`: its length and width in m."""
+        """Set the drum that a click strikes; `sides`: its length and width in m."""
         if (name, shape, sides) != (self._name, self._shape, self._sides):
             self._name = name
             self._shape = shape
@@ -85,17 +85,17 @@ class DrumView(StageView):
         self.setAccessibleDescription(f"{self._name}, struck at {place_words(self._place)}{where}")
 
     def set_listening_points(self, left: float, right: float | None = None) -> None:
-        """The directions the drum is heard from; `right` is None in mono."""
+        """Set the directions the drum is heard from; `right` is None in mono."""
         self._listening = {"left": left} if right is None else {"left": left, "right": right}
         self._describe()
         self.update()
 
     def set_motion(self, shown: bool) -> None:
-        """The state of the button; the frames given to `show_frame` should agree with it."""
+        """Set the state of the button; the frames given to `show_frame` should agree with it."""
         self._toggles[0].setChecked(shown)
 
     def show_frame(self, frame: HeadFrame | None) -> None:
-        """A moment of the motion; None: at rest."""
+        """Show a moment of the motion; None: at rest."""
         before, self._frame = self._frame, frame
         if frame is None:
             self._scales_m = {}

@@ -376,7 +376,7 @@ class Neck(Playable):
         painter.drawEllipse(middle, *(2 * [self._dot / 2]))
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
-        """A dot where a string is stopped, and what swings of it."""
+        """Paint a dot where a string is stopped, and what swings of it."""
         size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
@@ -403,7 +403,7 @@ class Neck(Playable):
         painter.drawPath(swing)
 
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
-        """A key's string in the fan; gives its end."""
+        """Paint a key's string in the fan; return its end."""
         length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - theme.px(_FOOT) - 8)
         x = self._column(key).center().x()
         thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)

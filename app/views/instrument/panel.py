@@ -253,12 +253,12 @@ class InstrumentPanel(QFrame):
         self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
-        """The lowest and the highest key that have a string."""
+        """Set the lowest and the highest key that have a string."""
         self.keys.set_range(low, high)
         self.neck.set_range(low, high)
 
     def set_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """The octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
+        """Set the octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
         self.bar.show_octave(octave, lowest, highest)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
@@ -289,7 +289,7 @@ class InstrumentPanel(QFrame):
         self.neck.show_notes(notes)
 
     def show_source(self, source: str) -> None:
-        """The source that is heard, in whose colour keys are lit."""
+        """Show the source that is heard, in whose colour keys are lit."""
         self.keys.show_source(source)
         self.neck.show_source(source)
 

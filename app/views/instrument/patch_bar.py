@@ -253,7 +253,7 @@ class PatchBar(QFrame):
             knob.set_narrow(close)
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
-        """The name and the title of each; "No body", of the name "", is always listed."""
+        """Set the name and the title of each; "No body", of the name "", is always listed."""
         chosen_body = self.body.currentData()
         with QSignalBlocker(self.body):
             self.body.clear()
@@ -339,7 +339,7 @@ class PatchBar(QFrame):
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """The octave of the lowest of the computer's keys, of those at which a key sounds."""
+        """Show the octave of the lowest of the computer's keys, of those at which a key sounds."""
         self.octave.setText(f"octave C{octave}")
         self._lower.setEnabled(octave > lowest)
         self._higher.setEnabled(octave < highest)

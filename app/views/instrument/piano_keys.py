@@ -118,7 +118,7 @@ class PianoKeys(Playable):
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
 
     def _paint_pin(self, painter: QPainter, key: int) -> None:
-        """A dot on a key that stays down by itself."""
+        """Paint a dot on a key that stays down by itself."""
         rect = self.key_rect(key)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(_ink(self._fill_colour(key))))
@@ -150,7 +150,7 @@ class PianoKeys(Playable):
             self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
 
     def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
-        """A word on a key, `above` pixels above its lower edge."""
+        """Paint a word on a key, `above` pixels above its lower edge."""
         painter.setFont(theme.small_font(size, bold=above > 16, grows=False))
         place = QRectF(key.left() - 4, key.bottom() - theme.px(above), key.width() + 8, theme.px(13))
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)

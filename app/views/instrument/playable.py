@@ -134,7 +134,7 @@ class Playable(QWidget):
     # What is shown
 
     def set_range(self, low: int, high: int) -> None:
-        """The lowest and the highest key that have a string."""
+        """Set the lowest and the highest key that have a string."""
         if (low, high) != (self._low, self._high):
             self.release_all()
             self._low, self._high = low, high
@@ -162,7 +162,7 @@ class Playable(QWidget):
         self._levels = steps
 
     def show_source(self, source: str) -> None:
-        """The source that is heard, in whose colour keys are lit."""
+        """Show the source that is heard, in whose colour keys are lit."""
         if source != self._source:
             self._source = source
             self.update()

@@ -164,7 +164,7 @@ class StringKnobs(QWidget):
         self.shape.setToolTip(barred or SHAPE_TIP)
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
-        """The resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
+        """Show the resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
         self.facts.show_facts(facts)
 
     def show_figures(self, figures: Mapping[str, str]) -> None:

@@ -67,7 +67,7 @@ class TimePlot(KeptPlot):
         item.setXRange(0, self._seconds, padding=0)
 
     def set_times(self, seconds: float, horizon_s: float) -> None:
-        """The length of the take, and for how long its model was trained.
+        """Set the length of the take, and for how long its model was trained.
 
         The view is kept where the take before was as long.
         """

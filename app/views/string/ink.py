@@ -36,7 +36,7 @@ GLOW = ((4.0, 0.25), (2.4, 0.5), (1.2, 0.8))  # pixels from the string on both s
 
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front: str, glows: bool = False) -> None:
-    """The sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
+    """Paint the sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
 
     Opaque fills and thin pens only: this is drawn sixty times a second.
     """
@@ -90,14 +90,14 @@ def _heights(axes: StringAxes, shape_mm: NDArray[np.float32], at: NDArray[np.flo
 
 
 def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], front: str) -> None:
-    """The envelopes, which lie behind the motion and change less often."""
+    """Paint the envelopes, which lie behind the motion and change less often."""
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in sorted(envelopes, key=lambda name: name == front):
         _paint_band(painter, axes, envelopes[name], name, 0.07)
 
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
-    """An opaque area with thin edges, which show its extent where another band covers it in part."""
+    """Paint an opaque area with thin edges, which show its extent where another band covers it in part."""
     colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(Qt.PenStyle.NoPen)
@@ -112,7 +112,7 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
 
 
 def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
-    """The string as it is pulled, before its release."""
+    """Paint the string as it is pulled, before its release."""
     curve = axes.curve(pluck.shape_mm)
     area = QPolygonF(curve)
     area.append(axes.at(1, 0))
@@ -131,7 +131,7 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """The handle: `full` on a string at rest, a ring while it moves.
+    """Paint the handle: `full` on a string at rest, a ring while it moves.
 
     It has its values where it is full or grabbed.
     """
@@ -178,7 +178,7 @@ def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, g
 
 
 def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
-    """The time that is shown, in the corner of the picture."""
+    """Paint the time that is shown, in the corner of the picture."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.TEXT))
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)

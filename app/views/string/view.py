@@ -90,7 +90,7 @@ class StringView(StageView):
     # What is shown
 
     def set_pluck(self, pluck: ShownPluck) -> None:
-        """The pluck as chosen; it is drawn while no motion is shown."""
+        """Set the pluck as chosen; it is drawn while no motion is shown."""
         self._pluck = pluck
         self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
         self.update()
@@ -105,18 +105,18 @@ class StringView(StageView):
         self.update()
 
     def set_trained(self, trained: TrainedPlucks) -> None:
-        """The training range, outside of which the picture is hatched."""
+        """Set the training range, outside of which the picture is hatched."""
         self._trained = trained
         self.update()
 
     def set_shown(self, motion: bool, envelope: bool) -> None:
-        """The state of both buttons; the frames given to `show_frame` should agree with it."""
+        """Set the state of both buttons; the frames given to `show_frame` should agree with it."""
         for button, on in zip(self._toggles, (motion, envelope), strict=True):
             button.setChecked(on)
         self._toggles[1].setEnabled(motion)
 
     def show_frame(self, frame: StringFrame | None) -> None:
-        """A moment of the motion; None goes back to the pluck."""
+        """Show a moment of the motion; None goes back to the pluck."""
         before = self._frame
         self._frame = frame
         span_mm = self._span_mm

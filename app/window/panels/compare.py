@@ -180,7 +180,7 @@ class ComparePanel(Panel):
             self._show()
 
     def _set_computing(self, share: float | None) -> None:
-        """The share of the table that is done, 0 … 1; None: nothing is being computed."""
+        """Set the share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
         stops = share is not None
         self._stop.setText("Stop" if stops else "Compute again")

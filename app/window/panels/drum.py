@@ -76,7 +76,7 @@ class DrumPanel(StagePanel):
         return None if drums is None or self._key is None else drums.of_key(self._key)
 
     def show_key(self, key: int, place: Place | None = None) -> None:
-        """The drum of a key is shown, struck at a place; None: at its own where it is another drum."""
+        """Show the drum of a key, struck at a place; None: at its own where it is another drum."""
         self._key = key
         drum = self._drum
         if drum is None:

@@ -90,7 +90,7 @@ class EigenvaluesPanel(Panel):
             self.compute(lambda job: pole_figure(load_subject(subject)))
 
     def show_figure(self, figure: PoleFigure | None, words: str = "") -> None:
-        """The eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
+        """Show the eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
             for layer in range(figure.layers):

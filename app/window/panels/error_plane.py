@@ -126,13 +126,13 @@ class ErrorPlanePanel(Panel):
         self.pluck_asked.emit()
 
     def _show(self, picture: PlanePicture | None) -> None:
-        """The errors computed so far; None: none."""
+        """Show the errors computed so far; None: none."""
         self._picture = picture
         self.map.show_picture(picture)
         self._show_values(*(self.map.cursor or (math.nan, math.nan)))
 
     def _say(self, words: str, share: float | None = None) -> None:
-        """The line above the map while nothing is pointed at, and the share that is computed."""
+        """Write the line above the map while nothing is pointed at, and show the share that is computed."""
         self._resting = words
         self.progress.show_share(share)
         self._show_values(*(self.map.cursor or (math.nan, math.nan)))
@@ -234,7 +234,7 @@ class _Map(PointedPlot):
         self._pluck.setData([position], [math.log10(held_mm)])
 
     def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
-        """The training range: positions, None for a model trained on noise, and the amplitudes at each of them."""
+        """Set the training range: positions, None for a model trained on noise, and the amplitudes at each."""
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
         self._trained = ((left, right), amplitudes_mm)
         places = np.linspace(left, right, OUTLINE)

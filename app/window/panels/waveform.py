@@ -158,7 +158,7 @@ class WaveformPanel(Panel):
                 curve.setData([], [])
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
-        """The vertical axis, from −full to full in `unit`."""
+        """Set the vertical axis, from −full to full in `unit`."""
         self.plot.getPlotItem().setYRange(-full, full, padding=0.02)
         self._label.set(f"{quantity} ({unit})", unit)
 
@@ -171,7 +171,7 @@ class WaveformPanel(Panel):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
-        """The samples so far, (frames,) from time 0, in the unit of the axis. Draws those in view, none left out."""
+        """Show the samples so far, (frames,) from time 0, in the unit of the axis; draw all of those in view."""
         (low_s, high_s), columns = self.plot.times_s, self.plot.columns
         # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
         # that is played waits for the painting.
