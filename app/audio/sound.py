@@ -304,7 +304,7 @@ class Sound:
         self._status = replace(self._status, problem=None)
 
     def _set_up(self, mixer: Mixer) -> None:
-        """Give it volume and effects, the latest where another thread sets them meanwhile."""
+        """Give the mixer volume and effects, the latest where another thread sets them meanwhile."""
         set_values: object = None
         while set_values != (wanted_values := (self._volume_db, self._effects)):
             mixer.set_volume(10 ** (wanted_values[0] / 20))

@@ -103,11 +103,11 @@ class Journal:
         self._append([{"end": end_s}])
 
     def close(self) -> None:
-        """Leave it to the next start, or to another process."""
+        """Leave the journal to the next start, or to another process."""
         self._lock.unlock()
 
     def delete(self) -> None:
-        """Remove it: the recording is saved, or not wanted. Where that fails, it is offered again."""
+        """Remove the journal: the recording is saved, or not wanted. Where that fails, it is offered again."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
         self._lock.unlock()
@@ -252,7 +252,7 @@ class _Read:
 
 
 def _number_within(value: Any, limits: tuple[float, float]) -> Any:
-    """The number. Raises ValueError: it is out of its limits, or none."""
+    """Return the number. Raises ValueError: it is out of its limits, or none."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not limits[0] <= value <= limits[1]:
         raise ValueError(f"{bounds.brief(str(value))} is out of range")
     return value

@@ -142,7 +142,7 @@ def find_patch(name_or_path: str) -> PatchEntry:
 
 
 def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
-    """Write it into the user's folder, which is made if need be; whole or not at all.
+    """Write the patch into the user's folder, which is made if need be; whole or not at all.
 
     Args:
         replace: the file of a patch of the user's that it replaces; None: it is a new one, with a file of its own.

@@ -138,17 +138,17 @@ class KeyNote:
         return self.began_frame + round(seconds * self.mixer.rate_hz)
 
     def release_at(self, frame: int) -> None:
-        """Let it fade out from a frame of the mixer on; 0: not any more."""
+        """Let the note fade out from a frame of the mixer on; 0: not any more."""
         self.player.cancel(self.id)
         if frame > 0:
             self.player.release(self.id, frame=frame)
 
     def release(self, seconds: float) -> None:
-        """Let it fade out within so many seconds, from now on; one that waits for its frame never begins."""
+        """Let the note fade out within so many seconds, from now on; one that waits for its frame never begins."""
         self.released = True
         self.player.cancel(self.id)
         self.player.release(self.id, max(seconds, 1e-3))
 
     def end(self) -> None:
-        """Mark it as cut, where no device plays its voices any more."""
+        """Mark the note as cut, where no device plays its voices any more."""
         self.cut = True

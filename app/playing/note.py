@@ -115,18 +115,18 @@ class Note:
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
-        """Let it fade out from a frame of the mixer on; 0: not any more."""
+        """Let the note fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def end(self) -> None:
-        """Cut it, where no device plays its voices any more; they are over."""
+        """Cut the note, where no device plays its voices any more; they are over."""
         self.cut = True
         for voice in self.voices.values():
             voice.refuse()
 
     def release(self, seconds: float) -> None:
-        """Let it fade out within so many seconds, from now on."""
+        """Let the note fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)

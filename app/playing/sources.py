@@ -91,7 +91,7 @@ class Sources:
         return initial_m, self.program(subject, source, rate_hz).start(initial_m)
 
     def prepare(self, subject: Subject, rate_hz: int) -> None:
-        """Load it with both programs. Raises PresetError."""
+        """Load a preset with both programs. Raises PresetError."""
         for kind in KINDS:
             self.program(subject, kind, rate_hz)
 

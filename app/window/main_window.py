@@ -239,7 +239,7 @@ class MainWindow(QMainWindow):
         self._set_alive(True)
 
     def show_on_stage(self, view: QWidget, focus: QWidget) -> None:
-        """Show one of these; `focus` in it gets the focus that the other had."""
+        """Show the string or the drum on the stage; `focus` in it gets the focus that the other had."""
         before = self._shown.currentWidget()
         if view is before:
             return

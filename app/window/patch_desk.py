@@ -164,7 +164,7 @@ class PatchDesk(QObject):
 
     @property
     def patch(self) -> Patch | None:
-        """The one that is there, played or not."""
+        """The patch that is there, played or not."""
         return self._session.choices.patch
 
     @property

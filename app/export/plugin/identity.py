@@ -82,7 +82,7 @@ def _folded_name(name: str) -> str:
 
 
 def _default_spelling(folded: str) -> str:
-    """The one name that has an identifier without a digest."""
+    """The name that has an identifier without a digest."""
     words = folded.replace("-", " ")
     return _factory_names().get(folded, words[:1].upper() + words[1:])
 

@@ -349,7 +349,7 @@ class Browser(QFrame):
             self._start_rest()
 
     def press(self, key: Qt.Key) -> None:
-        """Handle one of MOVES, Space, D or one of CLOSES."""
+        """Handle a key of MOVES, Space, D or one of CLOSES."""
         if key in MOVES:
             self.move_selection(key)
         elif key == KEYS.Key_Space:

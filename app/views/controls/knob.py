@@ -119,7 +119,7 @@ class Knob(QWidget):
             self._tell()
 
     def set_barred(self, why: str) -> None:
-        """Grey it out and say why in the tooltip; "" frees it."""
+        """Grey the knob out and say why in the tooltip; "" frees it."""
         if why != self._why_barred:
             self._why_barred = why
             self.setEnabled(not why)

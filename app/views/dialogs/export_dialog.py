@@ -111,7 +111,7 @@ class ExportDialog(GrowingDialog):
 
     @property
     def job(self) -> ExportJob | None:
-        """The one under way."""
+        """The job under way."""
         return self._job if self._background.busy else None
 
     def choices(self) -> ExportChoices:

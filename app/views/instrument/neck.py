@@ -233,7 +233,7 @@ class Neck(Playable):
             self._put_finger(string, key - self._strings[string][1])
 
     def _put_finger(self, string: int, fret: int) -> None:
-        """Lift it where it is already, or at the nut."""
+        """Put a finger on a string; lift it where it is already, or at the nut."""
         if fret <= 0 or self._fingers.get(string) == fret:
             self._fingers.pop(string, None)
         else:

@@ -45,7 +45,7 @@ class TimePanel(Panel, Generic[G]):
 
     @abstractmethod
     def _draw(self, figures: G) -> None:
-        """Show it as far as it is ready."""
+        """Show the figures as far as it is ready."""
 
     @abstractmethod
     def _words(self, figures: G, time_s: float, place: float) -> Iterable[str]:
