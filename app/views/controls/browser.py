@@ -405,7 +405,7 @@ class Browser(QFrame):
             self.dismiss()
 
     def page(self) -> int:
-        """The rows by which Page up or Page down moves."""
+        """The number of rows that Page up or Page down moves."""
         return max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
 
     def step(self, key: Qt.Key) -> int:
