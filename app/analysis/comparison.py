@@ -99,7 +99,7 @@ class _Truths:
         self._known: dict[tuple[object, ...], Floats] = {}
 
     def amplitudes(self, info: PresetInfo, job: Job) -> Floats:
-        """float32 (frames, modes) in m, of the frames after the first."""
+        """Return the amplitudes, float32 (frames, modes) in m, of the frames after the first."""
         key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
         if key not in self._known:
             blocks = []
@@ -121,7 +121,9 @@ def _compare_one(
     ear = listening_weights(np.array([basis.listen]), info.grid_points).astype(np.float32)
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
-    first, work_s, note = 0, 0.0, ""
+    first = 0
+    work_s = 0.0
+    note = ""
     try:
         _warm_up(source, basis, info)
         for predicted, spent_s in _frames(source, basis, info, job):

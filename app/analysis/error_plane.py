@@ -82,8 +82,8 @@ class ErrorPlane:
         spacing = self.spacing
         if spacing is None:
             return None
-        shown = np.exp(refine(np.log(np.maximum(self.error[::spacing, ::spacing], 1e-9)), spacing))
-        return PlanePicture(shown, spacing, self._share)
+        fine_errors = np.exp(refine(np.log(np.maximum(self.error[::spacing, ::spacing], 1e-9)), spacing))
+        return PlanePicture(fine_errors, spacing, self._share)
 
     @property
     def _share(self) -> float:
@@ -153,15 +153,15 @@ def refine(coarse: Array, factor: int) -> Array:
     """Bilinear interpolation of `coarse` (m, n) to ((m - 1) factor + 1, (n - 1) factor + 1) points."""
     fine = coarse
     for axis in (0, 1):
-        moved = np.moveaxis(fine, axis, 0)
-        places = np.arange((len(moved) - 1) * factor + 1) / factor
-        before = np.minimum(places.astype(int), max(len(moved) - 2, 0))
+        rows = np.moveaxis(fine, axis, 0)
+        places = np.arange((len(rows) - 1) * factor + 1) / factor
+        before = np.minimum(places.astype(int), max(len(rows) - 2, 0))
         share = (places - before)[:, None]
-        after = np.minimum(before + 1, len(moved) - 1)
+        after = np.minimum(before + 1, len(rows) - 1)
         # ∞ · 0 is not a number: beside an infinite error a known point keeps its own value
         with np.errstate(invalid="ignore"):
-            mixed = moved[before] * (1 - share) + moved[after] * share
+            mixed = rows[before] * (1 - share) + rows[after] * share
         fine = np.moveaxis(
-            np.where(np.isnan(mixed), np.where(share < 0.5, moved[before], moved[after]), mixed), 0, axis
+            np.where(np.isnan(mixed), np.where(share < 0.5, rows[before], rows[after]), mixed), 0, axis
         )
     return fine

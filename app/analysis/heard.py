@@ -56,12 +56,12 @@ class _Heard(Generic[Owner, Each]):
     @property
     def ready(self) -> int:
         """Frames so far."""
-        return min(each.ready_frames for each in self._series)
+        return min(series.ready_frames for series in self._series)
 
     def read_all(self, first: int, stop: int) -> NDArray[np.float32]:
         """The frames first … stop - 1 that are ready, (frames, places)."""
         stop = min(stop, self.ready)
-        return _combined([each.read(first, stop) for each in self._series], self.gain)
+        return _subtract_parts([series.read(first, stop) for series in self._series], self.gain)
 
 
 class HeardMotion(_Heard[Take, Motion]):
@@ -77,7 +77,7 @@ class HeardMotion(_Heard[Take, Motion]):
 
     def shape(self, position_s: float) -> NDArray[np.float32]:
         """The string (grid_points,) in m that slow motion shows at the playhead."""
-        return _combined([motion.shape_m(position_s) for motion in self._series], self.gain)
+        return _subtract_parts([motion.shape_m(position_s) for motion in self._series], self.gain)
 
     def strobes(self, position_s: float) -> list[Strobe | None]:
         """The strobes whose flashes `shape` is made of; None where it is the nearest picture instead."""
@@ -105,7 +105,7 @@ def _parts(source: str) -> tuple[str, ...]:
     return SOURCES if source == DIFFERENCE else (source,)
 
 
-def _combined(parts: list[NDArray[np.float32]], gain: float) -> NDArray[np.float32]:
+def _subtract_parts(parts: list[NDArray[np.float32]], gain: float) -> NDArray[np.float32]:
     values, *subtracted = parts
     if subtracted:
         values = values - subtracted[0]

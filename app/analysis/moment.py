@@ -122,14 +122,16 @@ def frame_at(
         position_s: the playhead.
         speed: of slow motion; 1 is real time.
     """
-    there = [motion for motion in motions if motion.there]
-    shapes, lowest, highest = {}, {}, {}
-    for motion in there:
+    rendered = [motion for motion in motions if motion.there]
+    shapes = {}
+    lowest = {}
+    highest = {}
+    for motion in rendered:
         last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
         frames = motion.read_all(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
         shapes[motion.source] = motion.shape(position_s) * MM
         lowest[motion.source] = frames.min(axis=0) * MM
         highest[motion.source] = frames.max(axis=0) * MM
     caption = f"{position_s:.3f} s" + ("" if speed >= 1 else f"   slow motion × {speed:.3f}")
-    envelopes = envelope.before(position_s, there) if envelope else {}
+    envelopes = envelope.before(position_s, rendered) if envelope else {}
     return StringFrame(shapes, lowest, highest, caption, position_s > take.info.horizon_s, envelopes)

@@ -71,12 +71,12 @@ class PoleFigure:
 def pole_figure(preset: Preset) -> PoleFigure:
     """The eigenvalues of a preset's model, and those of its string for small amplitudes."""
     info = preset.info
-    own = info.resonator.eigenvalues() / info.rate_hz
-    found = [log.numpy() for log in preset.model.log_eigenvalues()]
+    string_logs = info.resonator.eigenvalues() / info.rate_hz
+    layer_logs = [log.numpy() for log in preset.model.log_eigenvalues()]
     note = _NOTES.get(info.model, "")
-    if not found:
+    if not layer_logs:
         note = f"a {info.model} has no eigenvalues: its whole field goes through a network at every sample"
-    return PoleFigure(info.rate_hz, _poles(found, info), _poles([own], info), len(found), note)
+    return PoleFigure(info.rate_hz, _poles(layer_logs, info), _poles([string_logs], info), len(layer_logs), note)
 
 
 def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
@@ -84,7 +84,7 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
 
     kept = [_upper_half(log[log.real > math.log(VANISHED)]) for log in layers]
     log = np.concatenate([*kept, np.empty(0, complex)])
-    layer = np.repeat(np.arange(len(kept)), [len(one) for one in kept])
+    layer = np.repeat(np.arange(len(kept)), [len(poles) for poles in kept])
     angle = np.abs(np.angle(np.exp(1j * log.imag)))
     folded_hz = angle * info.rate_hz / (2 * math.pi)
     with np.errstate(divide="ignore"):
@@ -99,10 +99,10 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
 
 def _upper_half(log: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Select one of each pair λ, λ̄."""
-    turned = np.angle(np.exp(1j * log.imag))
-    upper = log.real + 1j * np.abs(turned)
-    lower = turned < 0
-    paired = np.array([bool(np.isclose(upper[~lower], one, rtol=0, atol=1e-9).any()) for one in upper], bool)
+    angles = np.angle(np.exp(1j * log.imag))
+    upper = log.real + 1j * np.abs(angles)
+    lower = angles < 0
+    paired = np.array([bool(np.isclose(upper[~lower], pole, rtol=0, atol=1e-9).any()) for pole in upper], bool)
     return upper[~(lower & paired)]
 
 

@@ -83,9 +83,9 @@ class Envelopes:
         start, stop = self.ready * self.stride, (self.ready + count) * self.stride
         for name, largest in self._largest_m.items():
             frames = motion_of(self.take, name, start, stop).reshape(count, self.stride, -1)
-            here = slice(self.ready, self.ready + count)
-            largest[here] = np.maximum(frames.max(axis=1), -frames.min(axis=1))
-            self._peaks_m[name][here] = largest[here].max(axis=1)
+            columns = slice(self.ready, self.ready + count)
+            largest[columns] = np.maximum(frames.max(axis=1), -frames.min(axis=1))
+            self._peaks_m[name][columns] = largest[columns].max(axis=1)
         self.ready += count
         return True
 
@@ -94,7 +94,7 @@ class Envelopes:
         return self._largest_m[quantity][: self.ready]
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
-        """1.5 times the median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
+        """The 1.5-fold median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
         column_s = self.stride / self.take.picture_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]

@@ -21,8 +21,8 @@ class Spectrogram:
     """Model, truth and error in dB; a sine at the pick-up's full scale is 0 dB. A `Growing`.
 
     Column k is of the window centred at k·hop_s; the last one ends with the take. Before its start the take is
-    mirrored, as the motion of a string released from rest would be, and of a drum or a velocity with the other sign:
-    a sudden start would show as a click that is not heard.
+    mirrored, as the motion of a string released from rest would be. A drum or a velocity has the other sign. A
+    sudden start would show as a click that is not heard.
 
     Attributes:
         ready: columns so far.
@@ -56,7 +56,7 @@ class Spectrogram:
         return self.take.rate_hz / self.window_frames
 
     def advance(self) -> bool:
-        count = min(self._possible() - self.ready, COLUMNS_AT_A_TIME)
+        count = min(self._ready_columns() - self.ready, COLUMNS_AT_A_TIME)
         if count <= 0:
             return False
         model, truth = (self._transforms(name, count) for name in ("model", "truth"))
@@ -66,22 +66,22 @@ class Spectrogram:
         self.ready += count
         return True
 
-    def _possible(self) -> int:
+    def _ready_columns(self) -> int:
         """The number of columns whose window is rendered to its end."""
-        return self._columns_of(min(heard.ready for heard in self._heard.values()))
+        return self._columns_of(min(signal.ready for signal in self._heard.values()))
 
     def _columns_of(self, frames: int) -> int:
         half = self.window_frames // 2
         return (frames - half - 1) // self.hop + 1 if frames > half else 0
 
     def _transforms(self, source: str, count: int) -> NDArray[np.complexfloating]:
-        """(count, bins) of the next columns."""
+        """The transforms of the next columns, (count, bins)."""
         first = self.ready * self.hop - self.window_frames // 2
         last = first + (count - 1) * self.hop + self.window_frames
-        heard = self._heard[source]
-        signal = heard.read(max(first, 0), last)
+        source_signal = self._heard[source]
+        signal = source_signal.read(max(first, 0), last)
         if first < 0:
-            mirror = heard.read(1, 1 - first)[::-1]
+            mirror = source_signal.read(1, 1 - first)[::-1]
             if isinstance(self.take, BlowTake) or self.listened.ear.pickup == "velocity":
                 mirror = -mirror
             signal = np.concatenate([mirror, signal])
@@ -90,10 +90,10 @@ class Spectrogram:
 
 
 class FrequencyRows:
-    """Turns levels of bins into levels of an image's rows, from `lowest_hz` up to half the rate.
+    """The levels of bins as levels of an image's rows, from `lowest_hz` up to half the rate.
 
-    Where a row is wider than a bin it is the loudest of its bins, so that no partial is lost between two rows; where
-    it is narrower it is interpolated.
+    A row wider than a bin is the loudest of its bins, so that no partial is lost between two rows. A narrower row is
+    interpolated.
     """
 
     def __init__(self, bins: int, bin_hz: float, rows: int, lowest_hz: float, logarithmic: bool) -> None:
@@ -108,7 +108,7 @@ class FrequencyRows:
         self._wide = np.diff(starts, append=bins) > 1
 
     def of(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(columns, bins) → (columns, rows)."""
+        """Return the levels by row, (columns, bins) → (columns, rows)."""
         between = levels_db[:, self._below] * (1 - self._share) + levels_db[:, self._below + 1] * self._share
         loudest = np.maximum.reduceat(levels_db, self._starts, axis=1)
         return np.where(self._wide, np.maximum(loudest, between), between)

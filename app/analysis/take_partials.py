@@ -53,8 +53,8 @@ class PartialRow:
 def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     """Rows by window (`WINDOWS`); a window of which the take has too little is left out.
 
-    Model and truth are rendered again, mode by mode, because a take holds pictures and not every frame; the truth in
-    steps shorter than a frame, which its phasors need.
+    Model and truth are rendered again, mode by mode, because a take holds pictures and not every frame. The truth
+    takes steps shorter than a frame, which its phasors need.
 
     Raises:
         Cancelled: the job was cancelled.

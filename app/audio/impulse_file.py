@@ -1,4 +1,4 @@
-"""Reads an impulse response from a sound file, which may come from anywhere and is checked in every respect."""
+"""A reader of impulse responses: sound files, which may come from anywhere and are checked in every respect."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_impulse(path: Path) -> Impulse:
 
         return Impulse(faded(samples[:most]) if len(samples) > most else samples, rate_hz)
     except ValueError as error:
-        raise _unusable(path, error) from error
+        raise _unusable_error(path, error) from error
 
 
 def cut_words(path: Path) -> str:
@@ -69,7 +69,7 @@ def _read(path: Path) -> tuple[NDArray[np.float64], int]:
     except UnreadableSound as error:
         raise ImpulseError(f"{path}: no sound file that can be read ({error}); give a WAV or FLAC") from error
     except ValueError as error:
-        raise _unusable(path, error) from error
+        raise _unusable_error(path, error) from error
 
 
 def _onset(samples: NDArray[np.float64], rate_hz: int) -> int:
@@ -81,7 +81,7 @@ def _onset(samples: NDArray[np.float64], rate_hz: int) -> int:
     return max(0, int(np.argmax(levels >= SILENT_SHARE * peak)) - round(LEAD_S * rate_hz))
 
 
-def _unusable(path: Path, error: ValueError) -> ImpulseError:
+def _unusable_error(path: Path, error: ValueError) -> ImpulseError:
     return ImpulseError(
         f"{path}: no impulse response that can be used ({error}); give another, mono or stereo, of up to"
         f" {LONGEST_FILE_S:g} s"

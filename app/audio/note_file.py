@@ -58,8 +58,8 @@ def read_note(path: Path) -> NoteFile:
             if seconds > LONGEST_S:
                 raise NoteFileError(f"{path}: lasts {seconds:.0f} s; cut out one note, at most {LONGEST_S:.0f} s")
             if file.frames * file.channels > MOST_NUMBERS:
-                held = f"{file.channels} channels of {file.samplerate} Hz for {seconds:.0f} s"
-                raise NoteFileError(f"{path}: has {held}, which is too much; export one or two")
+                size_words = f"{file.channels} channels of {file.samplerate} Hz for {seconds:.0f} s"
+                raise NoteFileError(f"{path}: has {size_words}, which is too much; export one or two")
             samples = file.read(file.frames, "float64", always_2d=True)
             rate_hz = file.samplerate
         if len(samples) == 0:

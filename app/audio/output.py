@@ -107,7 +107,7 @@ class DeviceOutput:
 
 
 class ClockOutput:
-    """Takes frames in real time and drops them, so that pictures move without a device."""
+    """An output that drops its frames in real time, so that pictures move without a device."""
 
     device: AudioDevice | None = None
     latency_s = 0.0

@@ -69,9 +69,9 @@ class _Wish:
     buffer_frames: int = 0
     rescan: bool = False
 
-    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
-        """`found` with the wanted rate, or, for 0, with its own."""
-        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
+    def at_its_rate(self, device: AudioDevice) -> AudioDevice:
+        """The device with the wanted rate, or, for 0, with its own."""
+        return replace(device, default_rate_hz=self.rate_hz) if self.rate_hz else device
 
     def buffer_s_at(self, rate_hz: int) -> float:
         return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
@@ -155,7 +155,7 @@ class Sound:
             return 0.0
 
     def set_volume_db(self, volume_db: float) -> None:
-        """0 dB leaves the samples as they are, minus infinity mutes.
+        """Set the volume: 0 dB leaves the samples as they are, minus infinity mutes.
 
         Raises:
             ValueError: it is not a number, or plus infinity.
@@ -201,21 +201,21 @@ class Sound:
             while not self._closing.is_set():
                 self._woken.wait(LOOK_EVERY_S)
                 self._woken.clear()
-                self._carry_on(self._process_requests)
+                self._try_work(self._process_requests)
                 if self._closing.is_set():
                     break
-                if self._carry_on(self._look_at_output) and self._carry_on(self._publish):
+                if self._try_work(self._look_at_output) and self._try_work(self._publish):
                     self._failed_looks = 0
                 else:
                     self._failed_looks += 1
                     if self._failed_looks % RESTART_AFTER == 0:
-                        self._carry_on(self._restart)
-                self._carry_on(self._free_ended)
-                self._carry_on(lambda: self._watch(self._status))
+                        self._try_work(self._restart)
+                self._try_work(self._free_ended)
+                self._try_work(lambda: self._watch(self._status))
         finally:
             self._close()
 
-    def _carry_on(self, work: Callable[[], None]) -> bool:
+    def _try_work(self, work: Callable[[], None]) -> bool:
         """Do `work`; return True if it could be done. A fault of it is reported once, and all else continues."""
         try:
             work()
@@ -256,11 +256,11 @@ class Sound:
         try:
             if wish.rescan or present is None:
                 self._be_silent()
-            device = self._found(wish, wish.rescan or present is None)
+            device = self._find_device(wish, wish.rescan or present is None)
             if device == self._output.device and self._wish == wish:
                 return
             self._be_silent()  # it might refuse to be opened twice
-            self._adopt(device, wish)
+            self._open_device(device, wish)
         except AudioUnavailable as error:
             if before is not None and present is not None:
                 self._reopen(present, before)
@@ -268,7 +268,7 @@ class Sound:
                 self._lose(wish)
             self._report(error.problem)
 
-    def _found(self, wish: _Wish, rescan: bool) -> AudioDevice:
+    def _find_device(self, wish: _Wish, rescan: bool) -> AudioDevice:
         """The device that is wished for. Raises AudioUnavailable: there is none now, or it cannot be looked for."""
         try:
             return wish.at_its_rate(self._look_up(wish.device, rescan))
@@ -277,7 +277,7 @@ class Sound:
         except Exception as error:
             raise unexpected(error, wish.device.name if wish.device else "default") from error
 
-    def _adopt(self, device: AudioDevice, wish: _Wish) -> None:
+    def _open_device(self, device: AudioDevice, wish: _Wish) -> None:
         """Open a device, with the present mixer where rate and channels stay, else with a new one.
 
         Raises:
@@ -296,22 +296,25 @@ class Sound:
             if isinstance(error, AudioUnavailable):
                 raise
             raise unexpected(error, device.name) from error
-        self.mixer, self._wish, self._stalled, self._calls_before = mixer, wish, False, mixer.calls
+        self.mixer = mixer
+        self._wish = wish
+        self._stalled = False
+        self._calls_before = mixer.calls
         self._set_up(mixer)  # what was set while the device was being opened went to the old one
         self._status = replace(self._status, problem=None)
 
     def _set_up(self, mixer: Mixer) -> None:
-        """Give it volume and effects, the latest where another thread sets them meanwhile."""
-        given: object = None
-        while given != (wished := (self._volume_db, self._effects)):
-            mixer.set_volume(10 ** (wished[0] / 20))
-            self._carry_on(partial(mixer.set_effects, wished[1]))  # else all would be silent
-            given = wished
+        """Give the mixer volume and effects, the latest where another thread sets them meanwhile."""
+        set_values: object = None
+        while set_values != (wanted_values := (self._volume_db, self._effects)):
+            mixer.set_volume(10 ** (wanted_values[0] / 20))
+            self._try_work(partial(mixer.set_effects, wanted_values[1]))  # else all would be silent
+            set_values = wanted_values
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
         """Open the device again as before a change that was refused; if that fails too, it counts as lost."""
         try:
-            self._adopt(device, wish)
+            self._open_device(device, wish)
         except AudioUnavailable:
             self._lose(wish)
 
@@ -339,7 +342,7 @@ class Sound:
         if self._lost is not None and time.monotonic() >= self._try_again_s:
             self._try_again_s = time.monotonic() + TRY_AGAIN_S
             try:
-                self._adopt(self._found(self._lost, True), self._lost)
+                self._open_device(self._find_device(self._lost, True), self._lost)
                 self._lost = None
             except AudioUnavailable:
                 pass
@@ -350,7 +353,7 @@ class Sound:
         if mixer.calls == self._calls_before:
             return False
         try:
-            self._adopt(device, self._wish)
+            self._open_device(device, self._wish)
         except AudioUnavailable:
             return False
         self._gaps.append(Gap(mixer.seconds, "device", 1000 * (time.monotonic() - began_s)))

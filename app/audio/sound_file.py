@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
 KINDS = "WAV, FLAC, AIFF or Ogg"
-_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_PCM = 1
+_FLOAT = 3
+_EXTENSIBLE = 0xFFFE
 _COMPRESSED = (2, 6, 7, 0x11, 0x31, 0x38, 0x40, 0x55)  # ADPCM, A-law, µ-law, GSM and MP3, which libsndfile reads
 _MOST_CHUNKS = 10_000
 _KEPT, _LARGEST_TEXT = (b"fmt ", b"fact"), 2**16  # chunks that are kept besides a list of texts; bytes of each
@@ -57,7 +59,7 @@ def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfi
             size = file.seek(0, io.SEEK_END)
             if largest_bytes is not None and size > largest_bytes:
                 raise UnreadableSound(f"larger than the {largest_bytes // 2**20} MiB that it may have")
-            with soundfile.SoundFile(_recognised(file, size)) as sound:
+            with soundfile.SoundFile(_splice(file, size)) as sound:
                 yield sound
     except soundfile.SoundFileError as error:
         raise UnreadableSound(str(error).rpartition(":")[2].strip(" .")) from error
@@ -69,7 +71,9 @@ class _Spliced(io.RawIOBase):
     """A file: bytes of our own, then a part of another file."""
 
     def __init__(self, head: bytes, file: BinaryIO, start: int, length: int) -> None:
-        self._head, self._file, self._start = head, file, start
+        self._head = head
+        self._file = file
+        self._start = start
         self._length, self._at = len(head) + length, 0
 
     def seekable(self) -> bool:
@@ -88,17 +92,17 @@ class _Spliced(io.RawIOBase):
 
     def readinto(self, buffer: WriteableBuffer) -> int:
         view = memoryview(buffer).cast("B")
-        wanted = min(len(view), max(0, self._length - self._at))
-        own = self._head[self._at : self._at + wanted]
-        view[: len(own)] = own
+        count = min(len(view), max(0, self._length - self._at))
+        head_part = self._head[self._at : self._at + count]
+        view[: len(head_part)] = head_part
         self._file.seek(self._start + max(0, self._at - len(self._head)))
-        rest = self._file.read(wanted - len(own))
-        view[len(own) : len(own) + len(rest)] = rest
-        self._at += len(own) + len(rest)
-        return len(own) + len(rest)
+        rest = self._file.read(count - len(head_part))
+        view[len(head_part) : len(head_part) + len(rest)] = rest
+        self._at += len(head_part) + len(rest)
+        return len(head_part) + len(rest)
 
 
-def _recognised(file: BinaryIO, end: int) -> _Spliced:
+def _splice(file: BinaryIO, end: int) -> _Spliced:
     start = 0
     head = _bytes_at(file, 0, 12)
     if head[:3] == b"ID3" and len(head) >= 10:  # tags that players of MP3 put before any file
@@ -106,14 +110,16 @@ def _recognised(file: BinaryIO, end: int) -> _Spliced:
         head = _bytes_at(file, start, 12)
     kind, form = head[:4], head[8:12]
     if kind in (b"RIFF", b"RIFX", b"RF64", b"BW64") and form == b"WAVE":
-        return _Spliced(*_wave(file, start, end))
+        return _Spliced(*_wave_parts(file, start, end))
     if kind == b"fLaC":
         head = _bytes_at(file, start, _FLAC_HEAD)
         bits = (int.from_bytes(head[20:22]) >> 4) % 32 + 1
         if len(head) == _FLAC_HEAD and bits not in _FLAC_BITS:
             raise UnreadableSound(f"it is FLAC of {bits} bits, not of 8, 16 or 24")
         if not _flac_frames(head):
-            return _Spliced(_counted(head, file, start, end), file, start + len(head), end - start - len(head))
+            return _Spliced(
+                _with_frame_count(head, file, start, end), file, start + len(head), end - start - len(head)
+            )
     if kind == b"OggS" and _bytes_at(file, start + 28, 5) == b"\x7fFLAC":
         raise UnreadableSound("it is FLAC within Ogg")
     if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
@@ -126,7 +132,7 @@ def _flac_frames(head: bytes) -> int:
     return int.from_bytes(head[21:26]) & _FLAC_FRAMES
 
 
-def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
+def _with_frame_count(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
     """The beginning of a FLAC file that states no length, with the number of frames that it has."""
     at = start + 4
     for _ in range(_MOST_CHUNKS):  # what stands before the sound
@@ -134,22 +140,22 @@ def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
         at += 4 + int.from_bytes(block[1:])
         if not block or block[0] >= 128:
             break
-    first = _bytes_at(file, at, 4)
-    place = max(at, end - _LARGEST_FLAC_BLOCK)
-    rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
-    found, length = len(rest) - 16, 0
+    block_head = _bytes_at(file, at, 4)
+    tail_at = max(at, end - _LARGEST_FLAC_BLOCK)
+    tail = _bytes_at(file, tail_at, max(0, end - tail_at)) + bytes(16)
+    block_at, length = len(tail) - 16, 0
     for _ in range(_MOST_CHUNKS):
-        found = rest.rfind(first[:2], 0, max(found, 0)) if len(first) == 4 else -1
-        if found < 0 or length:
+        block_at = tail.rfind(block_head[:2], 0, max(block_at, 0)) if len(block_head) == 4 else -1
+        if block_at < 0 or length:
             break
-        if all(_agree(rest[found + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
-            length = _end_of_flac_block(rest[found : found + 16], int.from_bytes(head[8:10]))
+        if all(_codes_agree(tail[block_at + byte] & 15, block_head[byte] & 15) for byte in (2, 3)):  # rate and bits
+            length = _end_of_flac_block(tail[block_at : block_at + 16], int.from_bytes(head[8:10]))
     if length == 0:
         raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
 
 
-def _agree(one: int, other: int) -> bool:
+def _codes_agree(one: int, other: int) -> bool:
     """Return True if two codes of rates or bits may mean the same; 0 is what the file's first block states."""
     return one == other or not (one and other)
 
@@ -177,11 +183,11 @@ def _end_of_flac_block(data: bytes, block_frames: int) -> int:
     return (number if data[1] & 1 else number * block_frames) + frames
 
 
-def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
+def _wave_parts(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
     """A header, the file, and place and length of its samples."""
     byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
-    found: dict[bytes, bytes] = {}
-    samples, stated = (0, 0), 0  # place and length; the length that ds64 states
+    chunks: dict[bytes, bytes] = {}
+    samples, ds64_length = (0, 0), 0  # place and length; the length that ds64 states
     at = start + 12
     for _ in range(_MOST_CHUNKS):
         header = _bytes_at(file, at, 8)
@@ -192,46 +198,46 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
             break
         at += 8
         if name == b"data":
-            if size >= _UNKNOWN and stated > 0:
-                size = stated
+            if size >= _UNKNOWN and ds64_length > 0:
+                size = ds64_length
             if at + size > end or (size == 0 and not _chunks_follow(file, at, end, byte_order)):
                 size = end - at
             if samples[1] == 0:
                 samples = at, size
         elif name == b"ds64" and size >= 16:
-            stated = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
+            ds64_length = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
         elif size <= _LARGEST_TEXT and (name in _KEPT or (name == b"LIST" and _bytes_at(file, at, 4) == b"INFO")):
-            found.setdefault(name, _bytes_at(file, at, size))
+            chunks.setdefault(name, _bytes_at(file, at, size))
         at = _next_chunk(file, at + size, size, byte_order)
     else:
         raise UnreadableSound(f"it has more than {_MOST_CHUNKS} chunks")
-    if b"fmt " not in found or samples[0] == 0:
-        raise UnreadableSound("it has no format" if b"fmt " not in found else "it has no samples")
-    if b"LIST" in found:
-        found[b"LIST"] = _whole_texts(found[b"LIST"], byte_order)
-    found[b"fmt "], frame_bytes, compressed = _format(found[b"fmt "], byte_order)
+    if b"fmt " not in chunks or samples[0] == 0:
+        raise UnreadableSound("it has no format" if b"fmt " not in chunks else "it has no samples")
+    if b"LIST" in chunks:
+        chunks[b"LIST"] = _whole_texts(chunks[b"LIST"], byte_order)
+    chunks[b"fmt "], frame_bytes, compressed = _plain_format(chunks[b"fmt "], byte_order)
     length = min(samples[1], _LARGEST_DATA) // frame_bytes * frame_bytes
-    chunks = b"".join(
-        struct.pack(byte_order + "4sI", name, len(found[name])) + found[name] + b"\0" * (len(found[name]) % 2)
+    body = b"".join(
+        struct.pack(byte_order + "4sI", name, len(chunks[name])) + chunks[name] + b"\0" * (len(chunks[name]) % 2)
         for name in (b"fmt ", b"fact", b"LIST")
-        if name in found and (compressed or name != b"fact")
+        if name in chunks and (compressed or name != b"fact")
     )
     kind = b"RIFX" if byte_order == ">" else b"RIFF"
-    head = struct.pack(byte_order + "4sI4s", kind, 12 + len(chunks) + length, b"WAVE") + chunks
+    head = struct.pack(byte_order + "4sI4s", kind, 12 + len(body) + length, b"WAVE") + body
     return head + struct.pack(byte_order + "4sI", b"data", length), file, samples[0], length
 
 
-def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
+def _plain_format(chunk: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     """A format chunk as libsndfile reads it, how many bytes a frame has, and whether it is compressed."""
-    if len(given) < 16:
+    if len(chunk) < 16:
         raise UnreadableSound("its format is cut off")
-    kind, channels, rate_hz, _, frame_bytes, bits = struct.unpack(byte_order + "HHIIHH", given[:16])
-    if kind == _EXTENSIBLE and len(given) >= 26:
-        kind = struct.unpack(byte_order + "H", given[24:26])[0]
+    kind, channels, rate_hz, _, frame_bytes, bits = struct.unpack(byte_order + "HHIIHH", chunk[:16])
+    if kind == _EXTENSIBLE and len(chunk) >= 26:
+        kind = struct.unpack(byte_order + "H", chunk[24:26])[0]
     if channels == 0 or rate_hz == 0:
         raise UnreadableSound(f"its format states {channels} channels at {rate_hz} Hz")
     if kind in _COMPRESSED:
-        return struct.pack(byte_order + "H", kind) + given[2:], max(frame_bytes, 1), True
+        return struct.pack(byte_order + "H", kind) + chunk[2:], max(frame_bytes, 1), True
     if kind not in (_PCM, _FLOAT):
         raise UnreadableSound(f"its samples are compressed as kind {kind:#x}")
     sample_bytes = -(-bits // 8)
@@ -244,25 +250,25 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     return struct.pack(byte_order + "HHIIHH", *rest), frame_bytes, False
 
 
-def _whole_texts(given: bytes, byte_order: str) -> bytes:
+def _whole_texts(chunk: bytes, byte_order: str) -> bytes:
     """A list of texts up to the first that is cut off. From that one libsndfile would read on into the samples."""
     end = 4  # of "INFO"
-    while len(given) >= end + 8:
-        size = struct.unpack(byte_order + "I", given[end + 4 : end + 8])[0]
-        if end + 8 + size > len(given):
+    while len(chunk) >= end + 8:
+        size = struct.unpack(byte_order + "I", chunk[end + 4 : end + 8])[0]
+        if end + 8 + size > len(chunk):
             break
-        end = min(end + 8 + size + size % 2, len(given))
-    return given[:end]
+        end = min(end + 8 + size + size % 2, len(chunk))
+    return chunk[:end]
 
 
 def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
     """The place of the chunk behind one that ends at `after`. An odd one should have a padding byte, and may not."""
     places = (after + size % 2, after + 1 - size % 2)
-    likely = [_likelihood(file, place, byte_order) for place in places]
+    likely = [_chunk_likelihood(file, place, byte_order) for place in places]
     return places[1] if likely[1] > likely[0] else places[0]
 
 
-def _likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
+def _chunk_likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
     """The likelihood, 0 … 4, that a chunk begins at a place.
 
     It is 0 without a name, 4 with a known one, else by its size and what follows.

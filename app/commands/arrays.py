@@ -89,7 +89,7 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
     with whole_file(path) as file:
         npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         for block in blocks:
-            file.write(_finite(block).astype("<f8").tobytes())
+            file.write(_check_finite(block).astype("<f8").tobytes())
             done += block.size
             report(done / math.prod(shape))
 
@@ -110,16 +110,16 @@ def _load(path: Path) -> np.ndarray:
     except OSError as error:
         raise Failure(f"{path}: cannot be read ({error.strerror or error}); give a NumPy .npy file") from error
     except Exception as error:  # NumPy parses the header as a Python literal, which may raise nearly anything
-        reported = one_line(str(error), 200)
+        reason = one_line(str(error), 200)
         raise Failure(
-            f"{path}: not a whole NumPy .npy file of numbers ({reported}); save it with numpy.save"
+            f"{path}: not a whole NumPy .npy file of numbers ({reason}); save it with numpy.save"
         ) from error
     if not isinstance(array, np.ndarray):
         raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")
     return array
 
 
-def _finite(block: Array) -> Array:
+def _check_finite(block: Array) -> Array:
     if not np.isfinite(block).all():
         raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
     return block

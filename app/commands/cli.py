@@ -1,7 +1,7 @@
 """The command line: `learned-strings` opens the app, with files where some are named; commands have no window.
 
-Exit status: 0 on success, 2 on bad usage, 130 when interrupted, 1 on any other failure, which is explained in one
-line on standard error (after its traceback where the environment variable LEARNED_STRINGS_DEBUG is set).
+Exit status: 0 on success, 2 on bad usage, 130 when interrupted, 1 on any other failure. One line on standard error
+explains it, after its traceback where the environment variable LEARNED_STRINGS_DEBUG is set.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""drums: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
+"""Command `drums`: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ def modes(
     json: Json = False,
 ) -> None:
     """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
-    patch, struck = drum_of(drum, key)
-    found = struck.modes
-    drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
-    facts = {"modes": len(found), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
+    patch, drum_key = drum_of(drum, key)
+    drum_modes = drum_key.modes
+    drops = {str(velocity): drum_key.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
+    facts = {"modes": len(drum_modes), "hardest_m_s": drum_key.played.hardest_m_s, "drop_cents": drops}
     rows = [
         {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
-        for m, n, hz, t60, mass in mode_rows(found, min(count, len(found)))
+        for m, n, hz, t60, mass in mode_rows(drum_modes, min(count, len(drum_modes)))
     ]
     if json:
         print_json({**facts, "lowest": rows})
@@ -85,7 +85,7 @@ def modes(
         [[r["m"], r["n"], round(r["hz"], 2), round(r["t60_s"], 3), round(r["air_mass"], 3)] for r in rows],
     )
     words = ", ".join(f"{cents:.0f} cents at velocity {velocity}" for velocity, cents in drops.items())
-    print(f"{len(found)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
+    print(f"{len(drum_modes)} modes; pitch drop {words}; hardest blow {drum_key.played.hardest_m_s:g} m/s")
 
 
 @drums.command()
@@ -192,8 +192,8 @@ def compare(
 ) -> None:
     """Compare a drum's models with the truth.
 
-    Prints relative errors over the whole surface, in total and by second: of the model, of a series of backward
-    error analysis, and of the linear drum.
+    Prints relative errors over the whole surface, in total and by second. They are those of the model, of a series of
+    backward error analysis, and of the linear drum.
     """
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
     blow = _blow_of(drum, key, velocity, place, preset)
@@ -207,22 +207,22 @@ def compare(
         "r = p = 1/12": untrained_player("series"),
         "linear drum": linear_drum,
     }
-    struck = blow.struck()
+    struck_drum = blow.struck()
     with progress("drums compare") as report:
-        whole, *windows = motion_errors(struck, players, rate, round(seconds * rate), report)
+        whole, *windows = motion_errors(struck_drum, players, rate, round(seconds * rate), report)
     if json:
         print_json(
             {
-                "modes": struck.resonator.modes,
-                "tension_rise": struck.tension_rise,
+                "modes": struck_drum.resonator.modes,
+                "tension_rise": struck_drum.tension_rise,
                 "rel_mse": whole.rel_mse,
                 "windows": [{"start_s": w.start_s, "stop_s": w.stop_s, "rel_mse": w.rel_mse} for w in windows],
             }
         )
         return
     print(
-        f"{blow.key.played.name}, {struck.resonator.modes} modes, rise of tension {struck.tension_rise:.3g}, "
-        f"{rate} Hz; relative MSE over the surface:"
+        f"{blow.key.played.name}, {struck_drum.resonator.modes} modes, "
+        f"rise of tension {struck_drum.tension_rise:.3g}, {rate} Hz; relative MSE over the surface:"
     )
     rows = [[f"{w.start_s:g} … {w.stop_s:g} s", *map(number, w.rel_mse.values())] for w in (*windows, whole)]
     print_table(("", *players), rows if len(windows) > 1 else rows[1:])
@@ -260,17 +260,17 @@ def _blow_of(
 
     from engine.strike import Strike
 
-    patch, struck = drum_of(drum, key)
+    patch, drum_key = drum_of(drum, key)
     if preset is not None:
         patch = patch.model_copy(update={"preset": preset})
-    own = struck.strike(velocity, patch.pluck.curve)
+    own_strike = drum_key.strike(velocity, patch.pluck.curve)
     if place is None:
-        return _Blow(patch, struck, own)
-    if not struck.modes.surface.inside(np.array([place])):
+        return _Blow(patch, drum_key, own_strike)
+    if not drum_key.modes.surface.inside(np.array([place])):
         raise typer.BadParameter(
             f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
         )
-    return _Blow(patch, struck, Strike(place, own.speed_m_s, own.mallet))
+    return _Blow(patch, drum_key, Strike(place, own_strike.speed_m_s, own_strike.mallet))
 
 
 def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
@@ -291,15 +291,15 @@ def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
         patch = find_patch(name).patch
     if not isinstance(patch.strings, Drums):
         raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
-    played = ", ".join(str(each.note) for each in patch.strings.drums)
+    played = ", ".join(str(drum.note) for drum in patch.strings.drums)
     if key is None:
         raise typer.BadParameter(
             f"is missing; give a MIDI key of {patch.name}: its drums have {played}", param_hint="--key"
         )
-    found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
-    if found is None:
+    drum_key = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
+    if drum_key is None:
         raise Failure(f"{patch.name} has no drum on key {key}; its drums have the keys {played}")
-    return patch, found
+    return patch, drum_key
 
 
 def _with_file(path: Path) -> Patch:
@@ -312,13 +312,13 @@ def _with_file(path: Path) -> Patch:
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 
-def _dop853(struck: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
+def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
     import torch
 
     from engine.truth import ModalState, solve_dop853
 
-    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
-    amplitudes = solve_dop853(struck.resonator, state, rate_hz, steps, report=report)[0, 1:]
+    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck_drum.amplitudes_m, struck_drum.speeds_m_s)))
+    amplitudes = solve_dop853(struck_drum.resonator, state, rate_hz, steps, report=report)[0, 1:]
     first = 0
 
     def following(count: int) -> Tensor:
@@ -340,15 +340,15 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
     from app.commands import arrays
     from app.rendering.blow import grid_of
 
-    found = blow.key.modes
-    inside, places = grid_of(found.surface, (found.drum.length_m, found.drum.width_m), points)
+    drum_modes = blow.key.modes
+    inside, places = grid_of(drum_modes.surface, (drum_modes.drum.length_m, drum_modes.drum.width_m), points)
     arrays.check_result_size(1, steps + 1, inside.size)
-    if (size := 8 * len(found) * len(places)) > LARGEST_SHAPES_BYTES:
+    if (size := 8 * len(drum_modes) * len(places)) > LARGEST_SHAPES_BYTES:
         raise Failure(
-            f"the shapes of {len(found)} modes at {len(places)} points would take {size / 2**20:.0f} MiB, more than "
-            f"the {LARGEST_SHAPES_BYTES // 2**20} MiB allowed; lower --points"
+            f"the shapes of {len(drum_modes)} modes at {len(places)} points would take {size / 2**20:.0f} MiB, more "
+            f"than the {LARGEST_SHAPES_BYTES // 2**20} MiB allowed; lower --points"
         )
-    shapes = found.shapes(places)
+    shapes = drum_modes.shapes(places)
     at_once = max(1, min(FRAMES_AT_ONCE, arrays.BYTES_AT_ONCE // (8 * inside.size)))
 
     def pictures() -> Iterator[Array]:
@@ -362,16 +362,18 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
     arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
-def mode_rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
-    """m, n, frequency in Hz, T60 in s and the mass with air, relatively, of the lowest modes."""
+def mode_rows(drum_modes: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
+    """Return m, n, frequency in Hz, T60 in s and the relative mass with air of the lowest modes."""
     import math
 
-    rows, circles, surface = [], dict[tuple[int, int], int](), found.surface
+    rows = []
+    circles = dict[tuple[int, int], int]()
+    surface = drum_modes.surface
     for place in range(count):
-        omega, sigma = float(found.omega[place]), float(found.sigma[place])
+        omega, sigma = float(drum_modes.omega[place]), float(drum_modes.sigma[place])
         m, n = int(surface.m[place]), int(surface.n[place])
         if surface.round:
             circles[m, n] = n = circles.get((m, n), 0) + 1
         t60_s = math.log(1000) / max(sigma, 1e-9)
-        rows.append((m, n, omega / math.tau, t60_s, float(found.scale[place]) ** -2))
+        rows.append((m, n, omega / math.tau, t60_s, float(drum_modes.scale[place]) ** -2))
     return rows

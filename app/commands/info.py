@@ -1,4 +1,4 @@
-"""info: what a WAV file is."""
+"""Command `info`: the kind of a WAV file."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def info(
     facts = origin.model_dump(mode="json")
     try:
         path, exact = preset_of(origin, usable_files())
-        here = f"{path}" if exact else f"{path} (another version of it)"
+        preset_file = f"{path}" if exact else f"{path} (another version of it)"
     except RecipeError:
-        here = "none; the preset is not here"
+        preset_file = "none; the preset is not here"
     if json:
-        print_json({**facts, "preset_file": here})
+        print_json({**facts, "preset_file": preset_file})
         return
     parts = {part: facts.pop(part, None) or {} for part in ("pluck", "string")}
-    reported = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
-    lines = {**reported, **facts, "preset file": here}
+    part_values = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
+    lines = {**part_values, **facts, "preset file": preset_file}
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")

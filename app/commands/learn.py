@@ -1,4 +1,4 @@
-"""learn: recordings of a string to an instrument."""
+"""Command `learn`: recordings of a string to an instrument."""
 
 from __future__ import annotations
 
@@ -64,10 +64,10 @@ def learn(
             "body": str(kept.body),
             "report": str(kept.report),
         }
-        print_json({**files, "recordings": [as_data(each) for each in learned]})
+        print_json({**files, "recordings": [as_data(recording) for recording in learned]})
         return
-    for each in learned:
-        for line in as_text(each):
+    for recording in learned:
+        for line in as_text(recording):
             print(line)
     say(f"note: hear it again by: learned-strings render {kept.preset.stem} out.wav --as-recorded")
     print(f"{kept.preset}, {kept.patch}")

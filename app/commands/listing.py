@@ -1,4 +1,4 @@
-"""presets, models, instruments: lists of them."""
+"""Commands `presets`, `models`, `instruments`: lists of them."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ def presets(json: Json = False) -> None:
     from training.heard_file import read_heard
 
     files = usable_files()
-    known: dict[str, Heard] = {}
+    records_by_digest: dict[str, Heard] = {}
     for folder in dict.fromkeys(path.parent for path in files):
-        heard, problems = read_heard(folder)
-        known |= heard
+        records, problems = read_heard(folder)
+        records_by_digest |= records
         for problem in problems:
             say(problem)
-    found = []
+    rows = []
     for path in files:
         try:
-            found.append(_facts(path, known))
+            rows.append(_facts(path, records_by_digest))
         except PresetError as error:
             say(str(error))
         except Exception as error:  # no fault of one file may keep the others from being listed
             say(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file")
-    _show(found, json)
+    _show(rows, json)
 
 
 def models(json: Json = False) -> None:
@@ -49,11 +49,11 @@ def models(json: Json = False) -> None:
     from engine.models import MODELS, build_model
     from engine.models.base import count_parameters
 
-    found = []
+    rows = []
     with torch.device("meta"):  # sizes without memory
         for name in MODELS:
-            found.append({"name": name, "parameters": count_parameters(build_model(name))})
-    _show(found, json)
+            rows.append({"name": name, "parameters": count_parameters(build_model(name))})
+    _show(rows, json)
 
 
 def instruments(
@@ -75,12 +75,12 @@ def instruments(
     entries, problems = list_patches()
     for problem in problems:
         say(problem)
-    found = []
+    rows = []
     for entry in entries:
         patch = entry.patch
         facts = {"name": entry.name, "title": patch.name, "category": patch.category, "own": entry.own}
-        found.append({**facts, "description": patch.description, "file": str(entry.path)})
-    _show(found, json, but=("own", "file"))
+        rows.append({**facts, "description": patch.description, "file": str(entry.path)})
+    _show(rows, json, but=("own", "file"))
 
 
 def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
@@ -90,20 +90,20 @@ def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
     for id, parameter in OF_PATCHES.items():
         if patch.has(id):
             low, high = parameter.limits
-            own = {"value": patch.value(id), "lowest": low, "highest": high, "default": parameter.default}
-            yield {"id": id, "name": parameter.name, "unit": parameter.unit, **own}
+            numbers = {"value": patch.value(id), "lowest": low, "highest": high, "default": parameter.default}
+            yield {"id": id, "name": parameter.name, "unit": parameter.unit, **numbers}
 
 
-def _show(found: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> None:
+def _show(rows: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> None:
     """Print facts as JSON, or as a table without the columns `but`."""
     if json:
-        print_json(found)
-    elif found:
-        columns = [name for name in found[0] if name not in but]
-        print_table(columns, [[facts[name] for name in columns] for facts in found])
+        print_json(rows)
+    elif rows:
+        columns = [name for name in rows[0] if name not in but]
+        print_table(columns, [[facts[name] for name in columns] for facts in rows])
 
 
-def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
+def _facts(path: Path, records_by_digest: dict[str, Heard]) -> dict[str, Any]:
     from engine.presets import described_parameters, preset_digest, read_info
     from training.heard_words import heard_word
 
@@ -120,6 +120,6 @@ def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
         "rel_mae": info.rel_mae,
         "test_rel_mse": info.test_rel_mse,
         "test_rel_mae": info.test_rel_mae,
-        "heard": heard_word(known.get(preset_digest(path))),
+        "heard": heard_word(records_by_digest.get(preset_digest(path))),
         "file": str(path),
     }

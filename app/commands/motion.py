@@ -1,4 +1,4 @@
-"""simulate, predict, compare: the motion of the whole string, by the physics and by models."""
+"""Commands `simulate`, `predict`, `compare`: motion of the whole string, by the physics and by models."""
 
 from __future__ import annotations
 
@@ -101,9 +101,9 @@ def simulate(
     resonator = resonator_of(parameters, modes, tension_modulated=tension_modulated, grid_points=points)
     with progress("simulate") as report:
         if solver == "fast":
-            motion = _fast(resonator, rate, steps, substeps)
+            motion = _splitting_motion(resonator, rate, steps, substeps)
         else:
-            motion = _dop853(resonator, rate, steps, len(initial), report)
+            motion = _dop853_motion(resonator, rate, steps, len(initial), report)
         arrays.write_motion(out, initial, steps, motion, report)
     if (peak_m := float(abs(initial).max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
@@ -134,7 +134,7 @@ def predict(
         )
     arrays.check_result_size(len(initial), steps + 1, points)
     with progress("predict") as report:
-        arrays.write_motion(out, initial, steps, _predicted(loaded, steps), report)
+        arrays.write_motion(out, initial, steps, _predicted_motion(loaded, steps), report)
     for words in _outside_family(loaded.info, initial):
         say(f"warning: {words}")
 
@@ -143,11 +143,11 @@ def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
     """The deviations of a string and its displacements from a preset of many strings, where the error grows."""
     if info.family is None:
         return []
-    found = info.family.warnings(info.string)
+    warnings = info.family.warnings(info.string)
     rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(initial)).max())
     if rise > (limit := info.family.tension_rise[1]):
-        found.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
-    return found
+        warnings.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
+    return warnings
 
 
 def compare(
@@ -175,18 +175,18 @@ def compare(
         raise typer.BadParameter(
             f"must hold a sample of {info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
         )
-    found = _comparison(loaded, pluck, steps)
-    for warning in found["warnings"]:
+    facts = _comparison(loaded, pluck, steps)
+    for warning in facts["warnings"]:
         say(f"warning: {warning}")
     if json:
-        print_json(found)
+        print_json(facts)
         return
-    print(f"{one_line(str(loaded.name))}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
+    print(f"{one_line(str(loaded.name))}: rel. MSE {number(facts['rel_mse'])}, rel. MAE {number(facts['rel_mae'])}")
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "")
     figures = ("start_s", "stop_s", "rel_mse", "rel_mae")
     rows = [
         [*(w[name] for name in figures), "past the training horizon" if w["past_horizon"] else ""]
-        for w in found["windows"]
+        for w in facts["windows"]
     ]
     print_table(columns, rows)
 
@@ -196,7 +196,7 @@ def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
 
     info = preset.info
     seconds = steps / info.rate_hz
-    sums = _compared(preset, pluck, steps)
+    sums = _error_sums(preset, pluck, steps)
     windows = [
         {**asdict(w), "past_horizon": w.start_s >= info.horizon_s}
         for w in sums.windows(info.rate_hz, window_edges(seconds, info))
@@ -219,7 +219,7 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
     return [*sorted(edge for edge in inner if edge < seconds), seconds]
 
 
-def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
+def _error_sums(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     from app.commands import arrays
     from engine.compare.relative import ErrorSums
     from engine.resonators.sine_transform import project
@@ -254,7 +254,7 @@ def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
         raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
 
 
-def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
+def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.truth import ModalState, SplittingSolver
 
@@ -270,7 +270,7 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
     return motion
 
 
-def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
+def _dop853_motion(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
     solved = 0
@@ -291,7 +291,7 @@ def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int,
     return motion
 
 
-def _predicted(preset: Preset, steps: int) -> Motion:
+def _predicted_motion(preset: Preset, steps: int) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.resonators.sine_transform import project
     from engine.sources import ModelSource

@@ -1,4 +1,4 @@
-"""play: a MIDI file, played by an instrument, to a WAV file."""
+"""Command `play`: a MIDI file, played by an instrument, to a WAV file."""
 
 from __future__ import annotations
 
@@ -47,24 +47,24 @@ def play(
     from app.instrument.midi_file import read_song
     from app.patches.library import find_patch
 
-    chosen = find_patch(instrument).patch
-    song = read_song(midi, chosen)
+    patch = find_patch(instrument).patch
+    song = read_song(midi, patch)
 
     if song.left_out:
         say(song.left_out)
-    if problem := body_problem(chosen):
+    if problem := body_problem(patch):
         say(problem)
-    loaded = arguments.open_preset(chosen.preset)
+    loaded = arguments.open_preset(patch.preset)
     from app.export.played import write_played
     from app.export.wav import WavSettings
     from app.instrument.offline import LONGEST_TAIL_S
 
     began_s = time.monotonic()
     whole_s = seconds if seconds is not None else song.length_s + LONGEST_TAIL_S / 10
-    with progress(f"{midi.name} by {chosen.name}") as report:
+    with progress(f"{midi.name} by {patch.name}") as report:
         written = write_played(
             out,
-            chosen,
+            patch,
             loaded,
             song.events,
             midi.name,

@@ -1,4 +1,4 @@
-"""plugin: instruments as a native plug-in for a DAW."""
+"""Command `plugin`: instruments as a native plug-in for a DAW."""
 
 from __future__ import annotations
 
@@ -57,34 +57,36 @@ def plugin(
         raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
-            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
+            patches = [entry.patch for entry in list_patches(SHIPPED)[0]]
         else:
-            chosen = [find_patch(name).patch for name in instruments]
+            patches = [find_patch(name).patch for name in instruments]
         images = []
-        for patch in chosen:
+        for patch in patches:
             images.append(image_of(patch, open_preset(patch.preset)))
             if images[-1].left_out:
                 say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
         if dry_run:
             _print_sizes(images)
             return
-        kept = cache.folder() or Path(tempfile.gettempdir())
+        cache_folder = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
         ids = {image.id for image in images}
-        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
-        wanted = list[tuple[str, str, Path]]()
-        for each in targets:
+        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in patches])
+        outputs = list[tuple[str, str, Path]]()
+        for system in targets:
             for kind in FORMATS if form == ALL else (form,):
-                folder = install_folder(kind, each) if install else (out or Path()) / (each if target == ALL else "")
-                wanted.append((kind, each, plugin_path(folder / name, kind)))
+                folder = (
+                    install_folder(kind, system) if install else (out or Path()) / (system if target == ALL else "")
+                )
+                outputs.append((kind, system, plugin_path(folder / name, kind)))
         if not replace:
-            for _, _, path in wanted:  # all before the first is written
+            for _, _, path in outputs:  # all before the first is written
                 check_kept(path, ids)
-        for kind, each, path in wanted:
-            began_s, there = time.monotonic(), path.exists()
-            build_plugin(images, kind, each, path, kept, _Steps(), replace=replace)
+        for kind, system, path in outputs:
+            began_s, replaces = time.monotonic(), path.exists()
+            build_plugin(images, kind, system, path, cache_folder, _Steps(), replace=replace)
             done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
-            print(f"{one_line(str(path))}: {done}{', replaces the one before' if there else ''}")
+            print(f"{one_line(str(path))}: {done}{', replaces the one before' if replaces else ''}")
     except (ValueError, OSError) as error:
         raise Failure(str(error)) from error
 
@@ -102,7 +104,7 @@ def _print_sizes(images: Sequence[Image]) -> None:
 
 
 class _Steps:
-    """Says each step once, and each tenth of the build."""
+    """A printer of progress: each step once, and each tenth of the build."""
 
     def __init__(self) -> None:
         self._latest = ("", 0)
@@ -115,4 +117,4 @@ class _Steps:
 
 
 def _size(path: Path) -> int:
-    return sum(each.stat().st_size for each in path.rglob("*")) if path.is_dir() else path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*")) if path.is_dir() else path.stat().st_size

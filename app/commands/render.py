@@ -1,4 +1,4 @@
-"""render: a pluck to a WAV file, or the recipe of a WAV file once more."""
+"""Command `render`: a pluck to a WAV file, or the recipe of a WAV file once more."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def render(
     """
     if recipe is not None:
         sources = {name: context.get_parameter_source(name) for name in context.params}
-        given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-        if out is not None or given - {"preset", "recipe"}:
+        names = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+        if out is not None or names - {"preset", "recipe"}:
             raise typer.BadParameter(
                 "holds all that its sound was made with; give OUT.wav alone beside it",
                 param_hint="--recipe",
@@ -105,11 +105,11 @@ def render(
     if out is not None:
         arguments.check_suffix("OUT.wav", out, ".wav")
     if as_recorded:
-        _render_as_recorded(_given("PRESET", preset), _given("OUT.wav", out), bits)
+        _render_as_recorded(_require("PRESET", preset), _require("OUT.wav", out), bits)
         return
-    preset, out = _given("PRESET", preset), _given("OUT.wav", out)
-    position, amplitude_mm = _given("--position", position), _given("--amplitude-mm", amplitude_mm)
-    seconds = _given("--seconds", seconds)
+    preset, out = _require("PRESET", preset), _require("OUT.wav", out)
+    position, amplitude_mm = _require("--position", position), _require("--amplitude-mm", amplitude_mm)
+    seconds = _require("--seconds", seconds)
     pluck = options.check_pluck(position, amplitude_mm, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
     from app.export.sound import SoundRequest
@@ -154,7 +154,7 @@ def check_shortest(preset: Preset, seconds: float) -> None:
         )
 
 
-def _given(name: str, value: Value | None) -> Value:
+def _require(name: str, value: Value | None) -> Value:
     if value is None:
         raise typer.BadParameter("is missing (only --recipe goes without it)", param_hint=name)
     return value

@@ -1,4 +1,4 @@
-"""sampled: an instrument for samplers, in SFZ or SoundFont 2."""
+"""Command `sampled`: an instrument for samplers, in SFZ or SoundFont 2."""
 
 from __future__ import annotations
 
@@ -64,15 +64,15 @@ def sampled(
         raise typer.BadParameter(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
-    chosen = find_patch(instrument).patch
+    patch = find_patch(instrument).patch
     if dry:
-        chosen = chosen.with_value("room.mix", 0.0)
-    if problem := body_problem(chosen):
+        patch = patch.with_value("room.mix", 0.0)
+    if problem := body_problem(patch):
         say(problem)
-    preset_path = find_preset(chosen.preset, usable_files())
+    preset_path = find_preset(patch.preset, usable_files())
     try:
         plan = SampledPlan(
-            chosen,
+            patch,
             _keys(keys),
             every,
             layers,
@@ -96,10 +96,10 @@ def sampled(
 
     render = note_renderer(load_preset(preset_path), source)
     with progress("sampled") as report:
-        made = export_sampled(plan, out, render, progress=report)
-    for note in notes(plan, made, "--dry leaves"):
+        written = export_sampled(plan, out, render, progress=report)
+    for note in notes(plan, written, "--dry leaves"):
         say(f"note: {note}")
-    print(f"{one_line(str(out))}: {made.samples} samples, {megabytes(made.size_bytes)}; {pitch}")
+    print(f"{one_line(str(out))}: {written.samples} samples, {megabytes(written.size_bytes)}; {pitch}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:

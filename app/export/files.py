@@ -106,9 +106,9 @@ def export_sounds(
     request = next(iter(requests.values()))
     info = request.preset.info
     with ExitStack() as files:
-        recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
+        recipes = {source: Recipe.of(source_request, settings) for source, source_request in requests.items()}
         # opened first, so that a folder that cannot be written to fails before the work
-        opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
             voices = render_voices(request, paths, rate_hz, all_voices=settings.normalise, progress=progress)
@@ -120,7 +120,7 @@ def export_sounds(
         reports = []
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]
-            with _explained(path):
+            with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
                 level = write_wav(file, sound, rate_hz, settings, tags, beside)
             report = _report(path, file, len(sound), rate_hz, level)
@@ -130,14 +130,14 @@ def export_sounds(
 
 
 def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
-    """`settings` with the longer fade-out of a sound that ends by its decay."""
+    """The settings with the longer fade-out of a sound that ends by its decay."""
     if request.decay_db is None:
         return settings
     return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: a name alone, no path, whatever `preset` is."""
+    """The name `{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`; never a path, whatever `preset` is."""
     preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_NAME]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
     return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
@@ -154,9 +154,9 @@ def _tags(title: str, recipe: Recipe) -> dict[str, str]:
 
 
 @contextmanager
-def _written_whole(path: Path) -> Iterator[BinaryIO]:
+def _open_whole(path: Path) -> Iterator[BinaryIO]:
     """A file to write to, which appears at `path` when the block ends well."""
-    with _explained(path), whole_file(path) as file:
+    with _explain_errors(path), whole_file(path) as file:
         yield file
 
 
@@ -166,7 +166,8 @@ def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level)
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def _explain_errors(path: Path) -> Iterator[None]:
+    """Raise errors of the context as a WriteError that names file and remedy."""
     try:
         yield
     except OSError as error:

@@ -57,8 +57,8 @@ _RECORDED = TypeAdapter(datetime)
 
 def recordings_folder() -> Path:
     """The path in LEARNED_STRINGS_RECORDINGS, else `recordings` in the platform's folder for a program's state."""
-    given = os.environ.get(FOLDER_VARIABLE)
-    return Path(given) if given else user_state_path("learned-strings", appauthor=False) / "recordings"
+    folder = os.environ.get(FOLDER_VARIABLE)
+    return Path(folder) if folder else user_state_path("learned-strings", appauthor=False) / "recordings"
 
 
 class Journal:
@@ -73,26 +73,26 @@ class Journal:
 
     @classmethod
     def begun(cls, folder: Path, recorded: datetime) -> Journal:
-        """A new one.
+        """A new journal, with its first line written.
 
         Raises:
             OSError: the folder cannot be made or written.
         """
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
-        if (lock := _locked(path)) is None:
+        if (lock := _lock_of(path)) is None:
             raise PermissionError(None, "its lock cannot be made", str(path))
-        made = cls(path, lock)
+        journal = cls(path, lock)
         try:
-            made._append([{"version": VERSION, "recorded": recorded.isoformat()}])
+            journal._append([{"version": VERSION, "recorded": recorded.isoformat()}])
         except OSError:
-            made.delete()
+            journal.delete()
             raise
-        return made
+        return journal
 
     def write(self, events: Iterable[TimedEvent]) -> None:
         """Append events, in the order of their times from the beginning of the recording. Raises OSError."""
-        self._append([self._line(each) for each in events])
+        self._append([self._line(event) for event in events])
 
     def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
         """Append the source that is heard from now on. Raises OSError."""
@@ -103,11 +103,11 @@ class Journal:
         self._append([{"end": end_s}])
 
     def close(self) -> None:
-        """Leave it to the next start, or to another process."""
+        """Leave the journal to the next start, or to another process."""
         self._lock.unlock()
 
     def delete(self) -> None:
-        """Remove it: the recording is saved, or not wanted. Where that fails, it is offered again."""
+        """Remove the journal: the recording is saved, or not wanted. Where that fails, it is offered again."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
         self._lock.unlock()
@@ -130,12 +130,12 @@ class Journal:
                 break
         return read.played()
 
-    def _line(self, each: TimedEvent) -> dict[str, Any]:
-        event, line = each.event, {"t": each.time_s}
+    def _line(self, entry: TimedEvent) -> dict[str, Any]:
+        event, line = entry.event, {"t": entry.time_s}
         if isinstance(event, PatchTurned):
             before, self._patch = self._patch, event.patch.model_dump(mode="json")
-            turned = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
-            return {**line, **turned}
+            change = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
+            return {**line, **change}
         return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
 
     def _append(self, lines: list[dict[str, Any]]) -> None:
@@ -153,10 +153,10 @@ def left_journals(folder: Path) -> list[Journal]:
         paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if path.is_file())
     except OSError:
         return []
-    return [Journal(path, lock) for path in paths if (lock := _locked(path)) is not None]
+    return [Journal(path, lock) for path in paths if (lock := _lock_of(path)) is not None]
 
 
-def _locked(path: Path) -> QLockFile | None:
+def _lock_of(path: Path) -> QLockFile | None:
     """The lock of a journal; None: another process has it, or it cannot be made."""
     lock = QLockFile(str(path.with_suffix(".lock")))
     lock.setStaleLockTime(0)  # a lock is as old as its process; one of a dead process does not count
@@ -194,7 +194,7 @@ class _Read:
             data = parse_json(line, self.where)
             if not isinstance(data, dict):
                 raise SchemaError(f"{self.where}: a line is no JSON object")
-            self._take(data)
+            self._take_line(data)
         except (ValueError, LookupError, TypeError, OverflowError) as error:
             if self.recorded is None:
                 reason = one_line(str(error), 200)
@@ -202,29 +202,30 @@ class _Read:
             return False
         return len(self.events) < LONGEST_RECORDING
 
-    def _take(self, data: dict[str, Any]) -> None:
+    def _take_line(self, data: dict[str, Any]) -> None:
+        """Add the content of a line. Raises ValueError: it is not as this program writes it."""
         if self.recorded is None:
             if data.get("version") != VERSION:
                 raise ValueError("version: made by another version of the program")
             self.recorded = _RECORDED.validate_python(data["recorded"])
         elif "end" in data:
-            self.end_s = _within(data["end"], (0.0, LONGEST_S))
+            self.end_s = _number_within(data["end"], (0.0, LONGEST_S))
         elif "source" in data:
             if data["source"] not in get_args(PlayedSource):
                 raise ValueError("source")
             self.source = data["source"]
-            self.difference_gain_db = _within(data["difference_gain_db"], DIFFERENCE_GAIN_RANGE_DB)
+            self.difference_gain_db = _number_within(data["difference_gain_db"], DIFFERENCE_GAIN_RANGE_DB)
         else:
-            time_s = _within(data.pop("t"), (-LONGEST_S, LONGEST_S))
+            time_s = _number_within(data.pop("t"), (-LONGEST_S, LONGEST_S))
             ((kind, value),) = data.items()
             self.events.append(TimedEvent(time_s, self._event(kind, value)))
 
     def _event(self, kind: str, value: Any) -> Event:
         if kind in ("patch", "turned"):
-            return PatchTurned(Patch.model_validate(self._turned(kind, value)))
+            return PatchTurned(Patch.model_validate(self._turn_patch(kind, value)))
         return _CHECKED[kind].validate_python(value)
 
-    def _turned(self, kind: str, value: Any) -> dict[str, Any]:
+    def _turn_patch(self, kind: str, value: Any) -> dict[str, Any]:
         if kind == "patch":
             self._patch = dict(value)
             return self._patch
@@ -242,16 +243,16 @@ class _Read:
         """The recording, with what is down at its end released."""
         if self.recorded is None:
             raise ValueError(f"{self.where}: no recording of this program (it is empty)")
-        patch = next((each.event.patch for each in self.events if isinstance(each.event, PatchTurned)), None)
-        last_s = max((each.time_s for each in self.events), default=0.0)
+        patch = next((entry.event.patch for entry in self.events if isinstance(entry.event, PatchTurned)), None)
+        last_s = max((entry.time_s for entry in self.events), default=0.0)
         events = played_from(self.events, last_s if self.end_s is None else self.end_s)
         if patch is None or not events:
             return None
         return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded)
 
 
-def _within(value: Any, limits: tuple[float, float]) -> Any:
-    """The number. Raises ValueError: it is out of its limits, or none."""
+def _number_within(value: Any, limits: tuple[float, float]) -> Any:
+    """Return the number. Raises ValueError: it is out of its limits, or none."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not limits[0] <= value <= limits[1]:
         raise ValueError(f"{bounds.brief(str(value))} is out of range")
     return value

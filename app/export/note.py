@@ -117,15 +117,16 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
     note = note_name(key) if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
     softest_mm, amplitude_mm = max(softest_mm, LEAST_MM), max(amplitude_mm, LEAST_MM)
     share = math.log(amplitude_mm / softest_mm) / math.log(max(hardest_mm / softest_mm, 1.001))
-    return _named(title, note, share)
+    return _file_stem(title, note, share)
 
 
 def struck_name(struck: Struck) -> str:
     """A name as `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
-    return _named(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
+    return _file_stem(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
 
 
-def _named(title: str, note: str, share: float) -> str:
+def _file_stem(title: str, note: str, share: float) -> str:
+    """The name of a file without its ending: short title, note and loudness."""
     short = re.split(r"[,—]| - ", title)[0]
     plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
     note = note.replace("♯", "#")
@@ -157,7 +158,7 @@ class HeardNote:
 
 @dataclass(frozen=True)
 class NoteExport:
-    """Renders a note once, and writes a file for each source. See `ExportJob`.
+    """The export of a note, rendered once, with a file for each source. See `ExportJob`.
 
     Attributes:
         paths: the files to write, by source.
@@ -193,7 +194,7 @@ class NoteExport:
 
 
 def _words(reports: list[WavReport], of_family: bool) -> list[str]:
-    """`of_family`: whether the model is of many strings, whose error does not grow past its training."""
+    """The warnings of reports; `of_family`: the model is of many strings, whose error does not grow past training."""
     lines = []
     for report in reports:
         level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"

@@ -116,7 +116,7 @@ def recorded_files(path: Path) -> tuple[Path, Path]:
 
 @dataclass(frozen=True, eq=False)
 class PlayedExport:
-    """Writes what was played to `recorded_files` of `path`. See `ExportJob`.
+    """The export of a recording to `recorded_files` of `path`. See `ExportJob`.
 
     Attributes:
         preset: the file of the preset that plays the patch.
@@ -149,11 +149,11 @@ class PlayedExport:
             difference_gain_db=played.difference_gain_db,
             recorded=played.recorded,
         )
-        heard, level = (
+        sound, level = (
             source_words(played.source, played.difference_gain_db),
             f"peak {written.level.peak_db:.1f} dBFS",
         )
-        return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {heard}, {level}."
+        return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {sound}, {level}."
 
     def cancelled(self) -> str:
         return "the MIDI file is kept."

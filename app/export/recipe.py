@@ -160,9 +160,9 @@ class Recipe(Value):
         """
         if self.string is not None:
             preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
-        asked: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
+        arguments: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
         struck = None if self.struck is None else self.struck.found()[0]
-        return SoundRequest(preset, **asked, difference_gain_db=self.difference_gain_db, struck=struck)
+        return SoundRequest(preset, **arguments, difference_gain_db=self.difference_gain_db, struck=struck)
 
     @property
     def settings(self) -> WavSettings:
@@ -189,12 +189,12 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
         )
     try:
         data = parse_json(text, "the text")
-        played = isinstance(data, dict) and "kind" in data
-        return InstrumentSound.model_validate(data) if played else Recipe.model_validate(data)
+        on_instrument = isinstance(data, dict) and "kind" in data
+        return InstrumentSound.model_validate(data) if on_instrument else Recipe.model_validate(data)
     except ValueError as error:
-        raise _unusable(path, explained(error)) from error
+        raise _unusable_error(path, explained(error)) from error
     except OverflowError as error:  # raised for numbers that are too long
-        raise _unusable(path, str(error)) from error
+        raise _unusable_error(path, str(error)) from error
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -204,13 +204,13 @@ def read_recipe(path: Path) -> Recipe:
         NotesElsewhere: it was played on an instrument.
         NoRecipe, RecipeError: as `read_origin`.
     """
-    found = read_origin(path)
-    if isinstance(found, InstrumentSound):
+    origin = read_origin(path)
+    if isinstance(origin, InstrumentSound):
         raise NotesElsewhere(
-            f"{path}: is {found.words}. It has no recipe to render again:"
-            f" its notes are in the MIDI file {found.midi}, beside it unless it was moved"
+            f"{path}: is {origin.words}. It has no recipe to render again:"
+            f" its notes are in the MIDI file {origin.midi}, beside it unless it was moved"
         )
-    return found
+    return origin
 
 
 def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
@@ -218,10 +218,10 @@ def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
     try:
         return recipe.request(preset)
     except ValueError as error:
-        raise _unusable(path, str(error)) from error
+        raise _unusable_error(path, str(error)) from error
 
 
-def _unusable(path: Path, why: str) -> RecipeError:
+def _unusable_error(path: Path, why: str) -> RecipeError:
     return RecipeError(
         f"{path}: its recipe cannot be used ({why}); it is damaged, of another program, or of a newer version"
     )

@@ -51,19 +51,19 @@ class Recording:
     def __getitem__(self, frames: slice) -> NDArray[np.float64]:
         first, last, _ = frames.indices(self._frames)
         self._file.seek(first * self._frame_bytes)
-        wanted = max(0, last - first) * self._frame_bytes
-        return np.frombuffer(_read(self._file, wanted), np.float32).reshape(-1, self.points).astype(np.float64)
+        count = max(0, last - first) * self._frame_bytes
+        return np.frombuffer(_read(self._file, count), np.float32).reshape(-1, self.points).astype(np.float64)
 
     @property
     def _frame_bytes(self) -> int:
         return 4 * self.points
 
 
-def _read(file: Any, wanted: int) -> bytes:
+def _read(file: Any, count: int) -> bytes:
     parts = []
-    while wanted > 0 and (part := file.read(wanted)):
+    while count > 0 and (part := file.read(count)):
         parts.append(part)
-        wanted -= len(part)
+        count -= len(part)
     return b"".join(parts)
 
 

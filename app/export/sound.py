@@ -82,7 +82,7 @@ class SoundRequest:
         listen_right: the listening point of a right channel; None for mono.
         pickup: 10 mm of "displacement" or 30 m/s of "velocity" are full scale.
         difference_gain_db: gain of the difference.
-        decay_db: the sound ends where both model and truth have fallen this far below their maximum, so that all
+        decay_db: the sound ends where both model and truth have fallen this far below their maximum. So all
             files of a pluck have the same length. None: it lasts `seconds`.
         through: level, amplifier, body and room of an instrument; a difference has its level alone. None: the string
             alone.
@@ -144,8 +144,8 @@ class Voices:
 
     def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
         """All samples of a source: (frames,), or (frames, 2) in stereo and for "both"."""
-        found = Mixed(self, source, difference_gain_db)[:]
-        return found[:, 0] if found.shape[1] == 1 else found
+        mixed = Mixed(self, source, difference_gain_db)[:]
+        return mixed[:, 0] if mixed.shape[1] == 1 else mixed
 
 
 @dataclass(frozen=True)
@@ -212,12 +212,12 @@ def render_voices(
     """
     sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
     needed = {voice for source in sources for voice in voices_of(source)}
-    wanted = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
+    voices = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
     sounds: dict[Voice, Recording] = {}
-    for place, voice in enumerate(wanted):
+    for place, voice in enumerate(voices):
 
         def part(share: float, place: int = place) -> None:
-            progress((place + share) / len(wanted))
+            progress((place + share) / len(voices))
 
         with suppress(*(() if voice in needed else (Runaway,))):
             sounds[voice] = _render(request, voice, rate_hz, part)
@@ -254,13 +254,13 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callabl
     preset, info = request.preset, request.preset.info
     decay_db = None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB
     if request.struck is not None:
-        found = Recording(channels_of(request.struck.patch))
+        struck_recording = Recording(channels_of(request.struck.patch))
         dry = request.source == "difference"
         for block in request.struck.sound(preset, voice, rate_hz, request.seconds, decay_db, dry, progress):
             if not np.isfinite(block).all():
-                raise Runaway(len(found) / rate_hz)
-            found.append(block)
-        return found
+                raise Runaway(len(struck_recording) / rate_hz)
+            struck_recording.append(block)
+        return struck_recording
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
     ear = Ear(request.points, request.pickup)
     through, recording = request.through, None

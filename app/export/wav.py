@@ -91,7 +91,9 @@ def write_wav(
     if len(sound) == 0:
         raise ValueError("there are no samples to write; choose a longer duration")
     fade_frames = round(settings.fade_out_s * rate_hz)
-    peak = max(_peak(_faded(_finite(block), first, len(sound), fade_frames)) for first, block in blocks(sound))
+    peak = max(
+        _peak(_fade_block(_check_finite(block), first, len(sound), fade_frames)) for first, block in blocks(sound)
+    )
     gain, clipped = 1.0, 0
     if settings.normalise:
         loudest = max([peak, *(_peak(block) for other in beside for _, block in blocks(other))])
@@ -102,14 +104,14 @@ def write_wav(
         for name, text in tags.items():
             setattr(out, name, text)
         for first, block in blocks(sound):
-            faded = _faded(block, first, len(sound), fade_frames)
-            stored, cut = quantised(faded * gain, settings.bits, first, len(sound))
+            faded = _fade_block(block, first, len(sound), fade_frames)
+            numbers, cut = quantised(faded * gain, settings.bits, first, len(sound))
             with suppress(soundfile.SoundFileError, AssertionError):  # of a full disk, whose OSError `check` raises
-                out.write(stored)
+                out.write(numbers)
             noting.check()
             clipped += cut
     noting.check()
-    _undate(file, channels)
+    _zero_time(file, channels)
     return Level(_decibel(peak * gain), clipped, _decibel(gain))
 
 
@@ -125,18 +127,19 @@ class _Noting:
         self._error: OSError | None = None
 
     def write(self, data: bytes) -> int:
-        return self._try(self._file.write, data, failed=len(data))
+        return self._call_file(self._file.write, data, failed=len(data))
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        return self._try(self._file.seek, offset, whence, failed=0)
+        return self._call_file(self._file.seek, offset, whence, failed=0)
 
     def tell(self) -> int:
-        return self._try(self._file.tell, failed=0)
+        return self._call_file(self._file.tell, failed=0)
 
     def read(self, size: int = -1) -> bytes:
-        return self._try(self._file.read, size, failed=b"")
+        return self._call_file(self._file.read, size, failed=b"")
 
-    def _try(self, call: Callable[..., T], *arguments: object, failed: T) -> T:
+    def _call_file(self, call: Callable[..., T], *arguments: object, failed: T) -> T:
+        """Call a method of the file; from its first OSError on, which is kept, return `failed`."""
         if self._error is None:
             try:
                 return call(*arguments)
@@ -150,7 +153,7 @@ class _Noting:
             raise self._error
 
 
-def _undate(file: BinaryIO, channels: int) -> None:
+def _zero_time(file: BinaryIO, channels: int) -> None:
     """Zero the time of writing in the chunk PEAK, so that the same sound makes the same bytes."""
     file.seek(0)
     place = file.read(HEAD_BYTES).find(b"PEAK" + struct.pack("<II", 8 * (1 + channels), 1))
@@ -159,7 +162,7 @@ def _undate(file: BinaryIO, channels: int) -> None:
         file.write(bytes(4))
 
 
-def _faded(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:
+def _fade_block(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:
     """A block that begins at frame `first` of `total`, with its part of the fade-out over the last `frames`."""
     frames = min(frames, total)
     begin = max(0, total - frames - first)  # in the block
@@ -175,7 +178,7 @@ def _peak(block: NDArray[np.floating]) -> float:
     return float(np.abs(block).max(initial=0.0))
 
 
-def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
+def _check_finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
     if not bool(np.isfinite(block).all()):
         raise ValueError("the sound holds values that are not finite; choose another source or a shorter duration")
     return block
@@ -183,7 +186,7 @@ def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
 
 def faded_out(samples: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
     """The sound with its last `frames` faded to zero along half a cosine."""
-    return _faded(samples, 0, len(samples), frames)
+    return _fade_block(samples, 0, len(samples), frames)
 
 
 def quantised(
@@ -191,8 +194,8 @@ def quantised(
 ) -> tuple[NDArray[np.generic], int]:
     """The numbers that the file stores, as soundfile takes them, and how many were clipped.
 
-    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound; at 24 bits the
-    step is 144 dB below full scale, below any converter's own noise.
+    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound. At 24 bits
+    there is none: the step is 144 dB below full scale, below any converter's own noise.
 
     Args:
         first, total: the samples are a block that begins at frame `first` of `total`, and get its part of the dither.

@@ -24,13 +24,13 @@ def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | 
         string: on which of a set it is played, as of `Strings.of_key`.
     """
     try:
-        found = Strings(patch).of_key(event.key, string)
+        key_string = Strings(patch).of_key(event.key, string)
     except ValueError:
-        found = None
-    if found is None:
+        key_string = None
+    if key_string is None:
         return []
     return outside_of_string(
-        info, by_two_numbers(patch, found.parameters), on_string(found, patch.pluck.pluck(event.velocity))
+        info, by_two_numbers(patch, key_string.parameters), on_string(key_string, patch.pluck.pluck(event.velocity))
     )
 
 

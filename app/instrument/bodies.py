@@ -80,23 +80,23 @@ def install_body(file: Path) -> str:
         WriteError: the copy cannot be written; nothing is left.
     """
     read_impulse(file)
-    folder, known = own_bodies(), _own_files()
+    folder, own_files = own_bodies(), _own_files()
     stem = file_stem(file.stem)[: LONGEST_NAME - 5]
     try:
         data = read_bounded(file, LARGEST_IMPULSE_BYTES)
     except OSError as error:
         raise ImpulseError(f"{file}: cannot be read ({error.strerror}); check the name") from error
-    for name, path in known.items():
+    for name, path in own_files.items():
         with suppress(OSError):  # one that cannot be read counts as another
             if path.stat().st_size == len(data) and read_bounded(path, LARGEST_IMPULSE_BYTES) == data:
                 return name
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        taken = {path.stem.casefold() for path in folder.iterdir()} | set(BODIES)  # names of some disks ignore case
+        used_names = {path.stem.casefold() for path in folder.iterdir()} | set(BODIES)  # some disks ignore case
     except OSError as error:
         raise WriteError(explain(folder, error)) from error
     names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
-    name = next(name for name in names if name.casefold() not in taken)
+    name = next(name for name in names if name.casefold() not in used_names)
     with whole_file(folder / f"{name}{file.suffix.lower()}") as copy:
         copy.write(data)
     return name
@@ -104,19 +104,19 @@ def install_body(file: Path) -> str:
 
 def _own_files() -> dict[str, Path]:
     """Name -> file. Of two files of one name the first; none of the name of an engine's body."""
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     try:
         paths = sorted(path for path in own_bodies().iterdir() if path.suffix.lower() in ENDINGS)
     except OSError:  # most often it is not there
-        return found
+        return files
     for path in paths:
         try:
             _NAME.validate_python(path.stem)
         except ValidationError:  # no patch could name it
             continue
         if path.stem not in BODIES and path.is_file():
-            found.setdefault(path.stem, path)
-    return found
+            files.setdefault(path.stem, path)
+    return files
 
 
 @lru_cache(maxsize=16)

@@ -49,7 +49,7 @@ class Tabled:
 
 
 class InstrumentPlayer:
-    """Plays one patch with the mixer's next quantum; what began is reported then.
+    """A player of one patch. Events count with the mixer's next quantum, which reports the notes that began.
 
     Every public method may be called from any thread. Strings that ring follow a patch that is taken.
     A mixer of another rate needs another player: see `again`.
@@ -82,7 +82,9 @@ class InstrumentPlayer:
             raise ValueError(
                 f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
-        self._preset, self.grid_points, self.most_notes = preset, preset.info.grid_points, most_notes
+        self._preset = preset
+        self.grid_points = preset.info.grid_points
+        self.most_notes = most_notes
         self._sources = tuple(gains)
         self._of_drums = isinstance(patch.strings, Drums)
         self._programs = programs_of(preset, rate_hz, self._sources, self._of_drums)
@@ -99,11 +101,14 @@ class InstrumentPlayer:
     def again(self, rate_hz: int) -> InstrumentPlayer:
         """The same for another mixer, with wheels and pedals as they stand. Its keys are taken over."""
         gains = {source: self.compiled.source_gain(place) for place, source in enumerate(self._sources)}
-        patch, ear, most, keys = self.patch, self.ear, self.most_notes, self._keys
-        made = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
+        patch = self.patch
+        ear = self.ear
+        most = self.most_notes
+        keys = self._keys
+        player = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
         for event in self.at_hand:
-            made.handle(event)
-        return made
+            player.handle(event)
+        return player
 
     # What is played
 
@@ -141,24 +146,24 @@ class InstrumentPlayer:
     @property
     def at_hand(self) -> list[Event]:
         """The events that bring wheels and pedals of a new player where they stand."""
-        found: list[Event] = []
+        state_events: list[Event] = []
         for number in range(of.CHANNELS):
             channel = self.compiled.channel(number)
             if channel.range_semitones is not None:
-                found += bend_range(channel.range_semitones, number)
+                state_events += bend_range(channel.range_semitones, number)
             if channel.fine_tuning:
                 steps = channel.fine_tuning + of.TUNING_STEPS
-                found += parameter_set(FINE_TUNING, steps // 128, steps % 128, number)
+                state_events += parameter_set(FINE_TUNING, steps // 128, steps % 128, number)
             if channel.coarse_tuning:
-                found += parameter_set(COARSE_TUNING, channel.coarse_tuning + 64, 0, number)
+                state_events += parameter_set(COARSE_TUNING, channel.coarse_tuning + 64, 0, number)
             if channel.volume != of.USUAL_VOLUME:
-                found.append(Controller(events.VOLUME, channel.volume, number))
+                state_events.append(Controller(events.VOLUME, channel.volume, number))
             if channel.expression != 127:
-                found.append(Controller(events.EXPRESSION, channel.expression, number))
+                state_events.append(Controller(events.EXPRESSION, channel.expression, number))
             if channel.bend:
-                found.append(Bend(channel.bend, number))
+                state_events.append(Bend(channel.bend, number))
             if channel.pedal:
-                found.append(Controller(events.SUSTAIN, 127, number))
+                state_events.append(Controller(events.SUSTAIN, 127, number))
             for controller, value in (
                 (events.SOFT, channel.mute),
                 (events.LEGATO, 127 * channel.legato),
@@ -169,16 +174,16 @@ class InstrumentPlayer:
                 (events.STRUM, 127 * channel.strums),
             ):
                 if value:
-                    found.append(Controller(controller, value, number))
+                    state_events.append(Controller(controller, value, number))
             if channel.slide is not None:
-                found.append(Controller(events.SLIDE, channel.slide, number))
+                state_events.append(Controller(events.SLIDE, channel.slide, number))
         wheel, moved_by = self._wheel
         if wheel:
-            found.append(Controller(events.MOD_WHEEL, wheel, moved_by))
-        return found
+            state_events.append(Controller(events.MOD_WHEEL, wheel, moved_by))
+        return state_events
 
     def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
-        """The factor of each of its sources; notes that ring fade to it.
+        """Set the factor of each of its sources; notes that ring fade to it.
 
         Args:
             compared: whether notes that begin have a voice of each source, to switch while they ring.
@@ -197,33 +202,33 @@ class InstrumentPlayer:
         Raises:
             ValueError: the tuning is impossible, or the patch has drums for a player of strings, or the reverse.
         """
-        heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        ear = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
         near = self._keys if nearly else None
         if not isinstance(patch.strings, Drums):
             if self._of_drums:
                 raise ValueError(f"{patch.name} has strings, and this player plays drums")
-            return StringKeys(patch, heard, self._preset.info, near if isinstance(near, StringKeys) else None)
+            return StringKeys(patch, ear, self._preset.info, near if isinstance(near, StringKeys) else None)
         if not self._of_drums:
             raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
-        return DrumKeys(patch, heard, near if isinstance(near, DrumKeys) else None)
+        return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
 
     def tabled(self, keys: StringKeys | DrumKeys) -> Tabled:
         """The table of keys, which takes milliseconds, of drums more."""
         return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
 
-    def take(self, made: Tabled, frame: int = 0) -> None:
+    def take(self, tabled: Tabled, frame: int = 0) -> None:
         """Play these keys from a frame on, at once; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            if self.table is None or is_another(made.keys.patch, self._keys.patch):
+            if self.table is None or is_another(tabled.keys.patch, self._keys.patch):
                 self._instrument += 1
                 self._wheel = 0, 0
             self._serial += 1
-            record = made.table.record
+            record = tabled.table.record
             record["serial"], record["instrument"] = self._serial, self._instrument
-            self._keys, self.table = made.keys, made.table
+            self._keys, self.table = tabled.keys, tabled.table
             self.compiled.take(self.table, frame)
 
     # Events
@@ -250,10 +255,10 @@ class InstrumentPlayer:
             return 0
         if isinstance(event, PluckAt):
             return 0
-        struck = None
+        blow = None
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._check(event)
-            struck = self._struck(event)
+            blow = self._struck(event)
         give = partial(self.compiled.give, channel=event.channel, frame=frame)
         if isinstance(event, NoteOn):
             return give(
@@ -262,7 +267,7 @@ class InstrumentPlayer:
                 value=event.velocity,
                 by_hand=None if self._of_drums else event.pluck,
                 struck_s=struck_s,
-                struck=struck,
+                struck=blow,
                 string=event.string,
             )
         elif isinstance(event, NoteOff):
@@ -290,8 +295,8 @@ class InstrumentPlayer:
         """The effect of a blow at a place of its own on a drum's modes; None: the drum's own place."""
         if event.place is None or not isinstance(self._keys, DrumKeys):
             return None
-        found = self._keys.of_key(event.key)
-        return None if found is None else found.struck(event.place)
+        drum_key = self._keys.of_key(event.key)
+        return None if drum_key is None else drum_key.struck(event.place)
 
     def _follow_wheel(self, event: Controller) -> None:
         moved_by = self._wheel[1]
@@ -330,8 +335,8 @@ class InstrumentPlayer:
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
         with contextlib.suppress(ValueError):  # reported when it is struck
-            own = keys.strings.of_key(note.key, note.string if note.string >= 0 else None)
-            return 0.0 if own is None else 12 * math.log2(own.parameters.length_m / note.length_m)
+            key_string = keys.strings.of_key(note.key, note.string if note.string >= 0 else None)
+            return 0.0 if key_string is None else 12 * math.log2(key_string.parameters.length_m / note.length_m)
         return 0.0
 
 

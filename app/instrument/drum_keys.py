@@ -88,7 +88,9 @@ class DrumKeys:
     def __init__(self, patch: Patch, ear: Ear, near: DrumKeys | None = None) -> None:
         """Raise ValueError: the tuning is impossible, or a drum."""
         assert isinstance(patch.strings, Drums)
-        self.patch, self.ear, self.drums = patch, ear, patch.strings
+        self.patch = patch
+        self.ear = ear
+        self.drums = patch.strings
         self._tuning = Tuning(patch.tuning)
         self.body: Array | None = body_curves(patch) if near is None else near.body
         self._known: dict[int, DrumKey | None] = {}
@@ -112,10 +114,10 @@ class DrumKeys:
         return played.model_copy(update=speeds), ratio
 
     def _of_key(self, key: int) -> DrumKey | None:
-        found = self.tuned_to(key)
-        if found is None:
+        drum_and_ratio = self.tuned_to(key)
+        if drum_and_ratio is None:
             return None
-        played, ratio = found
+        played, ratio = drum_and_ratio
         try:
             modes = self._modes(played, ratio)
         except ValueError as error:
@@ -148,12 +150,12 @@ def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
     return modes_of(tune(drum, ratio, highest_hz), highest_hz, of.MOST_DRUM_MODES)
 
 
-def block_of(found: DrumKey) -> Array:
+def block_of(drum_key: DrumKey) -> Array:
     """The drum of a key as the kernels read it: see `records.DRUM`."""
-    modes = len(found.modes)
+    modes = len(drum_key.modes)
     block = np.zeros(DRUM.itemsize // 8 + DRUM_ROWS * modes)
-    drum = struck_drum(found.played, found.modes.drum)
-    kernel.write(drum, found.modes.rows, np.array(found.points), tools(), block.ctypes.data, modes)
+    drum = struck_drum(drum_key.played, drum_key.modes.drum)
+    kernel.write(drum, drum_key.modes.rows, np.array(drum_key.points), tools(), block.ctypes.data, modes)
     return block
 
 

@@ -24,10 +24,10 @@ def effects_of(patch: Patch) -> Effects | None:
 def effects_from(chosen: ChosenBody, room: Room, amp: Amp, level_db: float) -> Effects | None:
     """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
     driven = amp.drive_db > 0
-    made = Effects(
+    effects = Effects(
         _body(chosen)[0], room if room.mix > 0 else None, amp if driven else None, level_db if driven else 0.0
     )
-    return None if made == Effects() else made
+    return None if effects == Effects() else effects
 
 
 def added_words(patch: Patch) -> str:
@@ -74,7 +74,9 @@ def body_curves(patch: Patch) -> NDArray[np.float64] | None:
 
 def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
     """The body, and why it cannot be used."""
-    name, mix, size = chosen.name, chosen.mix, chosen.size
+    name = chosen.name
+    mix = chosen.mix
+    size = chosen.size
     if not name or mix == 0:
         return None, ""
     if name in BODIES:

@@ -10,18 +10,37 @@ from app.patches.fields import ranged
 from app.patches.patch import Patch
 from engine.pluck import Pluck
 
-SLIDE_TIME, VOLUME, EXPRESSION, PORTAMENTO, SOFT, LEGATO = 5, 7, 11, 65, 67, 68
-HARMONICS, TREMOLO, STRUM = 80, 81, 82  # MIDI's general-purpose buttons
-SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
+# Numbers of MIDI controllers
+MOD_WHEEL = 1
+SLIDE_TIME = 5
+VOLUME = 7
+EXPRESSION = 11
+SUSTAIN = 64
+PORTAMENTO = 65
+SOFT = 67
+LEGATO = 68
+SLIDE = 74
+HARMONICS = 80  # this and the next two: MIDI's general-purpose buttons
+TREMOLO = 81
+STRUM = 82
+SOUND_OFF = 120
+RESET = 121
+NOTES_OFF = 123
 SWITCHES = (LEGATO, PORTAMENTO, SLIDE_TIME, HARMONICS, TREMOLO, STRUM)  # how keys are played
-VALUE, FINE_VALUE, INCREMENT, DECREMENT = (
-    6,
-    38,
-    96,
-    97,
-)  # of the parameter that these choose: registered ones (RPN), and others
-REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
-BEND_RANGE, FINE_TUNING, COARSE_TUNING, NO_PARAMETER = 0, 1, 2, 127  # registered ones
+# Controllers that choose a parameter, a registered one (RPN) or another, and set it
+FINE_OTHER = 98
+OTHER = 99
+FINE_REGISTERED = 100
+REGISTERED = 101
+VALUE = 6
+FINE_VALUE = 38
+INCREMENT = 96
+DECREMENT = 97
+# Registered parameters
+BEND_RANGE = 0
+FINE_TUNING = 1
+COARSE_TUNING = 2
+NO_PARAMETER = 127
 SETS_PARAMETER = (VALUE, FINE_VALUE, INCREMENT, DECREMENT)
 AT_REST = 127  # value of `RESET` with which nothing stays, of what MIDI's own, 0, leaves: ranges, tuning, volume
 PEDAL_DOWN = 64  # from this value on
@@ -152,7 +171,7 @@ def parameter_set(number: int, value: int, fine_value: int, channel: int) -> lis
         (REGISTERED, NO_PARAMETER),
         (FINE_REGISTERED, NO_PARAMETER),
     )
-    return [Controller(controller, each, channel) for controller, each in messages]
+    return [Controller(controller, byte, channel) for controller, byte in messages]
 
 
 def bend_range(semitones: float, channel: int) -> list[Event]:
@@ -170,8 +189,8 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
         if isinstance(event, NoteOn | NoteOff):
             off = NoteOff(event.key, event.channel, event.string)
             strokes = down.pop(off, 0)
-            struck = isinstance(event, NoteOn) and event.velocity > 0
-            strokes = (1 if event.string is not None else strokes + 1) if struck else strokes - 1
+            begins = isinstance(event, NoteOn) and event.velocity > 0
+            strokes = (1 if event.string is not None else strokes + 1) if begins else strokes - 1
             if strokes > 0:
                 down[off] = strokes
         elif isinstance(event, Controller) and event.number == SUSTAIN:
@@ -195,9 +214,10 @@ def played_from(recorded: Iterable[TimedEvent], end_s: float) -> list[TimedEvent
 
     Keys and pedals that are down are released at its end.
     """
-    events = sorted((each for each in recorded if each.time_s <= end_s), key=lambda each: each.time_s)
-    events += [TimedEvent(end_s, event) for event in releases_for(each.event for each in events)]
-    first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
+    events = [timed_event for timed_event in recorded if timed_event.time_s <= end_s]
+    events.sort(key=lambda timed_event: timed_event.time_s)
+    events += [TimedEvent(end_s, event) for event in releases_for(timed_event.event for timed_event in events)]
+    first = next((timed_event.time_s for timed_event in events if isinstance(timed_event.event, NoteOn)), None)
     if first is None:
         return []
-    return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]
+    return [TimedEvent(max(0.0, timed_event.time_s - first), timed_event.event) for timed_event in events]

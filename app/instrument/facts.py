@@ -103,13 +103,13 @@ def reported(figure: float, unit: str) -> str:
     return f"{text} {unit}".rstrip()
 
 
-def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: float) -> float:
+def knob_for(patch: Patch, key: tuple[int, int | None], field: str, figure_value: float) -> float:
     """Find the knob value where a figure of a key's string is as wanted, or as near as it goes.
 
     Args:
         key: and on which string of the set it is played, as in `Strings.of_key`.
         field: one of FIGURES.
-        wanted: in the parameter's `figure_unit`.
+        figure_value: in the parameter's `figure_unit`.
 
     Raises:
         ValueError: the key is silent.
@@ -118,14 +118,14 @@ def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: floa
     low, high = OF_PATCHES[field].limits
     for _ in range(HALVINGS):
         middle = math.sqrt(low * high)
-        turned = patch.model_copy(update={"knobs": patch.knobs.model_copy(update={name: middle})})
+        trial = patch.model_copy(update={"knobs": patch.knobs.model_copy(update={name: middle})})
         try:
-            found = Strings(turned).of_key(*key)
+            key_string = Strings(trial).of_key(*key)
         except ValueError:  # there is no such string, as there is one at 1
             above = middle > 1
         else:
-            if found is None:
+            if key_string is None:
                 raise ValueError(f"key {key[0]} of {patch.name} is silent; choose another")
-            above = (figure.of(found.parameters, turned) > wanted) != figure.falls
+            above = (figure.of(key_string.parameters, trial) > figure_value) != figure.falls
         low, high = (low, middle) if above else (middle, high)
     return math.sqrt(low * high)

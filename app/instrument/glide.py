@@ -1,12 +1,12 @@
 """Pitch glide: by how many cents a key starts above its resting pitch, in closed form.
 
 A pluck stretches the string, which raises its tension. Over a period of each mode, q_n² averages to half its peak and
-q_n³ to three quarters of it, so that the first partial is raised to
+q_n³ to three quarters of it. The first partial is raised to
 
     ω² = ω₁² + k₁ (Σ_m η_m² q_m² / 2 + η₁² q₁² / 4),
 
-with the symbols of `engine.resonators.base`. Each q_m² decays by exp(-2σ_m t); here it is its mean over the first
-START_S, as high modes of short strings die away before a pitch is heard. The glide grows with amplitude squared.
+with the symbols of `engine.resonators.base`. Each q_m² decays by exp(-2σ_m t). Its mean over the first START_S counts
+here, as high modes of short strings die away before a pitch is heard. The glide grows with amplitude squared.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
         ValueError: the tuning is impossible.
     """
     if isinstance(patch.strings, Drums):
-        return _of_drums(patch)
+        return _drum_glides(patch)
     strings = Strings(patch)
     plucks = [patch.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
     shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
     modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)
     blows = [blow_factor(np.ones(1), shape) for shape in shapes_m / (amplitudes_mm[:, None] / 1000)]
-    found = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
+    glides = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
         try:
@@ -62,25 +62,25 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             if patch.pluck.is_blow:
                 omega = undamped_frequencies(string.parameters, string.modes)
                 sets_out_m = sets_out_m * np.stack(blows) * (omega[0] / omega)
-            found[key] = _of_string(patch, string, sets_out_m)
-    found.setflags(write=False)
-    return found
+            glides[key] = _string_glides(patch, string, sets_out_m)
+    glides.setflags(write=False)
+    return glides
 
 
-def _of_drums(patch: Patch) -> NDArray[np.float64]:
+def _drum_glides(patch: Patch) -> NDArray[np.float64]:
     """Compute the glides as `glides_cents`, by the mean tension of a blow's first swing."""
     keys = DrumKeys(patch, Ear(tuple(patch.pickup.points)))
-    found = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
+    glides = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
             if (drum := keys.of_key(key)) is not None:
-                found[key] = [drum.drop_cents(velocity, patch.pluck.curve) for velocity in range(len(found[key]))]
-    found.setflags(write=False)
-    return found
+                glides[key] = [drum.drop_cents(velocity, patch.pluck.curve) for velocity in range(len(glides[key]))]
+    glides.setflags(write=False)
+    return glides
 
 
-def _of_string(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def _string_glides(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """The glides (plucks,) of plucks with these modal amplitudes, (plucks, at least the string's modes)."""
     parameters, modes = string.parameters, string.modes
     decayed = 2 * START_S * decay_rates(patch, parameters, modes)

@@ -69,25 +69,25 @@ def learn_files(
     """Learn recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
-        progress: is called with the share that is done; may raise, to cancel: the same call continues later, with
-            the same result, from a checkpoint in `unfinished_folder`.
+        progress: is called with the share that is done; may raise, to cancel. The same call continues later from a
+            checkpoint in `unfinished_folder`, with the same result.
 
     Raises:
         NoteFileError, RecordingError: a file cannot be learned from; the message names it and the remedy.
         SchemaError: a checkpoint is damaged; the message names it.
         WriteError, OSError: a checkpoint cannot be written or read.
     """
-    found = []
+    notes = []
     for number, path in enumerate(paths):
         file = read_note(path)
         source = Source(path.name, file.digest, file.rate_hz, len(file.samples))
         try:
-            found.append((examined(file.samples, file.rate_hz), source))
+            notes.append((examined(file.samples, file.rate_hz), source))
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from error
         progress(0.05 * (number + 1) / len(paths))
     return learn(
-        found,
+        notes,
         kind=kind,
         length_m=length_m,
         gauge_mm=gauge_mm,
@@ -118,8 +118,8 @@ def reasons_against(path: Path) -> Reasons:
     """
     file = read_note(path)
     words: dict[bool, list[str]] = {True: [], False: []}
-    for each in examined(file.samples, file.rate_hz).findings:
-        words[each.refused].append(f"{each.reason}: {each.remedy}")
+    for finding in examined(file.samples, file.rate_hz).findings:
+        words[finding.refused].append(f"{finding.reason}: {finding.remedy}")
     return Reasons(words[True], words[False])
 
 
@@ -167,7 +167,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
         "free_poles": FREE_POLES,
         "begins_s": FIT_BEGINS_S,
         "seconds": FIT_LASTS_S,
-        "recordings": [each.source.digest for each in learned],
+        "recordings": [recording.source.digest for recording in learned],
     }
     recorded = combined(learned, settings)
     patch = _patch(name, stem, first, len(recorded.cents), kind)
@@ -191,7 +191,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
         if attack is not None:
             patch = with_attack(patch, load_preset(preset), first.note, first.physics.f0_hz, attack[1])
         with whole_file(report) as file:
-            file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
+            file.write(json.dumps([as_data(recording) for recording in learned], indent=2).encode())
         return Kept(preset, save_patch(patch).path, body, report)
 
 

@@ -43,8 +43,8 @@ def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[Recorde
         return None
     part = note.part(0, PART_S)
     hz = np.fft.rfftfreq(2 * len(part), 1 / note.rate_hz)
-    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, 2 * len(part))) ** 2
-    level_db = 10 * math.log10(float(force @ force) / max(float(heard.sum()) / len(part), 1e-30))
+    power = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, 2 * len(part))) ** 2
+    level_db = 10 * math.log10(float(force @ force) / max(float(power.sum()) / len(part), 1e-30))
     return RecordedAttack.of(force, note.rate_hz), level_db
 
 
@@ -58,10 +58,10 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
     tuned = patch.model_copy(update={"tuning": tuning})
     shared = gcd(note.rate_hz, RESPONSE_HZ)
     truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
-    struck, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
+    events, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
     dry = np.concatenate(
         list(
-            render_events(tuned, preset, struck, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
+            render_events(tuned, preset, events, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
         )
     )
     sound = fftconvolve(dry[:, 0].astype(np.float64), body)[: len(truth)]
@@ -89,5 +89,5 @@ def _body_impulse(patch: Patch) -> Array | None:
 def _mean_square(sound: Array, rate_hz: int) -> float:
     """The mean square of a sound after K-weighting."""
     hz = np.fft.rfftfreq(2 * len(sound), 1 / rate_hz)
-    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(sound, 2 * len(sound))) ** 2
-    return float(heard.sum()) / len(sound) / len(sound)
+    power = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(sound, 2 * len(sound))) ** 2
+    return float(power.sum()) / len(sound) / len(sound)

@@ -69,7 +69,7 @@ class Song:
     @property
     def length_s(self) -> float:
         """The time of the last note or release."""
-        return max(each.time_s for each in self.events if isinstance(each.event, NoteOn | NoteOff))
+        return max(entry.time_s for entry in self.events if isinstance(entry.event, NoteOn | NoteOff))
 
 
 def event_of(message: Sequence[int]) -> Event | None:
@@ -77,16 +77,16 @@ def event_of(message: Sequence[int]) -> Event | None:
     if len(message) < 3:
         return None
     kind, channel = message[0] & 0xF0, message[0] & 0x0F
-    one, two = message[1] & 0x7F, message[2] & 0x7F
-    if kind == NOTE_ON and two > 0:
-        return NoteOn(one, two, channel)
+    first, second = message[1] & 0x7F, message[2] & 0x7F
+    if kind == NOTE_ON and second > 0:
+        return NoteOn(first, second, channel)
     if kind in (NOTE_ON, NOTE_OFF):
-        return NoteOff(one, channel)
+        return NoteOff(first, channel)
     if kind == BEND:
-        steps = one + 128 * two - BEND_STEPS
+        steps = first + 128 * second - BEND_STEPS
         return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
     if kind == CONTROLLER:
-        return Controller(one, 0 if one == RESET else two, channel)
+        return Controller(first, 0 if first == RESET else second, channel)
     return None
 
 
@@ -111,41 +111,41 @@ def _messages_in(path: Path) -> MidiMessages:
 
 
 def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
-    found: list[TimedEvent] = []
+    timed_events: list[TimedEvent] = []
     notes, last_note_s = False, 0.0
     for time_s, message in messages.timed:
         if (event := event_of(message)) is None:
             continue
-        found.append(TimedEvent(time_s, event))
+        timed_events.append(TimedEvent(time_s, event))
         if isinstance(event, NoteOn | NoteOff):
             notes, last_note_s = notes or isinstance(event, NoteOn), time_s
     if not notes:
         raise MidiFileError(f"{path}: holds no note; give a MIDI file with notes")
     if not last_note_s <= LONGEST_S:
         raise MidiFileError(f"{path}: more than an hour of music; give a shorter MIDI file")
-    while found[-1].time_s > min(last_note_s + AFTER_LAST_NOTE_S, LONGEST_S):
-        found.pop()
-    return found
+    while timed_events[-1].time_s > min(last_note_s + AFTER_LAST_NOTE_S, LONGEST_S):
+        timed_events.pop()
+    return timed_events
 
 
-def _ignored(messages: MidiMessages) -> list[str]:
+def _ignored_messages(messages: MidiMessages) -> list[str]:
     """The messages that change nothing here, in words."""
-    found = []
+    left_out = []
     if messages.missing_tracks:
-        found.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
+        left_out.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
     if messages.skipped:
-        found.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
+        left_out.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
     if messages.clipped:
-        found.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
+        left_out.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
     kinds = {message[0] & 0xF0 for _, message in messages.timed}
     if PROGRAM in kinds:
-        found.append("its program changes")
+        left_out.append("its program changes")
     if kinds & {KEY_PRESSURE, PRESSURE}:
-        found.append("its pressure")
+        left_out.append("its pressure")
     sent = {message[1] for _, message in messages.timed if message[0] & 0xF0 == CONTROLLER}
     if unknown := [str(number) for number in sorted(sent) if not is_obeyed(number)]:
-        found.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
-    return found
+        left_out.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
+    return left_out
 
 
 def _count(count: int, noun: str) -> str:
@@ -165,12 +165,12 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     """
     messages = _messages_in(path)
     timed, mode = _events_of(path, messages), patch.mode if patch is not None else "poly"
-    ignored = _ignored(messages)
-    notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
+    ignored = _ignored_messages(messages)
+    notes_on = {entry.event.channel for entry in timed if isinstance(entry.event, NoteOn)}
     pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
     if pads and drums:
-        timed = [each for each in timed if channels_in([each.event]) in (drums, set())]
+        timed = [entry for entry in timed if channels_in([entry.event]) in (drums, set())]
         others = [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else []
         return _song(path, patch, timed, others + ignored)
     if pads:
@@ -179,38 +179,42 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     if not channels:
         raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")
     if drums:
-        timed = [each for each in timed if channels_in([each.event]) != drums]
+        timed = [entry for entry in timed if channels_in([entry.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
-        timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
+        timed = [
+            replace(entry, event=_on_channel_of_keys(entry.event))
+            for entry in timed
+            if channels_in([entry.event]) == channels
+        ]
     return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
 
 def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
     """The song; `left_out` with the notes for which the patch has no sound."""
-    keys = [each.event.key for each in timed if isinstance(each.event, NoteOn)]
-    if patch is not None and (silent := _silent(patch, keys)):
+    keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
+    if patch is not None and (silent := _count_silent(patch, keys)):
         low, high = (note_name(key) for key in patch.range)
         sounding = "drum" if isinstance(patch.strings, Drums) else "string"
         left_out.append(
             f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
         )
-    return Song(timed, f"{path.name} is played without {_listed(left_out)}" if left_out else "")
+    return Song(timed, f"{path.name} is played without {_join_words(left_out)}" if left_out else "")
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join_words(words: Sequence[str]) -> str:
     return " and ".join(filter(None, ("; ".join(words[:-1]), words[-1])))
 
 
-def _silent(patch: Patch, keys: Sequence[int]) -> int:
+def _count_silent(patch: Patch, keys: Sequence[int]) -> int:
     """The number of these keys for which a patch has no string."""
-    strings, known = Strings(patch), dict.fromkeys(keys, False)
-    for key in known:
+    strings, is_silent = Strings(patch), dict.fromkeys(keys, False)
+    for key in is_silent:
         with contextlib.suppress(ValueError):  # an impossible string is reported when it is struck
-            known[key] = strings.of_key(key) is None
-    return sum(known[key] for key in keys)
+            is_silent[key] = strings.of_key(key) is None
+    return sum(is_silent[key] for key in keys)
 
 
-def _on_keys(event: Event) -> Event:
+def _on_channel_of_keys(event: Event) -> Event:
     return event if isinstance(event, PatchTurned | PluckAt) else replace(event, channel=KEYS)
 
 
@@ -227,9 +231,9 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
     tick = 0
-    for each in sorted(timed, key=lambda one: one.time_s):
-        now = round(mido.second2tick(each.time_s, TICKS, TEMPO))
-        for message in messages_of(each.event):
+    for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
+        now = round(mido.second2tick(entry.time_s, TICKS, TEMPO))
+        for message in messages_of(entry.event):
             track.append(message.copy(time=max(0, now - tick)))
             tick = max(tick, now)
     file = mido.MidiFile(type=0, ticks_per_beat=TICKS)
@@ -241,29 +245,31 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
 def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
     """The events with messages for the range of bends, where a channel has the patch's and not its own."""
-    channels, own, found = sorted(channels_in(each.event for each in timed)), set[int](), list[TimedEvent]()
+    channels = sorted(channels_in(entry.event for entry in timed))
+    with_own_range = set[int]()
+    track = list[TimedEvent]()
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:
         for channel in of:
-            found.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
+            track.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
 
     set_ranges(0.0, channels)
-    for each in sorted(timed, key=lambda one: one.time_s):
-        event, time_s = each.event, each.time_s
-        found.append(each)
+    for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
+        event, time_s = entry.event, entry.time_s
+        track.append(entry)
         if isinstance(event, PatchTurned):
             if is_another(event.patch, patch):
-                own.clear()
-            moved = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
+                with_own_range.clear()
+            range_changed = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
             patch = event.patch
-            set_ranges(time_s, [channel for channel in channels if moved and channel not in own])
+            set_ranges(time_s, [channel for channel in channels if range_changed and channel not in with_own_range])
         elif isinstance(event, Controller) and event.number in SETS_PARAMETER:
-            own.add(event.channel)
+            with_own_range.add(event.channel)
         elif isinstance(event, Controller) and (event.number, event.value) == (RESET, AT_REST):
-            own.discard(event.channel)
+            with_own_range.discard(event.channel)
             set_ranges(time_s, [event.channel])
-            found.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
-    return found
+            track.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
+    return track
 
 
 def _bend_semitones(patch: Patch, channel: int) -> float:

@@ -1,8 +1,9 @@
 """The channel messages of a Standard MIDI File with their times in s, as far as the file is whole.
 
-Sources: Standard MIDI Files 1.0 (MMA RP-001) and, of .rmi files, RIFF's form RMID (MMA RP-029). What other programs
-write and most players read is read as well: chunks of any kind between tracks, another number of tracks than the
-header's, lengths that are too long or too short, tracks without their end, and running status across other messages.
+Sources: Standard MIDI Files 1.0 (MMA RP-001) and, of .rmi files, RIFF's form RMID (MMA RP-029). Deviations that
+other programs write and most players accept are accepted. These are chunks of any kind between tracks, another number
+of tracks than the header's, and tracks without their end. So are lengths that are too
+long or too short, and running status across other messages.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from dataclasses import dataclass
 LONGEST_NUMBER = 4  # bytes of a number of variable length, by the standard
 USUAL_TEMPO_US = 500_000  # of a quarter note
 FRAME_RATES_HZ = {24: 24.0, 25: 25.0, 29: 30_000 / 1_001, 30: 30.0}  # SMPTE's; 29: 30 drop
-META, TEMPO, END_OF_TRACK = 0xFF, 0x51, 0x2F
+META = 0xFF
+TEMPO = 0x51
+END_OF_TRACK = 0x2F
 SYSTEM_EXCLUSIVE = (0xF0, 0xF7)  # and what follows an escape: a length, then any bytes
 DATA_BYTES = {0x80: 2, 0x90: 2, 0xA0: 2, 0xB0: 2, 0xC0: 1, 0xD0: 1, 0xE0: 2, 0xF1: 1, 0xF2: 2, 0xF3: 1}  # by kind
 LARGEST_VALUE = 127
@@ -64,7 +67,7 @@ def read_messages(file: bytes, most: int) -> MidiMessages:
     if kind == 2 and reader.tracks > 1:
         raise NotMidi(f"holds {reader.tracks} songs of their own (format 2): save one of them in a file")
     return MidiMessages(
-        list(clock.timed(sorted(reader.ticked, key=lambda each: each[0]))),
+        list(clock.timed(sorted(reader.ticked, key=lambda message: message[0]))),
         max(0, counted - reader.tracks),
         reader.clipped,
         reader.skipped,
@@ -124,7 +127,9 @@ class _Reader:
     """
 
     def __init__(self, raw: bytes, most: int) -> None:
-        self._raw, self._most, self._left = raw, most, most
+        self._raw = raw
+        self._most = most
+        self._left = most
         self.ticked: list[tuple[int, int | Message]] = []
         self.tracks = self.clipped = self.skipped = 0
 
@@ -152,8 +157,8 @@ class _Reader:
 
         Returns the place at which the next chunk is to be looked for.
         """
-        raw, known = self._raw, end == len(self._raw) or self._begins_chunk(end)
-        limit = end if known else len(raw)
+        raw, length_is_right = self._raw, end == len(self._raw) or self._begins_chunk(end)
+        limit = end if length_is_right else len(raw)
         tick = running = 0
         up_to_end = None  # messages that lie within the length that the track says it has
         try:
@@ -168,7 +173,7 @@ class _Reader:
                 running, place, ended = self._read_message(tick, running, place, limit)
                 if ended:
                     after = raw[place : place + 4] == b"MTrk"
-                    return end if known and not after else place
+                    return end if length_is_right and not after else place
         except _CutOff as error:
             if up_to_end is None:
                 raise NotMidi(str(error)) from error
@@ -224,10 +229,10 @@ class _Reader:
     def _number(self, place: int, limit: int) -> tuple[int, int]:
         """A number of variable length, and the place after it."""
         value = 0
-        for here in range(place, min(place + LONGEST_NUMBER, limit)):
-            value = value << 7 | self._raw[here] & 0x7F
-            if self._raw[here] < 0x80:
-                return value, here + 1
+        for at in range(place, min(place + LONGEST_NUMBER, limit)):
+            value = value << 7 | self._raw[at] & 0x7F
+            if self._raw[at] < 0x80:
+                return value, at + 1
         raise _CutOff("is no MIDI file: a number in it has no end")
 
 

@@ -122,8 +122,8 @@ def render_events(
     stage = OfflinePlayer(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied, dry)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
-    done, events = 0, sorted(timed, key=lambda each: each.time_s)
-    played = max((place for place, each in enumerate(events) if _sounds(each.event)), default=-1) + 1
+    done, events = 0, sorted(timed, key=lambda timed_event: timed_event.time_s)
+    tail = max((place for place, timed_event in enumerate(events) if _sounds(timed_event.event)), default=-1) + 1
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
         nonlocal done, skipped
@@ -136,18 +136,18 @@ def render_events(
             advanced(done / rate_hz)
 
     def play_until(frame: int, few: Sequence[TimedEvent]) -> Iterator[NDArray[np.float32]]:
-        for each in few:
-            at = round(each.time_s * rate_hz)
+        for timed_event in few:
+            at = round(timed_event.time_s * rate_hz)
             yield from blocks_until(at // QUANTUM * QUANTUM)
-            stage.handle(each.event, at)
+            stage.handle(timed_event.event, at)
         yield from blocks_until(frame)
 
     if seconds is not None:
         end = round(seconds * rate_hz) + (AHEAD if limited else 0)
-        yield from play_until(end, [each for each in events if each.time_s < seconds])
+        yield from play_until(end, [timed_event for timed_event in events if timed_event.time_s < seconds])
         return
-    yield from play_until(0, events[:played])
-    left = deque(events[played:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
+    yield from play_until(0, events[:tail])
+    left = deque(events[tail:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
     quiet_s = 0.0  # until all effects have died away as well
@@ -158,9 +158,9 @@ def render_events(
         now = []
         while left and round(left[0].time_s * rate_hz) < end:
             now.append(left.popleft())
-        made = list(play_until(end, now))
-        loudest = max((float(np.abs(block).max(initial=0.0)) for block in made), default=0.0)
-        waiting += made
+        blocks = list(play_until(end, now))
+        loudest = max((float(np.abs(block).max(initial=0.0)) for block in blocks), default=0.0)
+        waiting += blocks
         if loudest >= quiet:
             yield from waiting
             waiting = []
@@ -174,10 +174,10 @@ def _sounds(event: Event) -> bool:
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
     """The channels that `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
-    events = [each.event for each in timed]
-    turned = (event.patch for event in events if isinstance(event, PatchTurned))
+    events = [timed_event.event for timed_event in timed]
+    later_patches = (event.patch for event in events if isinstance(event, PatchTurned))
     wheeled = any(isinstance(event, Controller) and event.number == MOD_WHEEL for event in events)
-    return max(channels_of(each, wheeled) for each in (patch, *turned))
+    return max(channels_of(version, wheeled) for version in (patch, *later_patches))
 
 
 def _gains(source: str, difference_gain_db: float) -> dict[str, float]:

@@ -41,20 +41,20 @@ class StringKeys:
         Raises:
             ValueError: the key has no possible string.
         """
-        found = self.strings.of_key(key, string)
-        if found is None:
+        key_string = self.strings.of_key(key, string)
+        if key_string is None:
             return None
         if self.recorded is not None and self.ear.pickup == "bridge":
             raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
-        if overdamped(found.parameters.row, found.modes):
+        if overdamped(key_string.parameters.row, key_string.modes):
             raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
-        return found
+        return key_string
 
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
     """The polarisations of a patch. None: its strings move in one direction, or as a recording says."""
-    chosen = patch.polarisations
-    return None if chosen is None or preset.recorded is not None else chosen
+    polarisations = patch.polarisations
+    return None if polarisations is None or preset.recorded is not None else polarisations
 
 
 def on_string(string: KeyString, pluck: Pluck) -> Pluck:

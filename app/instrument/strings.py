@@ -1,7 +1,7 @@
 """The string of each key, by the laws of `engine.kernels.strings`, as the player has it.
 
 Pitch is that of the first partial of a quiet pluck. A key changes the length alone, a slackened string the tension
-alone; both are solved for the pitch in closed form, so that it is exact.
+alone. Both are solved for the pitch in closed form and are exact.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Strings:
         """The string of a key; None for a key beyond the patch's range, or one that its tuning leaves out.
 
         Args:
-            string: on which of a set the key is played, counted from the highest, 0; None, or one that the set does
-                not have or that would have to be slackened too far: the one that the key itself chooses.
+            string: on which of a set the key is played, counted from the highest, 0. The key itself chooses where it
+                is None, is not in the set, or would have to be slackened too far.
 
         Raises:
             ValueError: no string has that pitch; the message names the key and what is impossible.
@@ -85,7 +85,7 @@ class Strings:
         """The pitch of an open string, which the range does not limit."""
         return self._tuning.hz(note)
 
-    def _stopped(self, key: int, wanted: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
+    def _stopped(self, key: int, number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
         """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
         strings, slackened = self._patch.strings, 1.0
         assert not isinstance(strings, Drums)
@@ -93,16 +93,16 @@ class Strings:
             string = strings.string
         else:
             ordered = strings.strings[::-1]
-            chosen = ordered[law.played(ordered, len(ordered), key, -1 if wanted is None else wanted)]
-            string = chosen.string
-            if key < chosen.note:
-                slackened = pitch_hz / self._tuning.hz(chosen.note)
+            open_string = ordered[law.played(ordered, len(ordered), key, -1 if number is None else number)]
+            string = open_string.string
+            if key < open_string.note:
+                slackened = pitch_hz / self._tuning.hz(open_string.note)
         knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
-        whole, own = [0.0] * of.STRING, [0.0] * of.STRING
-        law.stop(string.row, knobs, slackened, pitch_hz, whole, own)
+        whole, stopped_row = [0.0] * of.STRING, [0.0] * of.STRING
+        law.stop(string.row, knobs, slackened, pitch_hz, whole, stopped_row)
         if not whole[of.TENSION] > 0:
             raise ValueError(f"key {key}: no tension slackens its string so far; choose a higher key")
-        parameters = StringParameters(*own)  # or what is out of bounds is named
+        parameters = StringParameters(*stopped_row)  # or what is out of bounds is named
         return parameters, parameters.length_m / whole[LENGTH]
 
 

@@ -68,11 +68,15 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
 
 def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: bool) -> tuple[NDArray[np.float64], ...]:
     """The program of each source as the kernels read it; `drums`: of drums in place of strings."""
-    model_silence, unheard, silence = HEARD_SILENCE, 0.0, HEARD_SILENCE
+    model_silence = HEARD_SILENCE
+    unheard = 0.0
+    silence = HEARD_SILENCE
     if drums:
-        model_silence, unheard, silence = DRUM_STILL, DRUM_UNHEARD, DRUM_SILENCE
+        model_silence = DRUM_STILL
+        unheard = DRUM_UNHEARD
+        silence = DRUM_SILENCE
     model = tension_memory(preset.weights, preset.configuration, rate_hz, model_silence, unheard)
-    return tuple(solver_memory(rate_hz, silence=silence) if each == "truth" else model for each in sources)
+    return tuple(solver_memory(rate_hz, silence=silence) if source == "truth" else model for source in sources)
 
 
 def table_of(
@@ -95,7 +99,9 @@ def table_of(
     table["shape"], table["stops"] = SHAPES.index(patch.pluck.shape), patch.pluck.stops
     table["strikes"], table["let_ring"] = patch.pluck.is_blow, patch.damping.let_ring
     table["points"], table["velocity"] = len(ear.points), ear.pickup == "velocity"
-    table["solo"], table["grid"], table["detuning"] = ear.solo, grid_points, 1.0
+    table["solo"] = ear.solo
+    table["grid"] = grid_points
+    table["detuning"] = 1.0
     if (moving := loud.polarisations) is not None:
         table["pairs"], table["detuning"] = of.MOST_PAIRS, moving.detuning
         table["pulled"], table["heard"] = moving.pulled, moving.heard
@@ -110,13 +116,15 @@ def table_of(
         if patch.pickup.flux_mm > 0:
             table["nearness"] = FULL_SCALE_M / (patch.pickup.flux_mm / 1000)
     course = patch.course
-    table["course"], table["octaves"], table["bridge"] = course.strings, course.octaves, course.bridge
+    table["course"] = course.strings
+    table["octaves"] = course.octaves
+    table["bridge"] = course.bridge
     table["apart_cents"], table["apart_s"] = course.cents, course.apart_ms / 1000
     table["variation"] = patch.pluck.variation if varied else 0.0
     table["level"] = 10 ** (patch.level_db / 20)
     table["noise_level"] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)
-    for place, each in enumerate(CONTACTS[patch.noise.kind]):
-        for name, value in asdict(each).items():
+    for place, contact in enumerate(CONTACTS[patch.noise.kind]):
+        for name, value in asdict(contact).items():
             table["contacts"][place][name] = value
     goal = wheel_goal(patch) if patch.mod_wheel in WHEELED else None
     table["wheel"] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
@@ -178,11 +186,13 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
     table["sines"] = tail.put(np.sin(2 * np.pi * np.arange(turn) / turn))
 
 
-def put_recorded(table: np.void, tail: Tail, own: RecordedString, grid_points: int) -> None:
+def put_recorded(table: np.void, tail: Tail, string: RecordedString, grid_points: int) -> None:
     """Put what a recording adds to strings behind a table."""
     header = np.zeros(1, RECORDED)
-    pitch_hz, rest, hz, ratios, rows = own.additions
-    header["pitch_hz"], header["rest"], header["modes"] = pitch_hz, rest, grid_points - 2
+    pitch_hz, rest, hz, ratios, rows = string.additions
+    header["pitch_hz"] = pitch_hz
+    header["rest"] = rest
+    header["modes"] = grid_points - 2
     header["smooth"], header["partials"] = len(hz), rows.shape[1]
     table["recorded"] = tail.put(header.view(np.float64), hz, ratios, rows.ravel())
 
@@ -195,8 +205,8 @@ def _put_drums(tail: Tail, loud: DrumKeys) -> int:
     low, high = loud.patch.range
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
-            if (found := loud.of_key(key)) is not None:
-                blocks.append(block_of(found))
+            if (drum_key := loud.of_key(key)) is not None:
+                blocks.append(block_of(drum_key))
                 places[key] = free
                 free += len(blocks[-1])
     return tail.put(places.view(np.float64), *blocks)
@@ -204,5 +214,5 @@ def _put_drums(tail: Tail, loud: DrumKeys) -> int:
 
 def strings_of(patch: Patch) -> int:
     """The number of strings of a set that channels of a guitar may choose."""
-    chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
-    return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
+    by_channel = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
+    return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if by_channel else 0  # type: ignore[union-attr]

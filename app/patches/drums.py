@@ -46,8 +46,8 @@ class Drums(Value):
     """Drums by rising note.
 
     Attributes:
-        keys: "pads": a drum for its own key each; "pitch": a key plays the drum at or below it (below all, the
-            lowest), tuned to the key: a membrane by its tension, a plate by its size.
+        keys: "pads": a drum for its own key each. "pitch": a key plays the drum at or below it (below all, the
+            lowest), tuned to the key. A membrane is tuned by its tension, a plate by its size.
         highest_hz: of the modes that sound.
     """
 

@@ -36,7 +36,7 @@ def filled(name: str) -> str:
     return name
 
 
-def _safe(name: str) -> str:
+def _safe_name(name: str) -> str:
     """A name that is a valid file name on every system, and no path."""
     name = plain(name)
     if name.startswith(".") or name.endswith(".") or any(c in FORBIDDEN_IN_NAMES for c in name):
@@ -62,8 +62,10 @@ def parameter(id: str) -> Any:
     return Field(declared.default, ge=low, le=high, strict=id in OF_PATCHES, allow_inf_nan=False)
 
 
-Name = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(filled), AfterValidator(_safe)]
-Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
+Name = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(filled), AfterValidator(_safe_name)]
+Reference = Annotated[
+    str, Field(max_length=LONGEST_NAME), AfterValidator(_safe_name)
+]  # a name elsewhere, "" for none
 Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(plain)]
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, ranged(0, HIGHEST_KEY)]
@@ -71,20 +73,20 @@ Share = Annotated[float, ranged(0, 1)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
-def _given_whole(kind: type, data: Any) -> Any:
+def _check_complete(kind: type, data: Any) -> Any:
     """The data of a string or a drum. Raises ValueError: a parameter is not given whose default is not 0.
 
     The engine's default is a string or drum of its own, parts of which no other shall have.
     """
     if isinstance(data, Mapping):
-        missing = [each.name for each in fields(kind) if each.default != 0 and each.name not in data]
+        missing = [field.name for field in fields(kind) if field.default != 0 and field.name not in data]
         if missing:
             raise ValueError(f"{', '.join(missing)} must be given; add what is missing")
     return data
 
 
-String = Annotated[StringParameters, BeforeValidator(partial(_given_whole, StringParameters))]
-Drum = Annotated[DrumParameters, BeforeValidator(partial(_given_whole, DrumParameters))]
+String = Annotated[StringParameters, BeforeValidator(partial(_check_complete, StringParameters))]
+Drum = Annotated[DrumParameters, BeforeValidator(partial(_check_complete, DrumParameters))]
 
 
 if TYPE_CHECKING:
@@ -94,16 +96,16 @@ else:
 
 
 class _OfRows(ModelMetaclass):
-    """Gives a class the fields of the rows of a part of the table of parameters that it does not state itself."""
+    """A metaclass that adds a field for each row of a part of the parameter table that the class does not state."""
 
     def __new__(
         meta, name: str, bases: tuple[type, ...], namespace: dict[str, Any], part: str = "", **options: Any
     ) -> type:
-        stated = namespace.setdefault("__annotations__", {})
+        hints = namespace.setdefault("__annotations__", {})
         for id in OF_PATCHES:
             section, _, field = id.rpartition(".")
-            if part and section == part and field not in stated:
-                stated[field], namespace[field] = float, parameter(id)
+            if part and section == part and field not in hints:
+                hints[field], namespace[field] = float, parameter(id)
         return super().__new__(meta, name, bases, namespace, **options)
 
 

@@ -75,10 +75,8 @@ def read_patch(path: Path) -> Patch:
     except PatchError:
         raise
     except (ValueError, OverflowError) as error:
-        reported = explained(error) if isinstance(error, ValueError) else str(error)
-        raise PatchError(
-            f"{path}: {one_line(reported, 300)}; mend this field, or save the instrument again"
-        ) from error
+        reason = explained(error) if isinstance(error, ValueError) else str(error)
+        raise PatchError(f"{path}: {one_line(reason, 300)}; mend this field, or save the instrument again") from error
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
@@ -103,7 +101,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
                 patch = read_patch(path)
                 if name_text(path.stem) in entries:
                     raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
-                name = _other_than(names, patch.name)
+                name = _free_name(names, patch.name)
                 names.add(name.casefold())
                 entries[name_text(path.stem)] = PatchEntry(path, patch.model_copy(update={"name": name}))
             except PatchError as error:
@@ -113,13 +111,13 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     return sorted(entries.values(), key=_order), problems
 
 
-def _other_than(taken: set[str], name: str) -> str:
-    """`name`, with a number where it is taken."""
-    number, found = 2, name
-    while found.casefold() in taken:
+def _free_name(taken: set[str], name: str) -> str:
+    """The name, with a number where it is taken."""
+    number, free_name = 2, name
+    while free_name.casefold() in taken:
         end = f" {number}"
-        number, found = number + 1, name[: LONGEST_NAME - len(end)] + end
-    return found
+        number, free_name = number + 1, name[: LONGEST_NAME - len(end)] + end
+    return free_name
 
 
 def find_patch(name_or_path: str) -> PatchEntry:
@@ -129,22 +127,22 @@ def find_patch(name_or_path: str) -> PatchEntry:
         PatchError: there is none, or its file cannot be used; the message lists like names, else all.
     """
     entries, _ = list_patches()
-    wanted = name_or_path.casefold()
+    folded_name = name_or_path.casefold()
     for entry in entries:
-        if wanted in (entry.name.casefold(), entry.patch.name.casefold()):
+        if folded_name in (entry.name.casefold(), entry.patch.name.casefold()):
             return entry
     path = Path(name_or_path)
     if path.suffix == SUFFIX:
         return PatchEntry(path, read_patch(path))
     names = [entry.name for entry in entries]
-    if close := get_close_matches(file_stem(wanted), names, cutoff=0.55):
+    if close := get_close_matches(file_stem(folded_name), names, cutoff=0.55):
         raise PatchError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
-    known = ", ".join(names) or "none is installed"
-    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
+    choices = ", ".join(names) or "none is installed"
+    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {choices}")
 
 
 def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
-    """Write it into the user's folder, which is made if need be; whole or not at all.
+    """Write the patch into the user's folder, which is made if need be; whole or not at all.
 
     Args:
         replace: the file of a patch of the user's that it replaces; None: it is a new one, with a file of its own.
@@ -187,10 +185,10 @@ def add_patch(file: Path) -> tuple[PatchEntry, bool]:
             return entry, False
     names = {entry.patch.name.casefold() for entry in entries}
     stems = {path.stem for folder in (SHIPPED, own_patches()) for path in folder.glob(f"*{SUFFIX}")}
-    name = _other_than(names, patch.name)
+    name = _free_name(names, patch.name)
     while file_stem(name) in stems:
         names.add(name.casefold())
-        name = _other_than(names, patch.name)
+        name = _free_name(names, patch.name)
     return save_patch(patch.model_copy(update={"name": name})), True
 
 

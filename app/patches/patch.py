@@ -43,8 +43,8 @@ from engine.values.string import Losses, Polarisations
 Category = Literal["guitar", "bass", "harp", "keys", "world", "drums", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 Mode = Literal["poly", "guitar", "mpe"]
-ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
-WHEEL = tuple(each.id for each in modulated_by("wheel"))  # what the modulation wheel may turn
+ASSIGNABLE = tuple(knob.id for knob in modulated_by("macro"))  # what macros may turn
+WHEEL = tuple(knob.id for knob in modulated_by("wheel"))  # what the modulation wheel may turn
 
 MOST_STRINGS = 128
 MOST_TARGETS = 8
@@ -83,7 +83,7 @@ class Knobs(Rows, part="knobs"):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
     The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
-    f = √(T₀/ρA) / 2ℓ for a flexible string: `tension` and `length` each take the other with them, and both multiply.
+    f = √(T₀/ρA) / 2ℓ for a flexible string. So `tension` and `length` each change the other, and both multiply.
     A heavier string (`density`, `gauge`) is tighter at the length that it has.
 
     Attributes:
@@ -286,8 +286,8 @@ class Patch(Value):
         preset: the model that plays it, by the name of a preset of many strings; never a path.
         range: the lowest and the highest key that sound.
         losses: None: strings decay by d₁ and d₃ alone, and through the bridge.
-        sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played: of all
-            keys where strings are let ring, else the open strings of a set. 0: they do not.
+        sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played. 0:
+            none do. They are the strings of all keys where strings are let ring, else the open strings of a set.
         polarisations: None: strings move in one direction alone, and lose nothing at a bridge.
         mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
@@ -376,10 +376,10 @@ class Patch(Value):
             raise ValueError(
                 f"field: {bounds.brief(field)} is no parameter of this instrument; try {', '.join(OF_PATCHES)}"
             )
-        found: Any = self
+        value: Any = self
         for part in field.split("."):
-            found = found[int(part)] if isinstance(found, tuple) else getattr(found, part)
-        return float(found)
+            value = value[int(part)] if isinstance(value, tuple) else getattr(value, part)
+        return float(value)
 
     def with_value(self, field: str, value: float) -> Patch:
         """The patch with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""
@@ -411,11 +411,11 @@ class Patch(Value):
         A target stays where the others forbid its value: the softest pluck does not pass the hardest.
         """
         share = min(1.0, max(0.0, value))
-        chosen = self.macros[macro]
-        moved = chosen.model_copy(update={"value": share})
-        macros = (*self.macros[:macro], moved, *self.macros[macro + 1 :])
+        before = self.macros[macro]
+        after = before.model_copy(update={"value": share})
+        macros = (*self.macros[:macro], after, *self.macros[macro + 1 :])
         patch = self.model_copy(update={"macros": macros})
-        for target in chosen.targets:
+        for target in before.targets:
             with contextlib.suppress(ValueError):
                 patch = patch.with_value(target.field, target.low + share * (target.high - target.low))
         return patch

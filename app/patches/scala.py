@@ -90,20 +90,20 @@ def parse_scale(text: str) -> Scale:
         ValueError: it is none, or one beyond the bounds of this module; the message quotes the line.
     """
     lines = [line for line in _LINE_END.split(text) if not line.startswith("!")]
-    count_line, *listed = _filled(lines[1:]) or [""]  # the first, which may be empty, is the description
-    found = _COUNT.match(count_line)
-    if found is None:
+    count_line, *pitch_lines = _filled_lines(lines[1:]) or [""]  # the first, which may be empty, is the description
+    count_match = _COUNT.match(count_line)
+    if count_match is None:
         raise ValueError(f"its number of notes, below its description, is {brief(count_line)}; it is no scale")
-    said = found.group().lstrip("0") or "0"
-    count = int(said[:9])
-    if count <= min(len(listed), MOST_NOTES):
-        octaves = tuple(_octaves(line) for line in listed[:count])
-        if not any(map(_NUMBER.match, listed[count:])):  # other text below the notes is a remark
+    digits = count_match.group().lstrip("0") or "0"
+    count = int(digits[:9])
+    if count <= min(len(pitch_lines), MOST_NOTES):
+        octaves = tuple(_octaves(line) for line in pitch_lines[:count])
+        if not any(map(_NUMBER.match, pitch_lines[count:])):  # other text below the notes is a remark
             return Scale(octaves)
-    numbers = sum(map(bool, map(_NUMBER.match, listed)))
-    if str(numbers) == said:
+    numbers = sum(map(bool, map(_NUMBER.match, pitch_lines)))
+    if str(numbers) == digits:
         raise ValueError(f"has {count} notes, at most {MOST_NOTES} may be given")
-    raise ValueError(f"says {said[:20]} notes and lists {numbers}; correct its count or its list of notes")
+    raise ValueError(f"says {digits[:20]} notes and lists {numbers}; correct its count or its list of notes")
 
 
 def parse_keymap(text: str) -> Keymap:
@@ -112,19 +112,19 @@ def parse_keymap(text: str) -> Keymap:
     Raises:
         ValueError: it is none, or one beyond the bounds of this module; the message names the entry.
     """
-    lines = _filled(_LINE_END.split(text))
+    lines = _filled_lines(_LINE_END.split(text))
     if len(lines) < 7:
         raise ValueError(f"has {len(lines)} numbers before its keys, 7 are needed; it may have been cut off")
-    size = _whole(lines[0], "size of map", 0, MOST_KEYS)
-    first = _whole(lines[1], "first key", 0, HIGHEST_KEY)
-    last = _whole(lines[2], "last key", 0, HIGHEST_KEY)
-    middle = _whole(lines[3], "middle key", 0, HIGHEST_KEY)
-    reference = _whole(lines[4], "reference key", 0, HIGHEST_KEY)
-    found = _FREQUENCY.match(lines[5])
-    reference_hz = float(found.group()) if found else 0.0
+    size = _whole_number(lines[0], "size of map", 0, MOST_KEYS)
+    first = _whole_number(lines[1], "first key", 0, HIGHEST_KEY)
+    last = _whole_number(lines[2], "last key", 0, HIGHEST_KEY)
+    middle = _whole_number(lines[3], "middle key", 0, HIGHEST_KEY)
+    reference = _whole_number(lines[4], "reference key", 0, HIGHEST_KEY)
+    frequency = _FREQUENCY.match(lines[5])
+    reference_hz = float(frequency.group()) if frequency else 0.0
     if not 0 < reference_hz < math.inf:
         raise ValueError(f"its reference frequency is {brief(lines[5])}, and must be a number above 0, as 440.0")
-    octave = _whole(lines[6], "formal octave", -MOST_KEYS, MOST_KEYS)
+    octave = _whole_number(lines[6], "formal octave", -MOST_KEYS, MOST_KEYS)
     if first > last:
         raise ValueError(f"its first key {first} is above its last key {last}")
     entries = [_entry(line) for line in lines[7:]]
@@ -134,7 +134,7 @@ def parse_keymap(text: str) -> Keymap:
     return Keymap(first, last, middle, reference, reference_hz, octave, pattern)
 
 
-def _filled(lines: list[str]) -> list[str]:
+def _filled_lines(lines: list[str]) -> list[str]:
     """The lines that are neither comments nor empty, without white space around them."""
     stripped = (line.strip() for line in lines)
     return [line for line in stripped if line and not line.startswith("!")]
@@ -142,10 +142,10 @@ def _filled(lines: list[str]) -> list[str]:
 
 def _octaves(line: str) -> float:
     """The pitch of a line: cents where its number has a full stop, else a ratio. Text behind it is ignored."""
-    if found := _CENTS.match(line):
-        cents = float(found.group())
-    elif found := _RATIO.match(line):
-        above, below = found.group(1), found.group(2) or "1"
+    if match := _CENTS.match(line):
+        cents = float(match.group())
+    elif match := _RATIO.match(line):
+        above, below = match.group(1), match.group(2) or "1"
         if max(len(above), len(below)) > MOST_DIGITS:
             raise ValueError(f"{brief(line)} has a number of more than {MOST_DIGITS} digits")
         if int(above) <= 0 or int(below) <= 0:
@@ -158,13 +158,13 @@ def _octaves(line: str) -> float:
     return cents / 1200
 
 
-def _whole(line: str, name: str, low: int, high: int) -> int:
-    found = _WHOLE.match(line)
-    if found is None or len(found.group()) > MOST_DIGITS or not low <= int(found.group()) <= high:
+def _whole_number(line: str, name: str, low: int, high: int) -> int:
+    match = _WHOLE.match(line)
+    if match is None or len(match.group()) > MOST_DIGITS or not low <= int(match.group()) <= high:
         raise ValueError(f"its {name} is {brief(line)}, and must be a whole number of {low} … {high}")
-    return int(found.group())
+    return int(match.group())
 
 
 def _entry(line: str) -> int | None:
     """The degree of one key; None where it is unmapped."""
-    return None if _UNMAPPED.match(line) else _whole(line, "entry", -MOST_KEYS, MOST_KEYS)
+    return None if _UNMAPPED.match(line) else _whole_number(line, "entry", -MOST_KEYS, MOST_KEYS)

@@ -68,8 +68,8 @@ class AheadVoice:
     @property
     def speed(self) -> float:
         """Seconds of sound in a second of rendering, without the first, short block; 0 before there is another."""
-        timed = self.done - 1 - AHEAD_FIRST
-        return timed / self.source.rate_hz / self._spent_s if timed > 0 and self._spent_s > 0 else 0.0
+        frames = self.done - 1 - AHEAD_FIRST
+        return frames / self.source.rate_hz / self._spent_s if frames > 0 and self._spent_s > 0 else 0.0
 
     @property
     def wanted_s(self) -> float:
@@ -147,15 +147,15 @@ class Ahead:
     def render(self, voice: AheadVoice) -> None:
         """Start to render a voice; where the same pluck is known, it begins at once."""
         with self._mailbox:
-            known = self._known.get(voice.key)
-            if known is None:
+            kept_samples = self._known.get(voice.key)
+            if kept_samples is None:
                 self._voices.append(voice)
                 self._mailbox.notify()
                 if self._thread is None:
                     self._thread = threading.Thread(target=self._run, name="render-ahead", daemon=True)
                     self._thread.start()
                 return
-        voice.take_known(known)
+        voice.take_known(kept_samples)
         voice.begun = True
         voice.begin()
 
@@ -172,12 +172,14 @@ class Ahead:
         while True:
             with self._mailbox:
                 self._voices = [
-                    each for each in self._voices if not each.finished and not each.voice.over and not each.given_up()
+                    voice
+                    for voice in self._voices
+                    if not voice.finished and not voice.voice.over and not voice.given_up()
                 ]
                 self._mailbox.wait_for(lambda: bool(self._voices) or self._closing)
                 if self._closing:
                     return
-                voice = min(self._voices, key=lambda each: each.lead_s)
+                voice = min(self._voices, key=lambda voice: voice.lead_s)
             try:
                 voice.advance()
                 if voice.finished and voice.ends_s is None:

@@ -41,13 +41,21 @@ class KeyNote:
         timed: its latency has been noted.
     """
 
-    from_s, waits_s, pending = 0.0, 0.0, False
+    from_s = 0.0
+    waits_s = 0.0
+    pending = False
 
     def __init__(
         self, player: InstrumentPlayer, mixer: Mixer, id: int, event: NoteOn, path: Path, begin_frame: int = 0
     ) -> None:
-        self.player, self.mixer, self.id, self.event, self._path = player, mixer, id, event, path
-        self.begin_frame, self.patch, self.ear = begin_frame, player.patch, player.ear
+        self.player = player
+        self.mixer = mixer
+        self.id = id
+        self.event = event
+        self._path = path
+        self.begin_frame = begin_frame
+        self.patch = player.patch
+        self.ear = player.ear
         self.request: RenderRequest | None = None
         self.string: int | None = None
         self.gain = 1.0
@@ -130,17 +138,17 @@ class KeyNote:
         return self.began_frame + round(seconds * self.mixer.rate_hz)
 
     def release_at(self, frame: int) -> None:
-        """Let it fade out from a frame of the mixer on; 0: not any more."""
+        """Let the note fade out from a frame of the mixer on; 0: not any more."""
         self.player.cancel(self.id)
         if frame > 0:
             self.player.release(self.id, frame=frame)
 
     def release(self, seconds: float) -> None:
-        """Let it fade out within so many seconds, from now on; one that waits for its frame never begins."""
+        """Let the note fade out within so many seconds, from now on; one that waits for its frame never begins."""
         self.released = True
         self.player.cancel(self.id)
         self.player.release(self.id, max(seconds, 1e-3))
 
     def end(self) -> None:
-        """Mark it as cut, where no device plays its voices any more."""
+        """Mark the note as cut, where no device plays its voices any more."""
         self.cut = True

@@ -86,18 +86,18 @@ class PluckRange:
 
     def turned(self, press: KeyPress, amplitude_mm: float) -> float | None:
         """The amplitude after a key that changes it, as `turn` does a velocity; None for another key."""
-        turned = turn(press, 0, self.velocity_of(amplitude_mm))
-        return None if turned is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(turned[1])
+        step = turn(press, 0, self.velocity_of(amplitude_mm))
+        return None if step is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(step[1])
 
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""
         low, high = self.position
-        return _rounded(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
+        return _round_within(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
 
     def amplitude_of(self, velocity: int) -> float:
         """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""
         low, high = self.amplitude_mm
-        return _rounded(velocities.between(low, high, velocities.share(velocity, 0.0)), low, high)
+        return _round_within(velocities.between(low, high, velocities.share(velocity, 0.0)), low, high)
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The velocity, 1 … 127, whose amplitude is nearest."""
@@ -132,9 +132,9 @@ def octave_near(octave: int, keys: Collection[int]) -> int:
     Args:
         keys: of MIDI, which sound; some instruments have fewer than the computer.
     """
-    counts = {each: len(letters_of(each).keys() & set(keys)) for each in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
+    counts = {other: len(letters_of(other).keys() & set(keys)) for other in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
     enough = MOST_OF_BEST * max(counts.values())
-    return min((each for each in counts if counts[each] >= enough), key=lambda each: abs(each - octave))
+    return min((other for other in counts if counts[other] >= enough), key=lambda other: abs(other - octave))
 
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:
@@ -149,23 +149,23 @@ def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
     if letter in OCTAVE_STEPS:
         return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity
     if letter and letter in "123456789":
-        return octave, _ninth(int(letter))
+        return octave, _velocity_of_digit(int(letter))
     step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
     return None if step is None else (octave, min(max(velocity + step, 1), LARGEST_VELOCITY))
 
 
 def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """0 … 9 along the row; None for a key that is not of it."""
+    """The place 0 … 9 along the row; None for a key that is not of it."""
     codes = _ROW_CODES.get(platform)
     if codes and press.code:
         return codes.index(press.code) if press.code in codes else None
-    found = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
-    return found if found >= 0 else None
+    place = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
+    return place if place >= 0 else None
 
 
-def _rounded(value: float, low: float, high: float) -> float:
+def _round_within(value: float, low: float, high: float) -> float:
     return min(max(round(value, DIGITS), low), high)
 
 
-def _ninth(digit: int) -> int:
+def _velocity_of_digit(digit: int) -> int:
     return round(1 + (digit - 1) / 8 * (LARGEST_VELOCITY - 1))

@@ -71,10 +71,10 @@ class _Wanted:
 
 
 class Keys:
-    """Every public method may be called from any thread.
+    """The keys of a patch, and its notes. Every public method may be called from any thread.
 
-    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before; where
-    its own is another, that is computed in the background. Nothing that takes milliseconds is computed under a lock.
+    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before.
+    Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
         find: the path of a preset by its name; None where there is none.
@@ -96,8 +96,12 @@ class Keys:
         report: Callable[[str, str], None],
         set_effects: Callable[[Effects | None], None],
     ) -> None:
-        self._sources, self._find, self._mixer = sources, find, mixer
-        self._in_background, self._report, self._set_effects = in_background, report, set_effects
+        self._sources = sources
+        self._find = find
+        self._mixer = mixer
+        self._in_background = in_background
+        self._report = report
+        self._set_effects = set_effects
         self.recorder = EventRecorder(report)
         self._lock = threading.RLock()
         self._player: InstrumentPlayer | None = None
@@ -130,7 +134,7 @@ class Keys:
         """
         with self._lock:
             player = self._player
-            if patch is None or (player is not None and not _holds(player, patch)):
+            if patch is None or (player is not None and not _can_play(player, patch)):
                 self._player = None
             self._wanted = None if patch is None else _Wanted(patch, ear)
         self._follow_wish()
@@ -146,7 +150,7 @@ class Keys:
         self._follow_wish()
 
     def set_gains(self, gains: Mapping[str, float], compared: bool) -> None:
-        """The factor of each source, see `InstrumentPlayer.set_gains`."""
+        """Set the factor of each source, see `InstrumentPlayer.set_gains`."""
         with self._lock:
             self._gains, self._compared = gains, compared
             for player in self._playing:
@@ -170,17 +174,17 @@ class Keys:
                 return None
             self.recorder.take(event, None if due is None else due.time_s)
             frame, id = 0 if due is None else due.frame_in(mixer), 0
-            struck = event if isinstance(event, NoteOn) and event.velocity > 0 else None
+            note_on = event if isinstance(event, NoteOn) and event.velocity > 0 else None
             try:
-                if struck is None or not player.silent(struck.key):
+                if note_on is None or not player.silent(note_on.key):
                     id = player.handle(event, frame, struck_s)
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
             if isinstance(event, Controller) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
-            if struck is None or not id:
+            if note_on is None or not id:
                 return None
-            note = self._notes[player, id] = KeyNote(player, mixer, id, struck, self._path, frame)
+            note = self._notes[player, id] = KeyNote(player, mixer, id, note_on, self._path, frame)
             begun(note)
             return note
 
@@ -195,11 +199,11 @@ class Keys:
         if event.number in SWITCHES:
             self._switches[event.number, event.channel] = event
         elif event.number == RESET:
-            self._switches = {at: each for at, each in self._switches.items() if each.channel != event.channel}
+            self._switches = {at: switch for at, switch in self._switches.items() if switch.channel != event.channel}
 
     def look(self) -> list[KeyNote]:
         """Follow the player's reports; the notes that began since it was asked for the last time. Any thread."""
-        found = []
+        begun_notes = []
         with self._lock:  # a note is known before its report is read
             for player in self._playing:
                 for report in player.reports():
@@ -213,14 +217,14 @@ class Keys:
                     if note.over:
                         del self._notes[player, report.id]
                     elif report.kind == BEGAN:
-                        found.append(note)
-                own = [id for each, id in self._notes if each is player]
-                for id in player.compiled.missing(own):
+                        begun_notes.append(note)
+                ids = [id for owner, id in self._notes if owner is player]
+                for id in player.compiled.missing(ids):
                     self._notes.pop((player, id)).end()
             self._notes = {key: note for key, note in self._notes.items() if not note.over}
-            held = {player for player, _ in self._notes}
-            self._playing = [each for each in self._playing if each is self._player or each in held]
-        return found
+            with_notes = {player for player, _ in self._notes}
+            self._playing = [player for player in self._playing if player is self._player or player in with_notes]
+        return begun_notes
 
     def cancel(self) -> None:
         """Cancel the events that were handed over and are not due yet."""
@@ -237,22 +241,22 @@ class Keys:
 
     def sounding(self) -> dict[int, float]:
         """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
-        found: dict[int, float] = {}
-        for each in self.sounding_notes():
-            found[each.key] = max(found.get(each.key, 0.0), each.level)
-        return found
+        levels: dict[int, float] = {}
+        for note in self.sounding_notes():
+            levels[note.key] = max(levels.get(note.key, 0.0), note.level)
+        return levels
 
     def sounding_notes(self) -> list[SoundingNote]:
         """The notes that ring, with their strings; none while the output stands."""
         player, mixer = self._player, self._mixer()
-        if player is None or self._in is not mixer or self._stands(mixer):
+        if player is None or self._in is not mixer or self._mixer_stands(mixer):
             return []
         return [
-            SoundingNote(each.key, min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0), each.string, player.slid(each))
-            for each in player.ringing()
+            SoundingNote(note.key, min(max(1 + note.level_db / SEEN_DB, 0.0), 1.0), note.string, player.slid(note))
+            for note in player.ringing()
         ]
 
-    def _stands(self, mixer: Mixer) -> bool:
+    def _mixer_stands(self, mixer: Mixer) -> bool:
         now_s, frames = time.monotonic(), mixer.frames
         if frames != self._frames:
             self._frames, self._moved_s = frames, now_s
@@ -270,7 +274,7 @@ class Keys:
         """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
         with self._lock:
             player = self._player
-            self.recorder.begin([] if player is None else [_turned(player), *player.at_hand])
+            self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand])
 
     def hear_dry(self, dry: bool) -> None:
         """Leave out body and room, or not, as while models are compared with the truth."""
@@ -287,19 +291,19 @@ class Keys:
         if effects != self._effects:
             self._effects = effects
             self._set_effects(effects)
-        problem, reported = body_problem(patch) if patch is not None else "", self._reported_body
+        problem, reported_before = body_problem(patch) if patch is not None else "", self._reported_body
         self._reported_body = problem
-        if problem and problem != reported:
+        if problem and problem != reported_before:
             self._report(problem, "")
 
     def _present(self) -> InstrumentPlayer | None:
         """The player in the present mixer; in a new one its strings are at rest. Under the lock."""
         player, mixer = self._player, self._mixer()
         if player is not None and mixer is not self._in:
-            self._give(player.again(mixer.rate_hz), mixer)
+            self._set_player(player.again(mixer.rate_hz), mixer)
         return self._player
 
-    def _give(self, player: InstrumentPlayer, mixer: Mixer) -> None:
+    def _set_player(self, player: InstrumentPlayer, mixer: Mixer) -> None:
         """Let keys play a player. Under the lock."""
         player.set_gains(self._gains, self._compared)
         mixer.set_player(player.compiled)
@@ -310,7 +314,7 @@ class Keys:
         """Play what is wanted; what takes milliseconds of it, in the background."""
         wanted, player = self._wanted, self._player
         if wanted is not None and player is not None and not player.of_drums:
-            self._bring(player, wanted, nearly=not is_another(wanted.patch, player.patch))
+            self._load_wanted(player, wanted, nearly=not is_another(wanted.patch, player.patch))
         self._in_background(self._complete)
 
     def _complete(self) -> None:
@@ -321,16 +325,16 @@ class Keys:
             if player is None:
                 self._begin(wanted)
             else:
-                self._bring(player, wanted)
+                self._load_wanted(player, wanted)
         self._set_present_effects()
 
-    def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
+    def _load_wanted(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
         """Let keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
         try:
             keys = player.keys_of(wanted.patch, wanted.ear, nearly)
-            if isinstance(keys, DrumKeys) and not self._all_computed(keys):
+            if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
-            made = player.tabled(keys)
+            table = player.tabled(keys)
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
@@ -339,12 +343,12 @@ class Keys:
             return
         with self._lock:
             if wanted is self._wanted and player is self._player:
-                turned = (player.patch, player.ear) != (wanted.patch, wanted.ear)
-                player.take(made)
-                if turned:
-                    self.recorder.take(_turned(player))
+                is_outdated = (player.patch, player.ear) != (wanted.patch, wanted.ear)
+                player.take(table)
+                if is_outdated:
+                    self.recorder.take(_turned_event(player))
 
-    def _all_computed(self, keys: DrumKeys) -> bool:
+    def _compute_drums(self, keys: DrumKeys) -> bool:
         """Compute a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
         low, high = keys.patch.range
         for key in range(low, high + 1):
@@ -363,7 +367,7 @@ class Keys:
         try:
             preset, rate_hz = self._sources.load(path).preset, self._mixer().rate_hz
             drums = DrumKeys(patch, wanted.ear) if isinstance(patch.strings, Drums) else None
-            if drums is not None and not self._all_computed(drums):
+            if drums is not None and not self._compute_drums(drums):
                 return
             player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
         except (ValueError, PresetError) as error:
@@ -378,18 +382,18 @@ class Keys:
             for event in self._switches.values():
                 player.handle(event)
             self._path = path
-            self._give(player, mixer)
-            self.recorder.take(_turned(player))
+            self._set_player(player, mixer)
+            self.recorder.take(_turned_event(player))
         if now is not wanted:  # it is heard elsewhere by now
-            self._bring(player, now)
+            self._load_wanted(player, now)
 
 
-def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
+def _can_play(player: InstrumentPlayer, patch: Patch) -> bool:
     """Return True if a player can play a patch too."""
     return player.patch.preset == patch.preset and player.of_drums == isinstance(patch.strings, Drums)
 
 
-def _turned(player: InstrumentPlayer) -> PatchTurned:
+def _turned_event(player: InstrumentPlayer) -> PatchTurned:
     """The patch with the pick-up it is heard through. That is not its own where a single string is played."""
-    heard = {"points": player.ear.points, "kind": player.ear.pickup}
-    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=heard)}))
+    pickup = {"points": player.ear.points, "kind": player.ear.pickup}
+    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=pickup)}))

@@ -40,21 +40,22 @@ class Levels:
         """The gain by source; None: not known yet."""
         return self._known.get(note.matching_key) if note.match is None else note.match
 
-    def ask(self, note: Note, rate_hz: int, found: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:
-        """Compute the gains where they are not known and enough of the note is rendered; `found` is then called."""
+    def ask(self, note: Note, rate_hz: int, take: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:
+        """Compute the gains where they are not known and enough of the note is rendered; `take` is then called."""
         key = note.matching_key
-        if note.match is not None or not all(each.finished or each.rendered_s >= MATCHED_S for each in note.ahead):
+        if note.match is not None or not all(voice.finished or voice.rendered_s >= MATCHED_S for voice in note.ahead):
             return
         with self._lock:
             if key in self._waiting or len(self._waiting) > MOST_WAITING:
                 return
             self._waiting.add(key)
-        self._in_background(lambda: found(key, self._match(note, min(rate_hz, HIGHEST_RATE_HZ))))
+        self._in_background(lambda: take(key, self._match(note, min(rate_hz, HIGHEST_RATE_HZ))))
 
     def _match(self, note: Note, rate_hz: int) -> Mapping[str, float]:
+        """Compute the gain of each source of a note, and keep it for notes of the same pluck and ear."""
         key = note.matching_key
         try:
-            seconds = min([MATCHED_S, *(each.rendered_s for each in note.ahead)])  # a pluck may be shorter
+            seconds = min([MATCHED_S, *(voice.rendered_s for voice in note.ahead)])  # a pluck may be shorter
             levels = {source: self._level(note, source, seconds, rate_hz) for source in note.voices}
             gains = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         finally:
@@ -79,7 +80,7 @@ class Levels:
         return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
 
 
-def _match_gain(own: float, truth: float) -> float:
+def _match_gain(level: float, truth: float) -> float:
     limit = 10 ** (LARGEST_MATCH_DB / 20)
-    gain = truth / own if own > 0 else 0.0
+    gain = truth / level if level > 0 else 0.0
     return gain if 1 / limit <= gain <= limit else 1.0

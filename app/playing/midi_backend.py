@@ -76,7 +76,7 @@ class RtMidi:
         with self._faults():
             client = self._client()
             try:
-                return _distinct(client.get_ports())
+                return _number_duplicates(client.get_ports())
             finally:
                 client.delete()
 
@@ -85,7 +85,7 @@ class RtMidi:
         with self._faults():
             client = self._client()
             try:
-                client.open_port(_distinct(client.get_ports()).index(name))
+                client.open_port(_number_duplicates(client.get_ports()).index(name))
             except BaseException:
                 client.delete()
                 raise
@@ -113,16 +113,16 @@ class RtMidi:
             raise OSError(str(error).strip()) from error
 
 
-def _distinct(names: Iterable[str]) -> list[str]:
+def _number_duplicates(names: Iterable[str]) -> list[str]:
     """Names of ports; further ones of the same name are numbered, as some systems do not."""
-    found: list[str] = []
+    distinct_names: list[str] = []
     for name in names:
         number, distinct = 1, name
-        while distinct in found:
+        while distinct in distinct_names:
             number += 1
             distinct = f"{name} #{number}"
-        found.append(distinct)
-    return found
+        distinct_names.append(distinct)
+    return distinct_names
 
 
 class RtMidiInput:
@@ -133,7 +133,9 @@ class RtMidiInput:
     """
 
     def __init__(self, client: Any, name: str, callback: Callable[[Sequence[int]], None]) -> None:
-        self._client, self._name, self._callback = client, name, callback
+        self._client = client
+        self._name = name
+        self._callback = callback
         self._open = True
         self._thread = threading.Thread(target=self._fetch, name="midi-input", daemon=True)
         self._thread.start()
@@ -149,16 +151,16 @@ class RtMidiInput:
     def connected(self) -> bool:
         """Return True if its device is still there. No other client of the system is needed to ask."""
         try:
-            return self._name in _distinct(self._client.get_ports())
+            return self._name in _number_duplicates(self._client.get_ports())
         except Exception:  # the system itself is gone
             return False
 
     def _fetch(self) -> None:
         while self._open:
             time.sleep(PERIOD_S)
-            while self._open and (found := self._client.get_message()) is not None:
+            while self._open and (message := self._client.get_message()) is not None:
                 try:
-                    self._callback(found[0])
+                    self._callback(message[0])
                 except Exception as error:  # is reported, and costs this message only
                     threading.excepthook(
                         threading.ExceptHookArgs((type(error), error, error.__traceback__, self._thread))

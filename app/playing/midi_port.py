@@ -42,7 +42,7 @@ class MidiInput:
             MidiUnavailable: no backend, or the system's MIDI does not answer.
         """
         try:
-            return self._loaded().get_input_names()
+            return self._load_backend().get_input_names()
         except OSError as error:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
@@ -57,16 +57,16 @@ class MidiInput:
         self.close()
         self._awaited = name
         names = self.names()
-        found = name if name in names else next((each for each in names if same_device(each, name)), None)
-        if found is None:
+        port_name = name if name in names else next((other for other in names if same_device(other, name)), None)
+        if port_name is None:
             raise MidiUnavailable(f"The MIDI input {name} is not connected. Connect it, or choose another.")
         try:
-            self._port = self._loaded().open_input(found, callback=self._receive)
+            self._port = self._load_backend().open_input(port_name, callback=self._receive)
         except OSError as error:
             raise MidiUnavailable(
-                f"The MIDI input {found} cannot be opened ({error}). Another program may be using it."
+                f"The MIDI input {port_name} cannot be opened ({error}). Another program may be using it."
             ) from error
-        self.name, self._awaited = found, ""
+        self.name, self._awaited = port_name, ""
 
     def look(self) -> str:
         """Release the keys of an input that was disconnected, and open it when it is back; to be called often.
@@ -89,7 +89,10 @@ class MidiInput:
 
     def close(self) -> None:
         """Close the input, if one is open, and let its keys go; may be called again."""
-        port, self._port, self.name, self._awaited = self._port, None, "", ""
+        port = self._port
+        self._port = None
+        self.name = ""
+        self._awaited = ""
         if port is not None:
             port.close()
         self.release_all()
@@ -100,7 +103,7 @@ class MidiInput:
         for event in release_all(channels):
             self._on_release_all(event)
 
-    def _loaded(self) -> Backend:
+    def _load_backend(self) -> Backend:
         if self._backend is None:
             self._backend = self._load()
         return self._backend

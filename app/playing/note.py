@@ -59,8 +59,8 @@ class Note:
     @property
     def matching_key(self) -> tuple[object, ...]:
         """The values that the levels of its sources depend on."""
-        asked = self.request
-        return asked.preset, asked.pluck, asked.ear, asked.others, self.sources
+        request = self.request
+        return request.preset, request.pluck, request.ear, request.others, self.sources
 
     @property
     def over(self) -> bool:
@@ -79,13 +79,13 @@ class Note:
     @property
     def began(self) -> bool:
         """Return True if the device has any of its samples, or it was cut after it was handed over."""
-        return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
+        return not self.pending and (self.cut or any(voice.sounding or voice.over for voice in self.voices.values()))
 
     @property
     def waits_s(self) -> float:
         """The seconds that it will still be rendered before it sounds; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
-        return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
+        return max((voice.waits_s for voice in self.ahead), default=0.0) if waits else 0.0
 
     @property
     def began_frame(self) -> int:
@@ -115,18 +115,18 @@ class Note:
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
-        """Let it fade out from a frame of the mixer on; 0: not any more."""
+        """Let the note fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def end(self) -> None:
-        """Cut it, where no device plays its voices any more; they are over."""
+        """Cut the note, where no device plays its voices any more; they are over."""
         self.cut = True
         for voice in self.voices.values():
             voice.refuse()
 
     def release(self, seconds: float) -> None:
-        """Let it fade out within so many seconds, from now on."""
+        """Let the note fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)

@@ -80,7 +80,9 @@ class Notes:
         report: Report,
         set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
-        self._sound, self._sources, self._find = sound, sources, find
+        self._sound = sound
+        self._sources = sources
+        self._find = find
         self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
         self._notes: list[Note | KeyNote] = []
@@ -117,9 +119,11 @@ class Notes:
         reach = PluckRange.of(entry.info if entry is not None else None) if single else None
         with self._lock:
             plucked_before = self._reach is not None
-            self._reach, self._ear, chosen = reach, ear, self._chosen
-            if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
-                self._chosen = replace(chosen, preset=entry.path)
+            self._reach = reach
+            self._ear = ear
+            request = self._chosen
+            if request is not None and entry is not None and path_of(request.preset) != entry.path:
+                self._chosen = replace(request, preset=entry.path)
         if single and not plucked_before:
             self.keys.stop(REPLACED_S)
         self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
@@ -134,7 +138,7 @@ class Notes:
         self.keys.listen(ear)
 
     def choose(self, request: RenderRequest | None) -> None:
-        """The pluck that loops, seeks and the next pluck at a place start from."""
+        """Choose the pluck that loops, seeks and the next pluck at a place start from."""
         with self._lock:
             self._chosen = request
 
@@ -147,7 +151,7 @@ class Notes:
         with self._lock:
             self._monitor, self._compared = monitor, compared
             notes = self._plucks()
-            self._each(notes, self._apply_monitor)
+            self._do_for_each(notes, self._apply_monitor)
         self._set_gains_of_keys()
         for note in notes:
             if not note.pending and not note.over:
@@ -177,9 +181,9 @@ class Notes:
 
     def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
-        placed = self._place(event)
+        placed = self._as_pluck(event)
         if not isinstance(placed, PluckAt):
-            begun = self.keys.handle(placed, due, struck_s, self._adopt)
+            begun = self.keys.handle(placed, due, struck_s, self._keep_key_note)
             self.latest = begun or self.latest
             return begun
         with self._lock:
@@ -187,10 +191,10 @@ class Notes:
                 return None
             chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
         frame = 0 if due is None else due.frame_in(self._sound.mixer)
-        self.latest = note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
+        self.latest = note = self._ring_pluck(chosen, 0.0, frame, struck_s, due is not None)
         return note
 
-    def _place(self, event: Event) -> Event:
+    def _as_pluck(self, event: Event) -> Event:
         """The pluck that a key of a single string is; any other event as it is."""
         reach, chosen = self._reach, self._chosen
         if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
@@ -209,13 +213,14 @@ class Notes:
         """
         if alone:
             self.stop(REPLACED_S)
-        return None if self._chosen is None else self._ring(self._chosen, from_s, begin_frame)
+        return None if self._chosen is None else self._ring_pluck(self._chosen, from_s, begin_frame)
 
-    def _ring(
+    def _ring_pluck(
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
     ) -> Note:
+        """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
         note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
-        note.ahead_of_event, loaded = waits, self._loaded(note)
+        note.ahead_of_event, loaded = waits, self._is_loaded(note)
         if begin_frame:
             note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
@@ -224,7 +229,7 @@ class Notes:
         if from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
-            self._guarded(begin, note)()
+            self._wrap_errors(begin, note)()
         return note
 
     def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
@@ -241,7 +246,7 @@ class Notes:
         if isinstance(event, PluckAt):
             return self.ring(begin_frame=frame)
         due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
-        return self.keys.handle(event, due, 0.0, self._adopt)
+        return self.keys.handle(event, due, 0.0, self._keep_key_note)
 
     def cancel(self) -> None:
         """Cancel what was handed over and is not due yet."""
@@ -254,7 +259,7 @@ class Notes:
     def stop(self, seconds: float = STOP_S) -> None:
         """Let all notes fade out; those that wait will not sound."""
         with self._lock:
-            self._each(self._notes, lambda note: note.release(seconds))
+            self._do_for_each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
 
     # Ahead of events
@@ -262,14 +267,14 @@ class Notes:
     def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
         """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
-            self._helper.submit(self._guarded(work, note))
+            self._helper.submit(self._wrap_errors(work, note))
 
     @property
     def at_hand(self) -> bool:
         """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
         with self._lock:
             chosen = self._chosen
-            return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
+            return chosen is not None and self._is_loaded(Note(chosen, self._voices_of(chosen)))
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
@@ -335,8 +340,8 @@ class Notes:
         with self._lock:
             self._move_to_new_mixer()
             self._notes = [note for note in self._notes if not note.over]
-            self._each(self._notes, self._take_latency)
-            self._each(self._plucks(), self._follow)
+            self._do_for_each(self._notes, self._take_latency)
+            self._do_for_each(self._plucks(), self._follow)
 
     def close(self) -> None:
         """End the threads; may be called again."""
@@ -346,7 +351,7 @@ class Notes:
 
     # How it is done
 
-    def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
+    def _do_for_each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
         """Do `work` with each note. One with which it fails is dropped, and the others continue."""
         for note in notes:
             try:
@@ -355,6 +360,7 @@ class Notes:
                 drop(note, error, self._report)
 
     def _take_latency(self, note: Note | KeyNote) -> None:
+        """Add the latency of a note, once it is known, to the recent ones; notes rendered ahead have none."""
         ahead = isinstance(note, Note) and note.ahead
         if not note.timed and not ahead and (latency_s := note.latency_s) is not None:
             note.timed = True
@@ -384,10 +390,10 @@ class Notes:
         """
         for note in self.keys.look():
             with self._lock:
-                request, chosen = note.request, self._chosen
-                if request is None or chosen is None or note is not self.latest or self._reach is not None:
+                request, chosen_request = note.request, self._chosen
+                if request is None or chosen_request is None or note is not self.latest or self._reach is not None:
                     continue
-                self._chosen = replace(chosen, preset=request.preset, pluck=request.pluck)
+                self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
 
     def _path_of(self, preset: str) -> Path | None:
         entry = self._find(preset)
@@ -395,16 +401,16 @@ class Notes:
 
     def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
         """The sources that get a voice: what the monitor holds, without presets that are not here."""
-        here = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
-        return tuple(source for source in self._monitor.voices if source in here) or ("model",)
+        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
+        return tuple(source for source in self._monitor.voices if source in available) or ("model",)
 
-    def _loaded(self, note: Note) -> bool:
+    def _is_loaded(self, note: Note) -> bool:
         """Return True if nothing needs to be loaded for it."""
         rate_hz = self._sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
-    def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
-        """`work` with its errors reported; they cut the note."""
+    def _wrap_errors(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
+        """The work with its errors reported; they cut the note."""
 
         def guarded() -> None:
             try:
@@ -426,13 +432,15 @@ class Notes:
         plucks = [note for note in left if isinstance(note, Note) and note.seconds and not note.released]
         for note in left:
             if isinstance(note, Note) and note in plucks[-MOST_CARRIED:]:
-                note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
+                note.from_s = note.seconds
+                note.begin_frame = 0
+                note.mixer = None
                 note.pending, note.handed_over = True, False
                 self.in_background(partial(self._begin, note, 0.0), note)
             else:
                 note.end()
 
-    def _adopt(self, note: KeyNote) -> None:
+    def _keep_key_note(self, note: KeyNote) -> None:
         """Keep the note of a key, which the player has been given."""
         with self._lock:
             self._notes.append(note)
@@ -445,8 +453,8 @@ class Notes:
             self._make_voices(note, mixer.rate_hz, struck_s)
             note.set_begin(struck_s)
             if note.ahead:
-                for each in note.ahead:
-                    self._ahead.render(each)
+                for voice in note.ahead:
+                    self._ahead.render(voice)
                 return
             self._skip(note)
             if self._hand_over(note, mixer):
@@ -459,31 +467,33 @@ class Notes:
                 voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
-        asked, voices = note.request, dict[str, Voice]()
+        request, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
         for source in note.sources:
             subject = note.subject(source)
             try:
                 program = self._sources.program(subject, source, rate_hz)
-                initial_m, begin = self._sources.begin(subject, source, rate_hz, asked.pluck)
+                initial_m, begin = self._sources.begin(subject, source, rate_hz, request.pluck)
                 model = self._sources.load(subject).model if program.rendered else None
             except (PresetError, ValueError):
                 if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why
             if model is None:
-                voices[source] = Voice(program, initial_m, asked.ear, 0.0, begin=begin)
+                voices[source] = Voice(program, initial_m, request.ear, 0.0, begin=begin)
                 continue
-            voice = voices[source] = Voice(program, initial_m, asked.ear, 0.0, asked.seconds, model.rate_hz, begin)
-            voice.fade_out_by(asked.seconds)  # behind it there are no samples
+            voice = voices[source] = Voice(
+                program, initial_m, request.ear, 0.0, request.seconds, model.rate_hz, begin
+            )
+            voice.fade_out_by(request.seconds)  # behind it there are no samples
             ahead.append(
                 AheadVoice(
                     voice,
                     model,
                     initial_m,
-                    program.grid_weights(asked.ear),
-                    (subject, asked.pluck, asked.ear, asked.seconds),
-                    lambda: self._rendered_enough(note, ahead, struck_s),
+                    program.grid_weights(request.ear),
+                    (subject, request.pluck, request.ear, request.seconds),
+                    lambda: self._hand_over_rendered(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
                     note.from_s,
@@ -491,10 +501,10 @@ class Notes:
             )
         note.ahead, note.voices = ahead, voices
 
-    def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
+    def _hand_over_rendered(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
-            if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
+            if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
                 return
             note.handed_over = True  # or two that are ready at the same time would both do it
         self._skip(note)
@@ -546,7 +556,7 @@ class Notes:
     def _make_room(self, most: int) -> None:
         """Release the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
-        self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
+        self._do_for_each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
     def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
@@ -564,4 +574,4 @@ class Notes:
             notes = [note for note in self._plucks() if note.matching_key == key]
             for note in notes:
                 note.match = match
-            self._each(notes, self._apply_monitor)
+            self._do_for_each(notes, self._apply_monitor)

@@ -27,11 +27,11 @@ class Pair:
     def select(self, name: str) -> None:
         """Set which one is heard; where they sound, it is a cross-fade."""
         self._heard = name
-        for each, voice in self._voices.items():
-            voice.set_gain(float(each == name))
+        for source, voice in self._voices.items():
+            voice.set_gain(float(source == name))
 
     def play(self, restart: bool = False) -> None:
-        """Start both where nothing sounds, or `again`; otherwise they continue."""
+        """Start both where nothing sounds, or on `restart`; otherwise they continue."""
         if self._voices and not restart:
             return
         self.stop()

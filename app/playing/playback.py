@@ -1,4 +1,4 @@
-"""Plays a MIDI file. A thread of its own hands each event over before its time, with the frame at which it counts."""
+"""Playback of a MIDI file. A thread hands each event over before its time, with the frame at which it counts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Clock(Protocol):
 
 
 class Playback:
-    """Plays one list of events at a time.
+    """A player of one list of events at a time.
 
     Args:
         handle: plays an event when it is due, or, for None, at once; called in the playback's thread.
@@ -44,7 +44,10 @@ class Playback:
         cancel: Callable[[], None],
         ended: Callable[[], None] = lambda: None,
     ) -> None:
-        self._handle, self._clock, self._cancel, self._ended = handle, clock, cancel, ended
+        self._handle = handle
+        self._clock = clock
+        self._cancel = cancel
+        self._ended = ended
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -57,7 +60,7 @@ class Playback:
         """Play these events from their beginning; stop what is being played."""
         self.stop()
         self._stopping = threading.Event()
-        work = (sorted(events, key=lambda each: each.time_s), self._stopping)
+        work = (sorted(events, key=lambda timed_event: timed_event.time_s), self._stopping)
         self._thread = threading.Thread(target=self._run, args=work, name="midi-playback", daemon=True)
         self._thread.start()
 
@@ -70,12 +73,12 @@ class Playback:
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
         beginning, due = _Beginning(self._clock, self._ahead_s), None
-        nobody_plays = release_all(channels_in(each.event for each in events))
-        for each in events:
-            due = beginning.wait(each.time_s, self._ahead_s, stopping)
+        nobody_plays = release_all(channels_in(timed_event.event for timed_event in events))
+        for timed_event in events:
+            due = beginning.wait(timed_event.time_s, self._ahead_s, stopping)
             if stopping.is_set():
                 break
-            self._handle(each.event, due)
+            self._handle(timed_event.event, due)
         else:
             for event in nobody_plays:  # with the last event
                 self._handle(event, due)

@@ -52,11 +52,11 @@ class EventRecorder:
             full = len(self._recorded) >= LONGEST_RECORDING
             if not full:
                 at_s = time.monotonic() if time_s is None else time_s
-                taken = TimedEvent(at_s - self._began_s, event)
-                self._recorded.append(taken)
-                self._unfetched.append(taken)
-            reported, self._reported_full = self._reported_full, self._reported_full or full
-        if full and not reported:
+                timed_event = TimedEvent(at_s - self._began_s, event)
+                self._recorded.append(timed_event)
+                self._unfetched.append(timed_event)
+            reported_before, self._reported_full = self._reported_full, self._reported_full or full
+        if full and not reported_before:
             self._report(FULL, "")
 
     def cancel(self, event: Event | None = None) -> None:
@@ -65,23 +65,27 @@ class EventRecorder:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
                 self._recorded, self._unfetched = (
-                    [each for each in part if each.time_s <= played_s or (event is not None and each.event != event)]
+                    [
+                        timed_event
+                        for timed_event in part
+                        if timed_event.time_s <= played_s or (event is not None and timed_event.event != event)
+                    ]
                     for part in (self._recorded, self._unfetched)
                 )
 
     def end(self) -> list[TimedEvent]:
-        """The events as `played_from` has them. Those that were not fetched yet can be, up to here."""
+        """End the recording; return events as `played_from` has them. Those not fetched yet can be, up to here."""
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
             self.ended_s = time.monotonic() - self._began_s
-            self._unfetched = [each for each in self._unfetched if each.time_s <= self.ended_s]
+            self._unfetched = [timed_event for timed_event in self._unfetched if timed_event.time_s <= self.ended_s]
         return played_from(recorded, self.ended_s)
 
     def fetch(self) -> list[TimedEvent]:
         """The events whose time has come since the last call, with times in s from the beginning."""
         with self._lock:
             now_s = time.monotonic() - self._began_s
-            fetched = [each for each in self._unfetched if each.time_s <= now_s]
+            fetched = [timed_event for timed_event in self._unfetched if timed_event.time_s <= now_s]
             if fetched:
-                self._unfetched = [each for each in self._unfetched if each.time_s > now_s]
-        return sorted(fetched, key=lambda each: each.time_s)
+                self._unfetched = [timed_event for timed_event in self._unfetched if timed_event.time_s > now_s]
+        return sorted(fetched, key=lambda timed_event: timed_event.time_s)

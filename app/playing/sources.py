@@ -44,16 +44,16 @@ class Sources:
 
     def load(self, subject: Subject) -> Loaded:
         """The preset, or a string of it, from memory or from its file. Raises PresetError."""
-        if (found := self._known(subject)) is not None:
-            return found
+        if (loaded := self._known(subject)) is not None:
+            return loaded
         with self._loading:
-            found = self._known(subject) or Loaded(self._read(subject))
+            loaded = self._known(subject) or Loaded(self._read(subject))
             with self._lock:
-                self._presets[subject] = found
+                self._presets[subject] = loaded
                 while len(self._presets) > KEPT_PRESETS:
                     oldest, _ = self._presets.popitem(last=False)
-                    self._programs = {key: each for key, each in self._programs.items() if key[0] != oldest}
-            return found
+                    self._programs = {key: program for key, program in self._programs.items() if key[0] != oldest}
+            return loaded
 
     def _read(self, subject: Subject) -> Preset:
         if not isinstance(subject, StringOf):
@@ -68,15 +68,15 @@ class Sources:
         """
         kind = "truth" if source == "truth" else "model"
         key = (subject, kind, rate_hz)
-        if (found := self._programs.get(key)) is not None:
-            return found
+        if (program := self._programs.get(key)) is not None:
+            return program
         with self._loading:
             preset = self.load(subject).preset
-            if (found := self._programs.get(key)) is None:
-                found = truth_program(preset.info, rate_hz) if kind == "truth" else model_program(preset, rate_hz)
+            if (program := self._programs.get(key)) is None:
+                program = truth_program(preset.info, rate_hz) if kind == "truth" else model_program(preset, rate_hz)
                 with self._lock:
-                    self._programs[key] = found
-            return found
+                    self._programs[key] = program
+            return program
 
     def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Array, tuple[Array, Array]]:
         """A pluck's displacement (grid_points,) in m, and the start of a voice of the program. Both are kept.
@@ -91,14 +91,14 @@ class Sources:
         return initial_m, self.program(subject, source, rate_hz).start(initial_m)
 
     def prepare(self, subject: Subject, rate_hz: int) -> None:
-        """Load it with both programs. Raises PresetError."""
+        """Load a preset with both programs. Raises PresetError."""
         for kind in KINDS:
             self.program(subject, kind, rate_hz)
 
     def _known(self, subject: Subject) -> Loaded | None:
         """The loaded preset, marked as used last; None: not loaded."""
         with self._lock:
-            found = self._presets.get(subject)
-            if found is not None:
+            loaded = self._presets.get(subject)
+            if loaded is not None:
                 self._presets.move_to_end(subject)
-            return found
+            return loaded

@@ -1,4 +1,4 @@
-"""Copies a preset file into the user's own folder, after all checks."""
+"""Installation of a preset file in the user's own folder, after all checks."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
         raise InstallError(str(error)) from error
     present = list(present)
     for path in present:
-        if _same(path, digest):
+        if _has_digest(path, digest):
             return Installed(name_text(path.stem), path, was_there=True)
-    taken = {path.stem for path in present}
+    stems = {path.stem for path in present}
     stem = name_text(file.stem)
     names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
-    target = next(path for name in names if name not in taken and not (path := folder / f"{name}{SUFFIX}").exists())
+    target = next(path for name in names if name not in stems and not (path := folder / f"{name}{SUFFIX}").exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)
         data = read_bounded(file, LARGEST_PRESET_BYTES)
@@ -67,7 +67,7 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
     return Installed(target.stem, target, was_there=False)
 
 
-def _same(path: Path, digest: str) -> bool:
+def _has_digest(path: Path, digest: str) -> bool:
     try:
         return preset_digest(path) == digest
     except PresetError:

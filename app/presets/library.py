@@ -92,8 +92,8 @@ class Library:
 
     def first(self) -> PresetEntry | None:
         """The preset of the first start: `FIRST`, else the one of the least error among those of the highest rate."""
-        if (chosen := self.find(FIRST)) is not None:
-            return chosen
+        if (entry := self.find(FIRST)) is not None:
+            return entry
         highest_hz = max((entry.info.rate_hz for entry in self.entries), default=0)
         fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
@@ -107,8 +107,8 @@ class Library:
         if entries != self.entries:
             self.entries = entries
             self.changed.emit()
-        reported, self._problems = self._problems, problems
-        return [problem for problem in problems if problem not in reported]
+        problems_before, self._problems = self._problems, problems
+        return [problem for problem in problems if problem not in problems_before]
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
@@ -120,8 +120,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     entries: dict[str, PresetEntry] = {}
     folders = folders or (SHIPPED, user_folder())
     tables = [read_heard(folder) for folder in folders]
-    heard = {digest: found for known, _ in tables for digest, found in known.items()}
-    problems = [problem for _, found in tables for problem in found]
+    records = {digest: by_digest for table, _ in tables for digest, by_digest in table.items()}
+    problems = [problem for _, table_problems in tables for problem in table_problems]
     for folder in folders:
         problems += [problem] if (problem := unreadable(folder)) else []
         for path in preset_files(folder):
@@ -132,7 +132,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                     continue
                 state = path.stat()
                 entry = _read_entry(path, state.st_mtime_ns, state.st_size)
-                entries[name] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
+                entries[name] = replace(entry, heard=records.get(preset_digest(path))) if records else entry
             except PresetError as error:
                 problems.append(str(error))
             except OSError as error:  # such as a file that was deleted meanwhile
@@ -151,8 +151,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
     """Read an entry, cached by time and size of the file: the browser lists all presets whenever it opens."""
     info = read_info(path)
-    listed = replace(info, title=display_title(name_text(path.stem), info))
-    return PresetEntry(name_text(path.stem), path, listed, size_bytes)
+    titled_info = replace(info, title=display_title(name_text(path.stem), info))
+    return PresetEntry(name_text(path.stem), path, titled_info, size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:
@@ -167,5 +167,5 @@ def display_title(name: str, info: PresetInfo) -> str:
     if cell is None:
         return info.title
     named = cell.model, cell.tension_modulated, cell.initial, cell.rate_hz, cell.horizon
-    stored = info.model, info.tension_modulated, info.initial, info.rate_hz, info.horizon_steps
-    return cell.title if named == stored else info.title
+    key_facts = info.model, info.tension_modulated, info.initial, info.rate_hz, info.horizon_steps
+    return cell.title if named == key_facts else info.title

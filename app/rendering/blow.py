@@ -1,8 +1,8 @@
 """A blow on a drum as it is drawn: motion of model and truth, error, and sound, which grow.
 
 A string's take has pictures of points. A drum's has its lowest modes at flashes: amplitude, and the angle that the
-mode has turned through since the blow. A picture at any speed of slow motion follows from these: each mode turns more
-slowly by the same factor, as under a stroboscope of its own, while it decays in real time. Waves that run out from
+mode has turned through since the blow. A picture at any speed of slow motion follows from these: all modes turn more
+slowly by one factor, and decay in real time. Waves that run out from
 the mallet are thus seen as they run, only slower.
 """
 
@@ -56,10 +56,11 @@ class BlowRequest:
         """Return True if model and truth move alike: only listening points may differ."""
         if not isinstance(other, BlowRequest):
             return False
-        own, others = (
-            (each.preset, each.modes.drum, len(each.modes), each.strike, each.seconds) for each in (self, other)
+        own_motion, other_motion = (
+            (request.preset, request.modes.drum, len(request.modes), request.strike, request.seconds)
+            for request in (self, other)
         )
-        return own == others
+        return own_motion == other_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,16 +79,16 @@ class Head:
 
     @classmethod
     def of(cls, surface: Surface, sides: tuple[float, float]) -> Head:
-        """`sides`: length and width, for the numbers of columns and rows."""
+        """The head on a grid; `sides`: length and width, for the numbers of columns and rows."""
         inside, places = grid_of(surface, sides)
         shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(places)
         return cls(inside, shapes.astype(np.float32), places)
 
     def picture(self, amplitudes: NDArray[np.floating]) -> NDArray[np.float32]:
         """Displacement (rows, columns) of modal amplitudes (modes,), in their unit; 0 outside the drum."""
-        found = np.zeros(self.inside.shape, np.float32)
-        found[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
-        return found
+        picture_m = np.zeros(self.inside.shape, np.float32)
+        picture_m[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
+        return picture_m
 
 
 def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) -> tuple[NDArray[np.bool_], Array]:
@@ -150,7 +151,9 @@ class BlowTake:
     """
 
     def __init__(self, request: BlowRequest, head: Head) -> None:
-        self.request, self.head, self.seconds = request, head, request.seconds
+        self.request = request
+        self.head = head
+        self.seconds = request.seconds
         self.frames = int(request.seconds * RATE_HZ) + 2
         self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
         omega, sigma = request.modes.omega[0], request.modes.sigma[0]
@@ -195,7 +198,7 @@ class BlowTake:
 
     @property
     def scale(self) -> Array:
-        """(modes,): from amplitudes of the modes to those that `head` has shapes of."""
+        """The factors (modes,) from amplitudes of the modes to those that `head` has shapes of."""
         return self.request.modes.scale[: len(self.head.shapes)]
 
     def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:
@@ -208,11 +211,11 @@ class BlowTake:
         if ready == 0:
             return None
         flash = min(int(position_s * FLASH_HZ), ready - 1)
-        shown = parts[-1]
-        begins, angle = shown.angle[0], shown.angle[flash]
+        motion = parts[-1]
+        begins, angle = motion.angle[0], motion.angle[flash]
         slowed = begins + min(speed, 1.0) * (angle - begins)
-        found = shown.size_m[flash] * np.cos(slowed)
+        modal_m = motion.size_m[flash] * np.cos(slowed)
         if source == "difference":
             model = parts[0]
-            found = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - found
-        return np.asarray(found * self.scale)
+            modal_m = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - modal_m
+        return np.asarray(modal_m * self.scale)

@@ -24,7 +24,7 @@ TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its 
 
 
 class BlowJob(Rendering[BlowRequest, BlowTake]):
-    """Renders a blow of a preset of many strings."""
+    """The rendering of a blow of a preset of many strings."""
 
     def __init__(
         self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
@@ -52,18 +52,18 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 
     def _begin(self) -> BlowTake:
         take = BlowTake(self.request, head_of(self.request.modes))
-        self._movers = self._set_out()
+        self._movers = self._begin_movers()
         take.listened, self._weights = _listened(self.request), _weights(self.request)
         return take
 
-    def _set_out(self) -> dict[str, _Mover]:
+    def _begin_movers(self) -> dict[str, _Mover]:
         request = self.request
-        struck = StruckDrum.by(request.strike, request.modes)
+        struck_drum = StruckDrum.by(request.strike, request.modes)
         try:
             play = model_player(self._load(request.preset).preset.model)
         except ValueError as error:
             raise PresetError(f"{request.preset}: {error}") from error
-        return {"model": _Mover(play(struck, RATE_HZ)), "truth": _Mover(true_motion(struck, RATE_HZ))}
+        return {"model": _Mover(play(struck_drum, RATE_HZ)), "truth": _Mover(true_motion(struck_drum, RATE_HZ))}
 
     def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
@@ -88,7 +88,7 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
     def _listen(self, take: BlowTake) -> None:
         """Render the signals for other listening points; those that are there stay until these are complete."""
         if self._coming is None:
-            self._coming, self._weights = (_listened(self.request), self._set_out()), _weights(self.request)
+            self._coming, self._weights = (_listened(self.request), self._begin_movers()), _weights(self.request)
         listened, movers = self._coming
         done = listened.signals["truth"].ready_frames
         blocks = self._blocks(movers, min(BLOCK_FRAMES, listened.signals["truth"].frames - done))
@@ -110,31 +110,31 @@ class _Mover:
         """The next frames, (frames, modes) in m; the first of all is that of the blow, at rest."""
         if self._begun:
             return self._more(frames).numpy()
-        self._begun, found = True, self._more(frames - 1).numpy()
-        return np.concatenate([np.zeros((1, found.shape[1])), found])
+        self._begun, amplitudes_m = True, self._more(frames - 1).numpy()
+        return np.concatenate([np.zeros((1, amplitudes_m.shape[1])), amplitudes_m])
 
     def show(self, block: Array, motion: ModalMotion, omega: Array) -> None:
         """Take the flashes of these frames, which follow those of the last call; a speed needs the next frame.
 
         Modes that the frames leave out rest from now on.
         """
-        shown, between = motion.size_m.shape[1], RATE_HZ // FLASH_HZ
-        first, moving = self._done, min(block.shape[1], shown)
+        modes, between = motion.size_m.shape[1], RATE_HZ // FLASH_HZ
+        first, moving = self._done, min(block.shape[1], modes)
         turn = omega[:moving] / RATE_HZ
         if first == 0:
-            most = max(1.0, math.tau / TURNS * RATE_HZ / float(omega[shown - 1]))
+            most = max(1.0, math.tau / TURNS * RATE_HZ / float(omega[modes - 1]))
             self._step = max(step for step in range(1, between + 1) if between % step == 0 and step <= most)
             self._last, block = np.stack([-block[1, :moving], block[0, :moving]]), block[1:]  # odd about the blow
         q = np.concatenate([self._last[:, :moving], block[:, :moving]])
         stop = first + len(q) - 2
         numbers = np.arange(-(-first // self._step) * self._step, stop, self._step)
-        here = numbers - first + 1
-        swing = (q[here + 1] - q[here - 1]) / (2 * np.sin(turn))  # v/ω
-        size, angle = np.hypot(q[here], swing), np.arctan2(-swing, q[here])
+        indices = numbers - first + 1
+        swing = (q[indices + 1] - q[indices - 1]) / (2 * np.sin(turn))  # v/ω
+        size, angle = np.hypot(q[indices], swing), np.arctan2(-swing, q[indices])
         if len(numbers):
             before = angle[0] if first == 0 else self._wrapped[:moving]
-            turned = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
-            angles = (before if first == 0 else self._angle[:moving]) + np.cumsum(turned, axis=0)
+            steps = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
+            angles = (before if first == 0 else self._angle[:moving]) + np.cumsum(steps, axis=0)
             self._wrapped, self._angle = angle[-1], angles[-1]
             flash = numbers % between == 0
             motion.append(size[flash], angles[flash])
@@ -147,12 +147,12 @@ def _listened(request: BlowRequest) -> Listened:
 
 
 def _weights(request: BlowRequest) -> Array:
-    """(modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
+    """The weights (modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
     return np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in request.ear.points], axis=1)
 
 
 def _append(listened: Listened, blocks: dict[str, Array], weights: Array) -> None:
     for name, block in blocks.items():
         signal = listened.signals[name]
-        heard = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
-        signal.append(heard.astype(np.float32))
+        samples = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
+        signal.append(samples.astype(np.float32))

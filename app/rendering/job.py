@@ -22,7 +22,7 @@ BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next
 
 
 class Job(Rendering[RenderRequest, Take]):
-    """Renders a pluck.
+    """The rendering of a pluck.
 
     Requests for the same motion differ in listening points, slow motion or other presets.
     """
@@ -47,7 +47,7 @@ class Job(Rendering[RenderRequest, Take]):
             self._coming is None
             and take.listened.ear == self.request.ear
             and self._strobe == self._wanted_strobe(take)
-            and all(name in self._lines and self._lines[name].complete for name in self._wanted())
+            and all(name in self._lines and self._lines[name].complete for name in self._source_names())
         )
 
     def _continue(self, take: Take) -> None:
@@ -76,7 +76,10 @@ class Job(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride, source, program = take.info, take.stride, None, None
+            info = take.info
+            stride = take.stride
+            source = None
+            program = None
             try:
                 loaded = self._load(path)
                 source, program = loaded.model, loaded.model_program
@@ -93,7 +96,7 @@ class Job(Rendering[RenderRequest, Take]):
 
     def _show(self, take: Take) -> None:
         """Begin new flashes where the slow motion has changed; flashes that are under way are finished first."""
-        behind = any(self._lines[name].behind for name in self._wanted() if name in self._lines)
+        behind = any(self._lines[name].behind for name in self._source_names() if name in self._lines)
         if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
             self._strobe = strobe
             for line in self._lines.values():
@@ -118,7 +121,7 @@ class Job(Rendering[RenderRequest, Take]):
         return Listened(ear, {name: line.listen(ear) for name, line in self._lines.items()})
 
     def _is_whole(self, listened: Listened) -> bool:
-        return all(listened.signals[name].complete for name in self._wanted() if name in listened.signals)
+        return all(listened.signals[name].complete for name in self._source_names() if name in listened.signals)
 
     def _wanted_strobe(self, take: Take) -> Strobe:
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
@@ -133,15 +136,15 @@ class Job(Rendering[RenderRequest, Take]):
         most = BLOCK_FRAMES * truth.stride
         frames = min(min(2 * first, most) if first else 1 + FIRST_FRAMES, truth.frames - first)
         end_s = (first + frames) / truth.rate_hz if first + frames < truth.frames else take.seconds + 1.0
-        others = [self._lines[name] for name in self._wanted()[len(SOURCES) :]]
+        others = [self._lines[name] for name in self._source_names()[len(SOURCES) :]]
         behind = {line: min(BLOCK_FRAMES * line.stride, line.until(end_s)) for line in others}
         pending = [self._helper.submit(line.advance, count) for line, count in ({truth: frames} | behind).items()]
         model.advance(frames)
-        for each in pending:
-            each.result()
+        for call in pending:
+            call.result()
         take.model_ends_s = model.ends_s
 
-    def _wanted(self) -> list[str]:
+    def _source_names(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
     def _measure(self, take: Take) -> None:

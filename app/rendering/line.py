@@ -20,7 +20,7 @@ from engine.voices import Program
 
 
 class Line:
-    """Renders a source into its motion and its signal.
+    """The rendering of a source into its motion and its signal.
 
     Args:
         source: None for a string at rest.
@@ -44,9 +44,13 @@ class Line:
         seconds: float,
         stride: int,
     ) -> None:
-        self.rate_hz, self.stride, self.motion = info.rate_hz, stride, motion
+        self.rate_hz = info.rate_hz
+        self.stride = stride
+        self.motion = motion
         self.frames = int(seconds * info.rate_hz + 1e-6) + 1
-        self._seconds, self._source, self._program = seconds, source, program
+        self._seconds = seconds
+        self._source = source
+        self._program = program
         self._initial = _initial_m(pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
         self._flashes: Flashes | None = None
@@ -99,16 +103,18 @@ class Line:
 
     def advance(self, samples: int) -> None:
         """Render pictures and flashes of the next samples, flashes that are behind, and a block of the signal."""
-        first, stop, flashes = self.done, self.done + samples, self._flashes
+        first = self.done
+        stop = self.done + samples
+        flashes = self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
-            wanted, joint = numbers, flashes is not None and self._shown is None
+            union, joint = numbers, flashes is not None and self._shown is None
             if flashes is not None and joint:
-                wanted = np.union1d(numbers, flashes.needed(first, stop))
-            frames = self._pictures.take(wanted, stop)
+                union = np.union1d(numbers, flashes.needed(first, stop))
+            frames = self._pictures.take(union, stop)
             if flashes is not None and joint:
-                flashes.take(stop, wanted, frames)
-            self.motion.append(frames if len(wanted) == len(numbers) else frames[np.searchsorted(wanted, numbers)])
+                flashes.take(stop, union, frames)
+            self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
         if self._shown is not None and flashes is not None:
             self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
         if self._listening is not None:
@@ -116,16 +122,16 @@ class Line:
             if self._listening.signal.complete:
                 self._listening = None
 
-    def _catch_up(self, shown: _Frames, flashes: Flashes, most: int) -> None:
-        stop = min(shown.done + most, self.done)
-        numbers = flashes.needed(shown.done, stop)
-        flashes.take(stop, numbers, shown.take(numbers, stop))
+    def _catch_up(self, frames: _Frames, flashes: Flashes, most: int) -> None:
+        stop = min(frames.done + most, self.done)
+        numbers = flashes.needed(frames.done, stop)
+        flashes.take(stop, numbers, frames.take(numbers, stop))
         if stop == self.done:
             self._shown, self.motion.flashes = None, flashes
 
 
 class _Frames:
-    """Renders wanted frames of a source in ascending order; the string is at rest from where it runs away.
+    """The frames of a source, rendered in ascending order; the string is at rest from where it runs away.
 
     Attributes:
         done: frames that are passed, wanted or not.
@@ -148,8 +154,8 @@ class _Frames:
             assert self._source is not None
             ahead = numbers[following:] - self._state.frame
             try:
-                found, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
-                out[following:] = found[0]
+                frames, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
+                out[following:] = frames[0]
             except Runaway:  # at rest from here on: such values must never reach a loudspeaker
                 self._state, self.ends = None, max(self.done - 1, 0)
         self.done = stop

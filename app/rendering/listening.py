@@ -1,7 +1,7 @@
 """The signal of a source at the listening points, sample by sample, read from its voice.
 
-A compiled voice renders itself. Any other is given its samples: rendered at the listening points alone where the
-model can compute any frame, and read from the motion where that has every frame.
+A compiled voice renders itself; any other is given its samples. They are rendered at the listening points alone where
+the model can compute any frame, and read from the motion where that has every frame.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the dif
 
 
 class Listening:
-    """Reads the voice of a source into `signal`.
+    """A reader of a source's voice into `signal`.
 
     Args:
         program: of the voice.
@@ -44,7 +44,11 @@ class Listening:
         motion: Motion | None,
     ) -> None:
         self.signal = signal
-        self._source, self._program, self._initial, self._ear, self._motion = source, program, initial_m, ear, motion
+        self._source = source
+        self._program = program
+        self._initial = initial_m
+        self._ear = ear
+        self._motion = motion
         seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
         self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
         self._offline.voice.begin_at_once()
@@ -87,6 +91,6 @@ class Listening:
             self._given += len(samples_m)
             self._last = np.concatenate([self._last, samples_m])[-MIRRORED - 1 :]
             if self._given == self.signal.frames:  # a point reflection about its end keeps the signal's slope there
-                turned = 2 * self._last[-1:] - self._last[-2::-1]
-                voice.append(turned / np.float32(FULL_SCALE_M))
+                mirrored = 2 * self._last[-1:] - self._last[-2::-1]
+                voice.append(mirrored / np.float32(FULL_SCALE_M))
                 voice.end_here()

@@ -19,7 +19,7 @@ Made = TypeVar("Made", Take, BlowTake)
 
 
 class Rendering(ABC, Generic[Request, Made]):
-    """Renders a request; `advance` does the next block of it, and calls `listener` in its thread.
+    """The rendering of a request; `advance` does the next block of it, and calls `listener` in its thread.
 
     Args:
         load: returns a preset's model and truth; raises PresetError.
@@ -34,7 +34,9 @@ class Rendering(ABC, Generic[Request, Made]):
     ) -> None:
         self.request: Request = request
         self.take: Made | None = None
-        self._load, self._listener, self._helper = load, listener, helper
+        self._load = load
+        self._listener = listener
+        self._helper = helper
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 

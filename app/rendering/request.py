@@ -48,7 +48,7 @@ class RenderListener(Protocol):
     """The listener to the worker's results, called in the worker's thread."""
 
     def take_started(self, take: Take | BlowTake) -> None:
-        """A new pluck or blow has its first block."""
+        """Show that a new pluck or blow has its first block."""
 
     def take_finished(self, take: Take | BlowTake) -> None:
         """Report that its motion, signals and errors are complete."""

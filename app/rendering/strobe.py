@@ -21,8 +21,8 @@ class Strobe:
     """The flashes of a motion, `FLASH_HZ` for each second of the playhead.
 
     Attributes:
-        speed: by how many periods the shown phase advances in one period of the string; from 1 on each flash shows
-            the string at the playhead itself.
+        speed: advance of the shown phase, in periods, during one period of the string. From 1 on each flash shows the
+            string at the playhead itself.
         fundamental_hz: of the string at small amplitudes.
         seconds: of the motion.
     """
@@ -77,11 +77,11 @@ class Flashes:
 
         All frames needed before `stop` must be among these or have been added before.
         """
-        for wanted, shares in self._parts:
-            places = np.searchsorted(numbers, wanted)
-            here = np.flatnonzero(places < len(numbers))
-            here = here[numbers[places[here]] == wanted[here]]
-            self._shapes_m[here] += shares[here, None].astype(np.float32) * frames_m[places[here]]
+        for part_numbers, shares in self._parts:
+            places = np.searchsorted(numbers, part_numbers)
+            within = np.flatnonzero(places < len(numbers))
+            within = within[numbers[places[within]] == part_numbers[within]]
+            self._shapes_m[within] += shares[within, None].astype(np.float32) * frames_m[places[within]]
         late = self._last >= stop
         self.ready = int(late.argmax()) if late.any() else len(late)
 

@@ -1,8 +1,8 @@
 """A take: one pluck as pictures and signals, which grow while it is rendered.
 
 Each source has a *motion*, the string as a series of pictures, and a *signal*, its sound at the present
-listening points, sample by sample. One thread appends and any thread reads: values are written first, then the count
-of what is ready is raised, and values below it never change.
+listening points, sample by sample. One thread appends and any thread reads. Values are written first, then the count
+of ready ones is raised; values below it never change.
 """
 
 from __future__ import annotations
@@ -92,11 +92,11 @@ class Motion(Series):
 
     def shape_m(self, position_s: float) -> NDArray[np.float32]:
         """The string (places,) that the strobe shows; the nearest picture where its flash is not ready."""
-        shown = self._flash_m(position_s)
-        if shown is None:
+        frame_m = self._flash_m(position_s)
+        if frame_m is None:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
-            shown = self.read(nearest, nearest + 1)[0]
-        return shown
+            frame_m = self.read(nearest, nearest + 1)[0]
+        return frame_m
 
     def strobe_at(self, position_s: float) -> Strobe | None:
         """The strobe whose flash `shape_m` returns; None where that is a picture."""
@@ -209,7 +209,7 @@ class Take:
     @property
     def error(self) -> float:
         """The larger of `errors_by_training` as far as there are, so far; not a number where there are none."""
-        return max((each for each in self.errors_by_training if not math.isnan(each)), default=math.nan)
+        return max((error for error in self.errors_by_training if not math.isnan(error)), default=math.nan)
 
     @property
     def errors_by_training(self) -> tuple[float, ...]:
@@ -241,7 +241,7 @@ class Take:
             self.listened,
             *(motion.ready_frames for motion in motions),
             *(signal.ready_frames for signal in signals),
-            *((each, each.ready) for each in flashes),
+            *((motion_flashes, motion_flashes.ready) for motion_flashes in flashes),
         )
 
     def bytes(self, source: str) -> int:

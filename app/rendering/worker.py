@@ -36,8 +36,8 @@ class RenderWorker:
 
     Args:
         load: returns a preset's model and truth; called in the worker's thread.
-        hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while,
-            so that plucks in quick succession leave processor time for everything else.
+        hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while:
+            plucks in quick succession leave processor time for all else.
         sounds: whether a pluck would sound. The first motion, which may load torch, waits for that, for some seconds.
     """
 
@@ -48,7 +48,10 @@ class RenderWorker:
         hurried: Callable[[], bool] = lambda: False,
         sounds: Callable[[], bool] = lambda: True,
     ) -> None:
-        self._listener, self._load, self._hurried, self._sounds = listener, load, hurried, sounds
+        self._listener = listener
+        self._load = load
+        self._hurried = hurried
+        self._sounds = sounds
         self._mailbox = threading.Condition()
         self._request: RenderRequest | BlowRequest | None = None
         self._closing = False

@@ -45,7 +45,7 @@ class PluckedString(Value):
 
 
 class Choices(Monitor, Listener, PluckedString):
-    """Everything that is restored at the next start.
+    """The choices that are restored at the next start.
 
     Attributes:
         instrument: what is played.
@@ -101,8 +101,8 @@ class Choices(Monitor, Listener, PluckedString):
         Another preset resets `string`, unless given.
 
         Args:
-            changes: fields; also `preset`, the name of one whose single string becomes the instrument, and `patch`,
-                which takes the place of the one that is there, played or not.
+            changes: fields. Also `preset`, the name of one whose single string becomes the instrument, and `patch`,
+                which replaces the present one, played or not.
 
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
@@ -118,11 +118,11 @@ class Choices(Monitor, Listener, PluckedString):
             checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
-        found = self.model_copy(update={name: getattr(checked, name) for name in changes})
-        follow: dict[str, Any] = {"kept": None} if found.plays_patch else {}
-        if found.preset != self.preset and "string" not in changes:
+        choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
+        follow: dict[str, Any] = {"kept": None} if choices.plays_patch else {}
+        if choices.preset != self.preset and "string" not in changes:
             follow["string"] = None
-        return _with_one_pickup(found.model_copy(update=follow), changes)
+        return _with_one_pickup(choices.model_copy(update=follow), changes)
 
 
 OBSERVED = (*Choices.model_fields, "preset", "patch")  # names that `Session.changed` carries
@@ -152,9 +152,9 @@ def _with_instrument(data: dict[str, Any]) -> dict[str, Any]:
     preset, patch = old.get("preset", ""), old.get("patch")
     if patch is None or old.get("keys_play", "pitch") == "place":
         return {**rest, "instrument": {"preset": preset}, "kept": patch}
-    played = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
+    model = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
     string = rest.pop("string", None)
-    return {**rest, "instrument": patch, "string": string if preset in ("", played) else None}
+    return {**rest, "instrument": patch, "string": string if preset in ("", model) else None}
 
 
 class Session:
@@ -163,8 +163,8 @@ class Session:
     Signals carry the set of the names of the fields that have new values, of `OBSERVED`. `changed` is emitted after
     every change, `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
 
-    While a patch is played, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of the
-    two changes, the other follows, so that the sound is also saved, recorded and exported so.
+    While a patch is played, its pick-up and `listen`, `listen_right`, `stereo` and `pickup` agree: each follows the
+    other. So the sound is saved, recorded and exported as it is heard.
     """
 
     changed = Signal(frozenset)
@@ -227,7 +227,7 @@ class Session:
 
 
 def _with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
-    """`choices` in which a patch that is played is heard where its own pick-up says.
+    """The choices in which a patch that is played is heard where its own pick-up says.
 
     Args:
         asked: the fields that were asked to change. Of these the patch counts before listening points and pick-up,

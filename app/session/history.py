@@ -1,8 +1,8 @@
 """Undo and redo of the choices that shape the sound.
 
-A step is one gesture: all that changes between `hold` and `release` (a drag), or changes of the same fields that
-follow each other within half a second (keys, wheel notches, a controller). Undo restores the fields that the step
-changed and no others. Notes that are played (`Session.play`) are no steps: what they changed stays as it is.
+A step is one gesture: all that changes between `hold` and `release` (a drag). Changes of the same fields that follow
+each other within half a second are one as well (keys, wheel notches, a controller). Undo restores the fields that
+the step changed and no others. Notes that are played (`Session.play`) are no steps: their changes stay.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Values = dict[str, Any]  # of recorded fields
 
 
 class History:
-    """Records the changes of a session from now on.
+    """The record of a session's changes from now on.
 
     Args:
         now_s: a clock, replaced in tests.
-        held: whether a gesture that has begun may still be under way: its `release` may never come, as where a dialog
+        held: whether a gesture that has begun may still be under way. Its `release` may never come, as where a dialog
             or another window takes the mouse.
     """
 
@@ -67,11 +67,11 @@ class History:
 
     def _next(self, steps: Sequence[Values]) -> Values | None:
         """The last step that would change something: a drag that came back to its start does not."""
-        here = self._present
-        return next((step for step in reversed(steps) if any(here[name] != step[name] for name in step)), None)
+        present = self._present
+        return next((step for step in reversed(steps) if any(present[name] != step[name] for name in step)), None)
 
     def hold(self) -> None:
-        """A gesture begins: all changes until `release` are one step."""
+        """Begin a gesture: all changes until `release` are one step."""
         self._held = True
         self._open_fields = None
 
@@ -90,18 +90,18 @@ class History:
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
         self.release()
-        wanted = self._next(source)
-        while source and source.pop() is not wanted:
+        step = self._next(source)
+        while source and source.pop() is not step:
             pass
-        if wanted is not None:
+        if step is not None:
             before, self._restoring = self._present, True
             try:
-                self._session.update(**wanted)
+                self._session.update(**step)
             finally:
                 self._restoring = False
                 self._present = _recorded(self._session.choices)
             followed = {name for name, value in self._present.items() if value != before[name]}
-            target.append({name: before[name] for name in {*wanted, *followed}})
+            target.append({name: before[name] for name in {*step, *followed}})
 
     def _choices_played(self, _: frozenset[str]) -> None:
         self._present = _recorded(self._session.choices)
@@ -113,15 +113,17 @@ class History:
             return
         if self._held and not self._still_held():
             self.release()
-        now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
-        soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
+        now_s, changed_fields = self._now_s(), turned_fields(fields, self._present, values)
+        soon = changed_fields == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):
             self._undo.append({})
         step = self._undo[-1]
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()
-        self._open_fields, self._changed_s, self._present = turned, now_s, values
+        self._open_fields = changed_fields
+        self._changed_s = now_s
+        self._present = values
 
 
 def _recorded(choices: Choices) -> Values:

@@ -45,15 +45,15 @@ class Listener(Value):
         Raises:
             ValueError: in mono one of its macros would have nothing to move.
         """
-        heard = patch.pickup.model_copy(update={"points": self.points, "kind": self.pickup})
-        if heard == patch.pickup:
+        pickup = patch.pickup.model_copy(update={"points": self.points, "kind": self.pickup})
+        if pickup == patch.pickup:
             return patch
         if not self.stereo:
             for macro in patch.macros:
                 if any(target.field == RIGHT_POINT for target in macro.targets):
-                    reported = f"its macro {macro.name} moves the right listening point"
-                    raise ValueError(f"{patch.name} stays in stereo: {reported}")
-        return patch.model_copy(update={"pickup": heard})
+                    reason = f"its macro {macro.name} moves the right listening point"
+                    raise ValueError(f"{patch.name} stays in stereo: {reason}")
+        return patch.model_copy(update={"pickup": pickup})
 
 
 def points_of(pickup: Pickup) -> dict[str, object]:

@@ -38,8 +38,8 @@ class Monitor(Value):
     @property
     def voices(self) -> tuple[str, ...]:
         """The sources that need a voice, the one that is heard first."""
-        held = (self.source_heard, self.a, self.b)
-        parts = [part for each in held for part in (("model", "truth") if each == DIFFERENCE else (each,))]
+        sources = (self.source_heard, self.a, self.b)
+        parts = [part for source in sources for part in (("model", "truth") if source == DIFFERENCE else (source,))]
         return tuple(dict.fromkeys(parts))
 
     def gain(self, source: str, sources: Collection[str], match: Mapping[str, float] | None) -> float:

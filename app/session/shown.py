@@ -43,7 +43,7 @@ class ShownSource:
 
     @property
     def gain(self) -> float:
-        """`gain_db` as a factor of the signal."""
+        """The gain as a factor of the signal."""
         return float(10 ** (self.gain_db / 20))
 
 
@@ -57,7 +57,7 @@ def shown_sources(choices: Choices, library: Library) -> tuple[ShownSource, ...]
 
 def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
     for source in dict.fromkeys((choices.a, choices.b)):
-        slots = " ".join(letter for letter, held in (("A", choices.a), ("B", choices.b)) if held == source)
+        slots = " ".join(letter for letter, slot in (("A", choices.a), ("B", choices.b)) if slot == source)
         gain_db = choices.difference_gain_db if source == DIFFERENCE else 0.0
         yield ShownSource(source, slots, source_title(source, library), source == choices.source_heard, gain_db)
 

@@ -37,8 +37,8 @@ def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
 
 def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
     """The names, by slot, of presets that slots hold and that are not in the library (any more)."""
-    held = {"a": other_preset(choices.a), "b": other_preset(choices.b)}
-    return {slot: name for slot, name in held.items() if name and library.find(name) is None}
+    presets = {"a": other_preset(choices.a), "b": other_preset(choices.b)}
+    return {slot: name for slot, name in presets.items() if name and library.find(name) is None}
 
 
 def subject_of(choices: Choices, preset: Path) -> Subject:

@@ -52,30 +52,30 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
             return f"preset {new.preset}"
         if not isinstance(old, Patch):
             return f"instrument {new.name}"
-        return _of_ears(changed, old, new) or _of_patch(old, new)
+        return _pickup_words(changed, old, new) or _patch_words(old, new)
     if "kept" in changed:
-        return _of_patch(before["kept"], after["kept"])
-    return _together([words for name, words in CHOICES.items() if name in changed])
+        return _patch_words(before["kept"], after["kept"])
+    return _join_words([words for name, words in CHOICES.items() if name in changed])
 
 
 def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
     """The changed fields: `names` of `Choices` and, of a patch that has kept its name, its own as "patch.PATH"."""
-    found = set(names)
+    changed_names = set(names)
     for field in ("instrument", "kept"):
         old, new = before.get(field), after.get(field)
-        if field in found and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
-            found |= {f"patch.{path}" for path in _changed(old, new)}
-    return frozenset(found)
+        if field in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
+            changed_names |= {f"patch.{path}" for path in _changed(old, new)}
+    return frozenset(changed_names)
 
 
-def _of_ears(changed: list[str], before: Patch, after: Patch) -> str:
+def _pickup_words(changed: list[str], before: Patch, after: Patch) -> str:
     """The change of where and how the patch is heard, if nothing else of it has changed; else ""."""
     if not set(_changed(before, after)) <= PICKUP:
         return ""
-    return _together([CHOICES[name] for name in changed if name in Listener.model_fields])
+    return _join_words([CHOICES[name] for name in changed if name in Listener.model_fields])
 
 
-def _of_patch(before: Patch | None, after: Patch | None) -> str:
+def _patch_words(before: Patch | None, after: Patch | None) -> str:
     if after is None:
         return "no instrument"
     if before is None:
@@ -84,9 +84,9 @@ def _of_patch(before: Patch | None, after: Patch | None) -> str:
     if "name" in paths and len(paths) > 1:
         return f"instrument {after.name}"
     if "macros" in paths:
-        turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
-        return _together(turned or ["macros"])
-    return _together([field_words(field) for field in paths])
+        macro_names = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
+        return _join_words(macro_names or ["macros"])
+    return _join_words([field_words(field) for field in paths])
 
 
 def field_words(field: str) -> str:
@@ -112,9 +112,9 @@ def _names(part: object) -> Collection[str]:
     """The names of the fields of a part of a patch; none where it has no parts."""
     if isinstance(part, Value):
         return type(part).model_fields
-    return [each.name for each in fields(part)] if is_dataclass(part) else ()
+    return [part_field.name for part_field in fields(part)] if is_dataclass(part) else ()
 
 
-def _together(words: list[str]) -> str:
+def _join_words(words: list[str]) -> str:
     words = list(dict.fromkeys(words))
     return SEVERAL if len(words) > MOST_NAMED else " and ".join(words)

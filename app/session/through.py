@@ -18,7 +18,7 @@ def through_words(choices: Choices) -> tuple[str, ...]:
     if not isinstance(patch, Patch):
         return ("",)
     name = f"heard through {patch.name}"
-    if any(other_preset(each) for each in choices.voices):
+    if any(other_preset(voice) for voice in choices.voices):
         return f"keys are {name}, a string plucked by hand alone", f"keys {name}"
     if choices.source_heard == DIFFERENCE:
         return f"{name} without amplifier, body and room", name

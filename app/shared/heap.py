@@ -20,8 +20,8 @@ def collect_between_events() -> GarbageCollector:
     """Collect garbage in the calling thread, the window's, every `COLLECT_EVERY_S`, as long as the result is kept.
 
     Python itself collects in whichever thread happens to allocate, and would delete parts of closed views there, for
-    which Qt ends the process. Objects that exist by now are left out of every later collection: to look through all
-    of torch holds the interpreter for a quarter of a second, and keys and painting with it.
+    which Qt ends the process. Objects that exist by now are left out of every later collection. A pass through all
+    of torch would hold the interpreter for a quarter of a second, and keys and painting with it.
     """
     from pyqtgraph.util.garbage_collector import GarbageCollector  # with all of pyqtgraph
 

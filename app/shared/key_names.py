@@ -20,8 +20,8 @@ def key_named(text: str) -> int | None:
     text = text.strip()
     if _NUMBER.fullmatch(text):
         return int(text)
-    found = _NOTE.fullmatch(text)
-    if found is None:
+    match = _NOTE.fullmatch(text)
+    if match is None:
         return None
-    letter, sign, octave = found.groups()
+    letter, sign, octave = match.groups()
     return NAMES.index(letter.upper()) + _SIGNS[sign] + 12 * (int(octave) + 1)

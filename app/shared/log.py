@@ -34,18 +34,18 @@ _log = logging.getLogger("learned_strings")
 
 def log_file() -> Path:
     """The path in LEARNED_STRINGS_LOG, else `learned-strings.log` in the platform's folder for a user's logs."""
-    given = os.environ.get(FILE_VARIABLE)
-    return Path(given) if given else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
+    path = os.environ.get(FILE_VARIABLE)
+    return Path(path) if path else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
 
 
 @contextmanager
-def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
+def faults_logged(report: Callable[[str], None]) -> Iterator[None]:
     """Write uncaught exceptions of any thread to the log while it is open, each different one once.
 
     A log that cannot be opened is done without.
 
     Args:
-        `reported`: called with the text of each of them, in the thread where it was raised.
+        `report`: called with the text of each of them, in the thread where it was raised.
     """
     handler = _open(log_file())
     before = sys.excepthook, threading.excepthook
@@ -56,7 +56,7 @@ def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
         if text not in known and len(known) < MOST_KINDS:  # one that is raised at every frame would fill the log
             known.add(text)
             _log.error("%s", text)
-            reported(text)
+            report(text)
 
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         before[0](kind, error, trace)
@@ -110,7 +110,7 @@ def log_fault(error: BaseException, where: str) -> str:
 
 
 def faultless(work: Callable[P, object], where: str) -> Callable[P, None]:
-    """`work`, whose exceptions are written to the log and go no further: what it reports to must not stop sound."""
+    """The work, whose exceptions are written to the log and go no further: what it reports to must not stop sound."""
 
     def guarded(*values: P.args, **named: P.kwargs) -> None:
         try:

@@ -26,8 +26,14 @@ from engine.pluck import DEFAULT_LISTEN
 
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
 _ORDER: tuple[Modulation, ...] = ("none", "learn", "macro", "wheel")
-PITCH, STRING, DECAY, PLUCK, PICKUP, BODY = "PITCH", "STRING", "DECAY", "PLUCK", "PICK-UP", "BODY"
-NOISE, TECHNIQUE = "NOISE", "TECHNIQUE"
+PITCH = "PITCH"
+STRING = "STRING"
+DECAY = "DECAY"
+PLUCK = "PLUCK"
+PICKUP = "PICK-UP"
+BODY = "BODY"
+NOISE = "NOISE"
+TECHNIQUE = "TECHNIQUE"
 
 
 @dataclass(frozen=True)
@@ -35,8 +41,8 @@ class Taper:
     """The way in which a value moves and reads.
 
     Attributes:
-        step: of an arrow key or a wheel notch: of the value; a ratio above 1 where it is logarithmic; a share of the
-            way where it is curved.
+        step: of an arrow key or a wheel notch, in the value's unit. A ratio above 1 where it is logarithmic; a share
+            of the way where it is curved.
         text: format, with the unit.
         curve: how many times as fast the value rises at the end of its range as at the start; 1: evenly.
     """
@@ -52,7 +58,9 @@ MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", Tru
 DECIBELS = Taper(0.5, "{:+.1f} dB")
 CONTACT = Taper(0.02, "{:.2f} ms", curve=400.0)
 MUTED = Taper(0.02, "{:.1%}", curve=40.0)  # by each tenth of the way the T60 of a guitar's string shrinks by a third
-PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{:.0%}")
+PLACE = Taper(0.01)
+WIDTH = Taper(1.05, "{:.3f}", True)
+PERCENT = Taper(0.02, "{:.0%}")
 
 
 @dataclass(frozen=True)
@@ -106,19 +114,21 @@ class Parameter:
         return self.limits[1] / self.limits[0] if self.taper.logarithmic else self.taper.curve
 
     def share(self, value: float) -> float:
-        """0 … 1 along the range."""
+        """The share of a value along the range, 0 … 1."""
         (low, high), curve = self.limits, self.curve
         part = (value - low) / (high - low)
         return part if curve == 1.0 else math.log1p(part * (curve - 1)) / math.log(curve)
 
     def value(self, share: float) -> float:
         """The inverse of `share`, which is limited to 0 … 1."""
-        (low, high), curve, share = self.limits, self.curve, min(max(share, 0.0), 1.0)
+        low, high = self.limits
+        curve = self.curve
+        share = min(max(share, 0.0), 1.0)
         part = share if curve == 1.0 else (curve**share - 1) / (curve - 1)
         return self.clamped(low + part * (high - low))
 
     def stepped(self, value: float, steps: float) -> float:
-        """`value` moved by so many steps, within the range."""
+        """The value moved by so many steps, within the range."""
         step = self.taper.step
         if self.taper.logarithmic:
             return self.clamped(value * step**steps)
@@ -252,8 +262,8 @@ MULTIPLIER = (0.05, 20.0)
 AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
 NOISE_DB = (-60.0, 6.0)  # the lowest is off
 OF_PATCHES: Mapping[str, Parameter] = {
-    each.id: each
-    for each in (
+    parameter.id: parameter
+    for parameter in (
         Parameter(
             "tuning.a4_hz",
             "A4",
@@ -382,8 +392,8 @@ OF_PATCHES: Mapping[str, Parameter] = {
     )
 }
 OF_CHOICES: Mapping[str, Parameter] = {
-    each.id: each
-    for each in (
+    parameter.id: parameter
+    for parameter in (
         Parameter("position", "position", POSITION_RANGE, 0.35, PLACE, modulation="learn", name="pluck position"),
         Parameter(
             "amplitude_mm", "amplitude", (0, LARGEST_AMPLITUDE_MM), 4.0, Taper(0.25, "{:.2f} mm"), modulation="learn"
@@ -421,15 +431,15 @@ MACROS: Mapping[str, Parameter] = {
     for id, label in ((f"macros.{number}", f"macro {number + 1}") for number in range(MOST_MACROS))
 }
 LEARNABLE: Mapping[str, Parameter] = {  # what a MIDI controller can be assigned to
-    id: each for id, each in {**OF_CHOICES, **MACROS, **OF_PATCHES}.items() if each.allows("learn")
+    id: parameter for id, parameter in {**OF_CHOICES, **MACROS, **OF_PATCHES}.items() if parameter.allows("learn")
 }
 
 
 def modulated_by(modulation: Modulation) -> Iterator[Parameter]:
     """The parameters of patches that this kind of modulation may change, in the table's order."""
-    return (each for each in OF_PATCHES.values() if each.allows(modulation))
+    return (parameter for parameter in OF_PATCHES.values() if parameter.allows(modulation))
 
 
 def in_group(group: str) -> tuple[Parameter, ...]:
     """The parameters of patches whose knobs stand together."""
-    return tuple(each for each in OF_PATCHES.values() if each.group == group)
+    return tuple(parameter for parameter in OF_PATCHES.values() if parameter.group == group)

@@ -38,7 +38,7 @@ def lower_priority(rank: Rank) -> None:
 def wait_asleep() -> None:
     """Make OpenMP's threads, which compute for torch, sleep between operations; call it before torch is loaded.
 
-    By default each spins on its core and keeps it from other work: beside other busy processes a command took two to
+    By default each spins on its core and keeps it from other work. Next to other busy processes a command took two to
     three times as long, and as much processor time, as with one thread.
     """
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -31,18 +31,18 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
     text, prefix = _plain(text), _plain(prefix)
     if prefix and text.startswith(prefix):
         text = text[len(prefix) :].strip()
-    for shown in _ways(unit):
-        if shown and text.casefold().endswith(shown):
-            text = text[: -len(shown)].strip()
+    for spelling in _ways(unit):
+        if spelling and text.casefold().endswith(spelling):
+            text = text[: -len(spelling)].strip()
             break
-    found = _NUMBER.fullmatch(text)
-    if found is None:
+    match = _NUMBER.fullmatch(text)
+    if match is None:
         return None
-    if found["plain"] is not None:
-        digits = found["plain"].replace(",", ".")
+    if match["plain"] is not None:
+        digits = match["plain"].replace(",", ".")
     else:
-        digits = found["grouped"].replace(found["group"], "") + (found["rest"] or "").replace(",", ".")
-    number = float(found["sign"] + digits + (found["exponent"] or "").replace(" ", ""))
+        digits = match["grouped"].replace(match["group"], "") + (match["rest"] or "").replace(",", ".")
+    number = float(match["sign"] + digits + (match["exponent"] or "").replace(" ", ""))
     return number if math.isfinite(number) else None
 
 
@@ -53,10 +53,10 @@ def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
         return True
     text = text.removeprefix(prefix).strip()
     return any(
-        shown.startswith(text[found:].strip().casefold())
-        for shown in _ways(unit)
-        for found in range(len(text) + 1)
-        if _BEGUN.fullmatch(text[:found])
+        spelling.startswith(text[end:].strip().casefold())
+        for spelling in _ways(unit)
+        for end in range(len(text) + 1)
+        if _BEGUN.fullmatch(text[:end])
     )
 
 
@@ -67,5 +67,5 @@ def _ways(unit: str) -> tuple[str, ...]:
 
 def _plain(text: str) -> str:
     """Normalise a text: one kind of space, minus and apostrophe, no space around it; µ as μ. 10² is not 102."""
-    known = "".join(c if c.isdigit() and not c.isdecimal() else unicodedata.normalize("NFKC", c) for c in text)
-    return " ".join(known.translate(_MINUS).split())
+    plain = "".join(c if c.isdigit() and not c.isdecimal() else unicodedata.normalize("NFKC", c) for c in text)
+    return " ".join(plain.translate(_MINUS).split())

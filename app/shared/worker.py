@@ -27,7 +27,7 @@ class Progress(Protocol):
     """A function that long work calls; it may raise `Cancelled`, which ends the work. `Job.progress` is one."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
-        """`share`: done, 0 … 1; `text`: what is being done; `left_s`: seconds left, None where not known."""
+        """Report the done share, 0 … 1, the present step in words, and the seconds left; None: not known."""
 
 
 class Job:
@@ -99,8 +99,8 @@ class Worker:
 
     Args:
         name: of the thread.
-        say: see `Job`; signals are "progressed" (share, text, result so far), and one of "finished" (what the work
-            returned), "failed" (message, details) and "cancelled" at the end of each job.
+        say: see `Job`. Signals are "progressed" (share, text, result so far). One ends each job: "finished" (the
+            result), "failed" (message, details) or "cancelled".
         expected: errors whose message is for the user; of any other the details have the traceback.
         rests: see `Job`.
     """
@@ -112,7 +112,10 @@ class Worker:
         expected: tuple[type[Exception], ...] = (),
         rests: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._name, self._say, self._expected, self._rests = name, say, expected, rests
+        self._name = name
+        self._say = say
+        self._expected = expected
+        self._rests = rests
         self._mailbox = threading.Condition()
         self._next: tuple[Job, Work] | None = None
         self._job: Job | None = None  # the latest

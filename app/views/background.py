@@ -36,7 +36,7 @@ class Background(QObject):
         super().__init__(parent)
         self._job: Job | None = None  # the one whose signals are passed on
         self._worker = Worker(
-            name, lambda job, what, *reported: self._said.emit(job, what, reported), expected, rests
+            name, lambda job, signal_name, *arguments: self._said.emit(job, signal_name, arguments), expected, rests
         )
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
 
@@ -64,9 +64,9 @@ class Background(QObject):
         self._worker.close(seconds, cancel=cancel)
 
     @Slot(object, str, tuple)
-    def _pass_on(self, job: Job, what: str, reported: tuple[object, ...]) -> None:
+    def _pass_on(self, job: Job, signal_name: str, arguments: tuple[object, ...]) -> None:
         if job is not self._job:
             return
-        if what != "progressed":
+        if signal_name != "progressed":
             self._job = None
-        getattr(self, what).emit(*reported)
+        getattr(self, signal_name).emit(*arguments)

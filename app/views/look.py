@@ -10,7 +10,7 @@ from app.shared.value import Value
 
 
 class Look(Value):
-    """`size_percent`: of text. Settings of version 0.1 call the theme `face`."""
+    """Theme and size of text in percent. Settings of version 0.1 call the theme `face`."""
 
     theme: Literal["system", "dark", "light"] = Field("system", validation_alias=AliasChoices("theme", "face"))
     size_percent: Literal[100, 115, 125, 150] = 100

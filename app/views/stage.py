@@ -23,7 +23,9 @@ from app.views.controls.parts import tool_button
 from app.views.plots.legend import paint_sources
 from engine.pluck import DEFAULT_LISTEN
 
-MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 54, 38, 40  # pixels around the picture
+MARGIN_X = 54  # pixels around the picture
+MARGIN_TOP = 38
+MARGIN_BOTTOM = 40
 LEGEND_Y = 17.5  # the middle of the line above the picture
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 GRAB_PIXELS = 14  # how near a mark counts as on it
@@ -105,9 +107,9 @@ class StageView(QWidget):
         side = min(near, key=lambda name: near[name], default=None)
         return side if side is not None and near[side] < GRAB_PIXELS else None
 
-    def _step_mark(self, held: Qt.KeyboardModifier, steps: int) -> None:
+    def _step_mark(self, modifiers: Qt.KeyboardModifier, steps: int) -> None:
         """Move the left mark, with Ctrl the right one."""
-        side = "right" if held & Qt.KeyboardModifier.ControlModifier else "left"
+        side = "right" if modifiers & Qt.KeyboardModifier.ControlModifier else "left"
         if side in self._listening:
             self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
 
@@ -131,7 +133,7 @@ class StageView(QWidget):
     @property
     def _heard_remark(self) -> str:
         """The source that sounds instead of the model, in words, for a picture without a legend."""
-        others = (each.title for each in self._sources if each.heard and each.source != "model")
+        others = (source.title for source in self._sources if source.heard and source.source != "model")
         return next((f"You hear: {title}" for title in others), "")
 
     def _paint_ground(self, painter: QPainter) -> None:
@@ -173,7 +175,7 @@ class StageView(QWidget):
 
 
 def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
-    """The gradient behind a string or a drum, with a frame."""
+    """Paint the gradient behind a string or a drum, with a frame."""
     gradient = QLinearGradient(0, 0, 0, height)
     gradient.setColorAt(0, QColor(theme.present.ground_top))
     gradient.setColorAt(1, QColor(theme.present.ground_bottom))
@@ -210,7 +212,7 @@ def paint_remark(painter: QPainter, width: float, text: str) -> None:
 
 
 def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> None:
-    """The foot of a listening point, below the picture."""
+    """Paint the foot of a listening point, below the picture."""
     painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.GOOD))
     painter.drawPolygon(
@@ -232,7 +234,7 @@ def label_places(
     """The place of each label: under its mark, but within `width` and clear of its neighbour."""
     texts = sorted(marks)
     widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
-    lefts = [x - own / 2 for (x, _), own in zip(texts, widths, strict=True)]
+    lefts = [x - width_px / 2 for (x, _), width_px in zip(texts, widths, strict=True)]
     for second in range(1, len(texts)):
         overlap = max(0.0, lefts[second - 1] + widths[second - 1] + LABEL_GAP - lefts[second])
         lefts[second - 1] -= overlap / 2
@@ -240,6 +242,6 @@ def label_places(
     right = lefts[-1] + widths[-1]
     aside = max(0.0, -lefts[0]) + min(0.0, width - right)
     return [
-        (QRectF(left + aside, bottom + 16, own, 18), text)
-        for left, own, (_, text) in zip(lefts, widths, texts, strict=True)
+        (QRectF(left + aside, bottom + 16, label_width, 18), text)
+        for left, label_width, (_, text) in zip(lefts, widths, texts, strict=True)
     ]

@@ -146,8 +146,8 @@ def _luminance(colour: QColor) -> float:
 def _style_sheet() -> str:
     tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
     values = {**asdict(present), "tick": tick.as_posix()}
-    sheet = re.sub(r"font-size: (\d+)px", lambda found: f"font-size: {px(int(found[1]))}px", SHEET.read_text("utf-8"))
-    return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), sheet)
+    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", SHEET.read_text("utf-8"))
+    return re.sub(r"@(\w+)", lambda match: str(values[match[1]]), sheet)
 
 
 def _palette() -> QPalette:
@@ -197,11 +197,13 @@ def px(pixels: float) -> int:
 
 
 class _Fixed(QObject):
-    """Keeps a widget at a size that grows with the text; lives as long as the widget."""
+    """The size of a widget, which grows with the text; lives as long as the widget."""
 
     def __init__(self, widget: QWidget, width: int | None, height: int | None) -> None:
         super().__init__(widget)
-        self._widget, self._width, self._height = widget, width, height
+        self._widget = widget
+        self._width = width
+        self._height = height
         changes.theme_changed.connect(self.fit)
         self.fit()
 
@@ -227,7 +229,7 @@ def small_font(size_px: int = 11, bold: bool = False, grows: bool = True) -> QFo
 
 @lru_cache(maxsize=64)
 def blended(colour: str, ground: str, share: float) -> QColor:
-    """`share` (0 … 1) of `colour` over `ground`, as an opaque colour: that fills several times faster."""
+    """The opaque mix of a share (0 … 1) of `colour` and of `ground`, which fills several times faster than alpha."""
     over, under = QColor(colour), QColor(ground)
     mixed = (
         share * a + (1 - share) * b
@@ -237,7 +239,7 @@ def blended(colour: str, ground: str, share: float) -> QColor:
 
 
 def translucent(colour: str, alpha: int) -> QColor:
-    """`colour` with alpha 0 … 255."""
-    made = QColor(colour)
-    made.setAlpha(alpha)
-    return made
+    """The colour with alpha 0 … 255."""
+    mixed = QColor(colour)
+    mixed.setAlpha(alpha)
+    return mixed

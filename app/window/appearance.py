@@ -1,4 +1,4 @@
-"""Applies the theme that the user has chosen, or follows that of the desktop, and the text size."""
+"""The chosen theme, or the desktop's, and the size of text, applied to the window."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.window.main_window import MainWindow
 
 
 class Appearance(QObject):
-    """`look`: the present choices, to be saved."""
+    """The look of the window; `look`: the present choices, to be saved."""
 
     def __init__(self, window: MainWindow, look: Look) -> None:
         super().__init__(window)

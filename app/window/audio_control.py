@@ -134,14 +134,14 @@ class AudioControl(QObject):
         """List the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
         first = self._listed is None
         try:
-            found = output_devices(rescan=first and self._output.status().device is None)
+            devices = output_devices(rescan=first and self._output.status().device is None)
         except AudioUnavailable:
-            found, listed = [], None
+            devices, choices = [], None
         else:
-            listed = [DeviceChoice(name=device.name, host_api=device.host_api) for device in found]
-        if self._dialog is not None and (first or listed != self._listed):
-            self._dialog.show_devices(listed or [], self._wish[0])
-        self._listed = listed
+            choices = [DeviceChoice(name=device.name, host_api=device.host_api) for device in devices]
+        if self._dialog is not None and (first or choices != self._listed):
+            self._dialog.show_devices(choices or [], self._wish[0])
+        self._listed = choices
 
     def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
         rate, fault = rate_word(model_rate_hz), status.device is None

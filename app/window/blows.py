@@ -15,7 +15,7 @@ from engine.strike import Strike
 
 
 class Blows:
-    """Everything runs in the window's thread. Times are in s from the blow.
+    """The blows on a drum, in the window's thread. Times are in s from the blow.
 
     Args:
         submit: hands a request to the render worker.
@@ -25,16 +25,18 @@ class Blows:
     """
 
     def __init__(self, session: Session, library: Library, submit: Callable[[BlowRequest], None]) -> None:
-        self._session, self._library, self._submit = session, library, submit
+        self._session = session
+        self._library = library
+        self._submit = submit
         self._asked: tuple[BlowRequest, KeyNote] | None = None  # the latest blow, rendered or not
         self.shown: Playhead[BlowTake] = Playhead()
 
     @property
     def settled(self) -> bool:
         """Return True if motion and signals are complete, so that views need not look for more."""
-        asked, take = self._asked, self.shown.take
-        return asked is None or (
-            take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete
+        latest, take = self._asked, self.shown.take
+        return latest is None or (
+            take is not None and take.complete and take.request.same_motion(latest[0]) and take.listened.complete
         )
 
     def follow(self, note: KeyNote) -> None:
@@ -42,14 +44,14 @@ class Blows:
         if self._asked is not None and self._asked[1] is note:
             return
         keys = note.player.keys
-        found = keys.of_key(note.event.key) if isinstance(keys, DrumKeys) else None
+        drum_key = keys.of_key(note.event.key) if isinstance(keys, DrumKeys) else None
         entry, choices = self._library.find(note.patch.preset), self._session.choices
-        if found is None or entry is None:
+        if drum_key is None or entry is None:
             return
-        strike = found.strike(note.event.velocity, note.patch.pluck.curve)
+        strike = drum_key.strike(note.event.velocity, note.patch.pluck.curve)
         if note.event.place is not None:
             strike = Strike(note.event.place, strike.speed_m_s, strike.mallet)
-        request = BlowRequest(entry.path, found.modes, strike, choices.seconds, choices.ear)
+        request = BlowRequest(entry.path, drum_key.modes, strike, choices.seconds, choices.ear)
         self._asked = request, note
         if self.shown.take is not None and request.same_motion(self.shown.take.request):
             self.shown = Playhead(self.shown.take, note)

@@ -38,7 +38,9 @@ class BrowserDesk(QObject):
     ) -> None:
         super().__init__(browser)
         self.browser, self.favourites = browser, set(favourites)
-        self._rows, self._chosen, self._choose = rows, chosen, choose
+        self._rows = rows
+        self._chosen = chosen
+        self._choose = choose
         self._folder = folder
         browser.chosen.connect(choose)
         browser.favourite_asked.connect(self.toggle_favourite)
@@ -64,10 +66,10 @@ class BrowserDesk(QObject):
 
         A step from outside leads to its first or last.
         """
-        names, chosen = self.browser.listed, self._chosen()
+        names, name = self.browser.listed, self._chosen()
         if names:
-            here = names.index(chosen) if chosen in names else -1
-            self._choose(names[(here + step) % len(names) if here >= 0 else (0 if step > 0 else -1)])
+            index = names.index(name) if name in names else -1
+            self._choose(names[(index + step) % len(names) if index >= 0 else (0 if step > 0 else -1)])
 
     def toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}

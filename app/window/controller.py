@@ -75,7 +75,7 @@ ProblemListener = Callable[[AudioProblem], None]
 
 
 class _AudioMail(QObject):
-    """Carries a fault of the sound device from the caretaker's thread into the window's (Qt queues the signal)."""
+    """A signal that carries a fault of the sound device from its caretaker's thread into the window's."""
 
     reported = Signal(object)
 
@@ -313,24 +313,26 @@ class Controller(QObject):
         self.instruments.strike(x, y, velocity)
 
     def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
-        """An event of the instrument; called in the thread of the event."""
+        """Handle an event of the instrument; called in the thread of the event."""
         if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
         return self.performance.notes.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
-            played = self.patches.playing
+            was_playing = self.patches.playing
             self.patches.stop()
             if self.performance.playing:
                 self.performance.stop()
-            elif not played:  # in a rest of a file nothing rings
+            elif not was_playing:  # in a rest of a file nothing rings
                 self.pluck()
             self.window.transport.show_playing(self.performance.playing)
 
     def listening_test(self) -> None:
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
-        entry, choices, struck = self.entry, self.session.choices, self.instruments.struck
+        entry = self.entry
+        choices = self.session.choices
+        struck = self.instruments.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
@@ -495,8 +497,8 @@ class Controller(QObject):
         drums = self.session.choices.drums
         if (key := self.instruments.drum_key) is not None:
             self.drum.show_key(key)
-        shown = self.string if drums is None else self.drum
-        self.window.show_on_stage(shown, shown.view)
+        stage_panel = self.string if drums is None else self.drum
+        self.window.show_on_stage(stage_panel, stage_panel.view)
         for panel in self.panels:
             if panel.of_strings:
                 panel.cover("" if drums is None else DRUMS_PLAYED)
@@ -507,8 +509,8 @@ class Controller(QObject):
         if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
             return
         self._struck = latest
-        if (played := drums.of_key(latest.event.key)) is not None:
-            self.drum.show_key(latest.event.key, latest.event.place or played.place)
+        if (drum := drums.of_key(latest.event.key)) is not None:
+            self.drum.show_key(latest.event.key, latest.event.place or drum.place)
 
     def _wake(self) -> None:
         """Run the timer at its full rate for LIVELY_S, as something may move."""
@@ -521,7 +523,9 @@ class Controller(QObject):
     def _tick(self) -> None:
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        window, performance, status = self.window, self.performance, self.sound.status()
+        window = self.window
+        performance = self.performance
+        status = self.sound.status()
         performance.tick()
         playing, take = performance.playing, performance.take
         window.transport.show_playing(playing)
@@ -549,7 +553,9 @@ class Controller(QObject):
 
         So each painting is short: a key that is played waits for it.
         """
-        on_the_left, now_s, performance = bool(self._ticks % 2), time.monotonic(), self.performance
+        on_the_left = bool(self._ticks % 2)
+        now_s = time.monotonic()
+        performance = self.performance
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
         moment = performance.moment(elapsed_s)
         for panel in self.panels:

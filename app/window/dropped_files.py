@@ -48,7 +48,7 @@ def receive(file: Path, library: Library) -> Dropped:
         if ending == SUFFIX:
             return _preset(file, library)
         if ending == ".wav":
-            return _recipe(file, library)
+            return _drop_recipe(file, library)
         if ending in SOUNDS:
             return _other_sound(file)
     except NoRecipe:
@@ -92,17 +92,17 @@ def _preset(file: Path, library: Library) -> Dropped:
     return Dropped({"preset": entry.name}, notice if installed.was_there else "")
 
 
-def _recipe(file: Path, library: Library) -> Dropped:
+def _drop_recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
-        played = (
+        instrument = (
             SingleString(preset=name_text(path.stem)) if recipe.struck is None else recipe.struck.found()[0].patch
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")
-    choices = {"instrument": played, **restored_choices(recipe)}
+    choices = {"instrument": instrument, **restored_choices(recipe)}
     if recipe.through is not None:
         notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:
@@ -119,14 +119,14 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
     Of a single string, the patch that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
-    found: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "solo": 0,
         "a": "difference" if recipe.source == "difference" else "model",
         "b": "truth",
         "heard": "b" if recipe.source == "truth" else "a",
     }
     if recipe.struck is None:
-        found |= {
+        fields |= {
             **asdict(recipe.pluck),
             "string": None if recipe.string is None else asdict(recipe.string),
             "listen": recipe.listen,
@@ -134,9 +134,9 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
             "pickup": recipe.pickup,
         }
         if recipe.listen_right is not None:
-            found["listen_right"] = recipe.listen_right
+            fields["listen_right"] = recipe.listen_right
     if recipe.decay_db is None:
-        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
+        fields["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     if recipe.source == "difference":
-        found["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
-    return found
+        fields["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
+    return fields

@@ -51,7 +51,9 @@ class Exports(QObject):
         window: QWidget,
     ) -> None:
         super().__init__(window)
-        self._session, self._library, self._window = session, library, window
+        self._session = session
+        self._library = library
+        self._window = window
         self._recordings, self._struck = recordings, struck
         self._choices = choices
         self.dialog: ExportDialog | None = None
@@ -72,8 +74,8 @@ class Exports(QObject):
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
-            self.dialog.finished.connect(self._closed)
-            self.dialog.exported.connect(self._exported)
+            self.dialog.finished.connect(self._end_dialog)
+            self.dialog.exported.connect(self._forget_saved)
             self.dialog.ended.connect(self.ended)
         self.dialog.show_subjects(subjects)
         self.dialog.open_at(kind)
@@ -124,11 +126,11 @@ class Exports(QObject):
             "plugin": instrument,
         }
 
-    def _exported(self, job: object) -> None:
+    def _forget_saved(self, job: object) -> None:
         if isinstance(job, PlayedExport):
             self._recordings.forget(job.played)
 
-    def _closed(self) -> None:
+    def _end_dialog(self) -> None:
         assert self.dialog is not None
         self._choices = self.choices
         self.dialog.deleteLater()
@@ -182,13 +184,13 @@ def note_words(title: str, choices: Choices) -> str:
     width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
     string = f", a string of {choices.string.undamped_frequency(1) / math.tau:.1f} Hz" if choices.string else ""
     pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:.3g} mm"
-    heard = f"heard at {choices.listen:.2f}"
+    pickup_words = f"heard at {choices.listen:.2f}"
     if choices.stereo:
-        heard += f" (left) and {choices.listen_right:.2f} (right)"
+        pickup_words += f" (left) and {choices.listen_right:.2f} (right)"
     if choices.pickup == "bridge":
-        heard = "heard at the bridge"
+        pickup_words = "heard at the bridge"
     kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
-    return f"{title}{string}: {pluck}, {heard}{kind}{all_modes_words(choices)}"
+    return f"{title}{string}: {pluck}, {pickup_words}{kind}{all_modes_words(choices)}"
 
 
 def all_modes_words(choices: Choices) -> str:

@@ -41,7 +41,7 @@ LOOK_MS = 8  # until the player has reported the note of a key, between two look
 
 
 class Instruments(QObject):
-    """Plays events at once, in the thread of each; the session, and with it the window, follows later.
+    """The player of events, at once in the thread of each; session and window follow later.
 
     Args:
         handle: plays an event and returns the note that it began; called in the event's thread.
@@ -50,8 +50,8 @@ class Instruments(QObject):
 
     Attributes:
         latest: the note that was begun last; None before the first.
-        latest_key: the key of a patch that was struck last, or whose string was restored, and on which string of its
-            set, as in `KeyNote`; None before the first.
+        latest_key: the key of a patch that was struck or restored last, and its string of the set, as in `KeyNote`;
+            None before the first.
     """
 
     played = Signal()  # a note has begun, and the session has its values
@@ -73,7 +73,9 @@ class Instruments(QObject):
         super().__init__(window)
         self._session = session
         self._library = library
-        self._handle, self._play_preset, self._look = handle, play_preset, look
+        self._handle = handle
+        self._play_preset = play_preset
+        self._look = look
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
@@ -124,22 +126,22 @@ class Instruments(QObject):
         What was chosen with the instrument stays, as what undo or a file restores.
         """
         self._own_timer.stop()
-        chosen, self._chosen = self._chosen, frozenset()
+        fields, self._chosen = self._chosen, frozenset()
         choices, before = self._session.choices, self._shown
         patch = choices.instrument
         self._shown = patch if isinstance(patch, Patch) else None
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
             return
         another = before is not None and is_another(patch, before)
-        own = choices.string is None or (another and "string" not in chosen)
-        if choices.string is not None and not own and (another or before is None):
+        takes_string = choices.string is None or (another and "string" not in fields)
+        if choices.string is not None and not takes_string and (another or before is None):
             self.latest_key = _key_of(patch, choices.string) or self.latest_key
-        if not own and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
+        if not takes_string and (before is None or patch.pluck == before.pluck or (another and fields - {"string"})):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
-            if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
-                shown = asdict(on_string(found, patch.pluck.pluck(choices.velocity)))
-                self._session.play(**shown, **({"string": found.parameters} if own else {}))
+            if (key_string := Strings(patch).of_key(*self.shown_key(patch))) is not None:
+                changes = asdict(on_string(key_string, patch.pluck.pluck(choices.velocity)))
+                self._session.play(**changes, **({"string": key_string.parameters} if takes_string else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
@@ -153,16 +155,16 @@ class Instruments(QObject):
             self.latest_key = note.event.key, note.event.string
         else:
             self._unknown = None
-            self._tell(note.request, drawn)
+            self._show_in_session(note.request, drawn)
         self._begun.emit()
 
-    def _tell(self, request: RenderRequest, drawn: bool) -> None:
-        """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
+    def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
+        """Show this string and its pluck in the session; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
-        shown: dict[str, Any] = {"string": string}
-        shown |= {} if drawn else asdict(request.pluck)
+        changes: dict[str, Any] = {"string": string}
+        changes |= {} if drawn else asdict(request.pluck)
         with self._lock:
-            self._reported |= shown
+            self._reported |= changes
 
     @property
     def drum_key(self) -> int | None:
@@ -189,7 +191,7 @@ class Instruments(QObject):
         patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
             return alone
-        if any(other_preset(each) for each in choices.voices):
+        if any(other_preset(voice) for voice in choices.voices):
             return alone
         key, number = self.shown_key(patch)
         try:
@@ -217,7 +219,9 @@ class Instruments(QObject):
 
         After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
         """
-        choices, latest, drum = self._session.choices, self.latest, self.drum_key
+        choices = self._session.choices
+        latest = self.latest
+        drum = self.drum_key
         patch = choices.instrument
         if not isinstance(patch, Patch):
             return None
@@ -240,8 +244,10 @@ class Instruments(QObject):
         key = self.drum_key
         if key is not None:
             place = None if x is None or y is None else (x, y)
-            struck = self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
-            self.play(NoteOn(key, struck, KEYS, place))
+            strike_velocity = (
+                self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
+            )
+            self.play(NoteOn(key, strike_velocity, KEYS, place))
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
@@ -274,7 +280,7 @@ class Instruments(QObject):
             return  # another pluck was begun, or a single string chosen, meanwhile
         self.latest_key = note.event.key, note.string
         if note.request is not None:
-            self._tell(note.request, self._drawn)
+            self._show_in_session(note.request, self._drawn)
             self._tell_session()
         elif note.of_drum:
             self.played.emit()
@@ -285,10 +291,10 @@ class Instruments(QObject):
             self._look_timer.start()
             self._look_at_key()
         with self._lock:
-            reported = self._reported
+            changes = self._reported
             self._reported = {}
-        if reported:
-            self._session.play(**reported)
+        if changes:
+            self._session.play(**changes)
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:
@@ -308,8 +314,8 @@ class Instruments(QObject):
             if 0 <= key <= HIGHEST_KEY:
                 self._down[press] = key
                 self.play(NoteOn(key, choices.velocity, KEYS))
-        elif (turned := turn(press, choices.octave, choices.velocity)) is not None:
-            self._session.update(octave=turned[0], velocity=turned[1])
+        elif (step := turn(press, choices.octave, choices.velocity)) is not None:
+            self._session.update(octave=step[0], velocity=step[1])
 
     def _release(self, press: KeyPress) -> None:
         key = self._down.pop(press, None)
@@ -321,17 +327,17 @@ def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | 
     """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
     strings, pitch_hz = Strings(patch), string.pitch_hz
     low, high = patch.range
-    key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
+    key = next((key for key in range(low, high + 1) if _nearly_equal(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
     if key is None:
         return None
     for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
         with contextlib.suppress(ValueError):  # reported when it is struck
-            found = strings.of_key(key, number)
-            if found is not None and _same(found.parameters.length_m, string.length_m):
+            key_string = strings.of_key(key, number)
+            if key_string is not None and _nearly_equal(key_string.parameters.length_m, string.length_m):
                 return key, number
     return key, None
 
 
-def _same(value: float, other: float) -> bool:
+def _nearly_equal(value: float, other: float) -> bool:
     """Return True if values are equal within rounding, for the player computes strings too."""
     return math.isclose(value, other, rel_tol=1e-6)

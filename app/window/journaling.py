@@ -55,11 +55,13 @@ class Journaling(QObject):
         self._heard = source, difference_gain_db
 
     def end(self) -> Journal | None:
-        """The journal, with all of the recording, which has ended; None: it could not be begun."""
+        """End the journal, with all of the recording, and return it; None: it could not be begun."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
-        journal, self._journal, self._thread = self._journal, None, None
+        journal = self._journal
+        self._journal = None
+        self._thread = None
         if journal is not None and not self._broken:
             try:
                 journal.end(self._recorder.ended_s)
@@ -77,13 +79,13 @@ class Journaling(QObject):
 
     def _write(self) -> None:
         """Append what is new. After a fault nothing more: what follows would stand behind a torn line."""
-        journal, heard = self._journal, self._heard
+        journal, source_and_gain = self._journal, self._heard
         assert journal is not None
         try:
             journal.write(self._recorder.fetch())
-            if heard != self._written:
-                journal.hear(*heard)
-                self._written = heard
+            if source_and_gain != self._written:
+                journal.hear(*source_and_gain)
+                self._written = source_and_gain
         except OSError as error:
             self._broken = True
             self._fail(error)

@@ -9,16 +9,22 @@ from app.window.exports import Exports
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings
 
-FINISH, STOP, STAY = "Finish first", "Cancel export", "Stay"
-SAVE, DISCARD, CANCEL = "Save", "Discard", "Cancel"
+FINISH = "Finish first"
+STOP = "Cancel export"
+STAY = "Stay"
+SAVE = "Save"
+DISCARD = "Discard"
+CANCEL = "Cancel"
 
 
 class Leaving(QObject):
-    """Answers `MainWindow.may_close`. What the user finishes or saves first closes the window once that is done."""
+    """The answer to `MainWindow.may_close`. After what the user finishes or saves first, the window closes."""
 
     def __init__(self, window: MainWindow, recordings: Recordings, exports: Exports) -> None:
         super().__init__(window)
-        self._window, self._recordings, self._exports = window, recordings, exports
+        self._window = window
+        self._recordings = recordings
+        self._exports = exports
         self._waits = False  # for an export, to close then
         self._asking = False
         window.may_close = self.may_close

@@ -53,7 +53,7 @@ def with_patch(settings: Settings) -> Settings:
 
 
 class _Start(QObject):
-    """Loads the engine in a thread of its own once the window is painted, then makes the controller."""
+    """The start: a thread loads the engine once the window is painted; then the controller is made."""
 
     _loaded = Signal()
 
@@ -68,7 +68,10 @@ class _Start(QObject):
     ) -> None:
         super().__init__()
         self._files = list(files)
-        self._window, self._settings, self._path, self._notice = window, settings, path, notice
+        self._window = window
+        self._settings = settings
+        self._path = path
+        self._notice = notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
         self._torch = threading.Thread(target=load_torch, name="torch-loader", daemon=True)
@@ -99,7 +102,7 @@ class _Start(QObject):
             self._collector = collect_between_events()
         except Exception as error:
             self.failure = error
-            self._failed(error)
+            self._show_failure(error)
             return
         if self._notice:
             self._window.notices.report(self._notice)
@@ -126,7 +129,7 @@ class _Start(QObject):
         if face == "lab" and self._torch.ident is None:
             self._torch.start()
 
-    def _failed(self, error: Exception) -> None:
+    def _show_failure(self, error: Exception) -> None:
         """Show the error as a notice; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()

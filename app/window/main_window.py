@@ -239,14 +239,14 @@ class MainWindow(QMainWindow):
         self._set_alive(True)
 
     def show_on_stage(self, view: QWidget, focus: QWidget) -> None:
-        """Show one of these; `focus` in it gets the focus that the other had."""
+        """Show the string or the drum on the stage; `focus` in it gets the focus that the other had."""
         before = self._shown.currentWidget()
         if view is before:
             return
         focused = self.focusWidget()
-        held = before is not None and focused is not None and before.isAncestorOf(focused)
+        had_focus = before is not None and focused is not None and before.isAncestorOf(focused)
         self._shown.setCurrentWidget(view)
-        if held:
+        if had_focus:
             focus.setFocus()
 
     def show_failed(self) -> None:
@@ -273,9 +273,9 @@ class MainWindow(QMainWindow):
             QWidget.setTabOrder(before, after)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        moved = super().focusNextPrevChild(forward)
+        has_moved = super().focusNextPrevChild(forward)
         self._tabbed_to = self.focusWidget()
-        return moved
+        return has_moved
 
     def _press_or_pluck(self) -> None:
         """Press the button, or open the box, that the Tab key went to; after a click elsewhere, Enter plucks."""
@@ -328,29 +328,29 @@ class MainWindow(QMainWindow):
         self._share_height()
 
     @property
-    def _wide(self) -> float:
+    def _width_px(self) -> float:
         """The window's width, in pixels at which text has its usual size."""
         return self.width() / theme.present.scale
 
     @property
-    def _high(self) -> float:
+    def _height_px(self) -> float:
         return self.height() / theme.present.scale
 
     def _share_width(self) -> None:
-        self._brand.setVisible(self._wide >= (WIDE if self.face == "play" else WIDE_LAB))
+        self._brand.setVisible(self._width_px >= (WIDE if self.face == "play" else WIDE_LAB))
         for button in (self._keys_button, self._test_button):
-            button.setVisible(self._wide >= WIDE and self._shows("test"))
+            button.setVisible(self._width_px >= WIDE and self._shows("test"))
 
     def _hold_rest(self) -> None:
         """Move the header's controls and the preset's facts that have no room to the overflow menu."""
-        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._wide < WIDE else ()
-        hides_facts = self._shows("facts") and self._high < HIGH
+        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._width_px < WIDE else ()
+        hides_facts = self._shows("facts") and self._height_px < HIGH
         facts = (self.presets.card, self.through_label, self.outside_label, self.error_label) if hides_facts else ()
         self._more.hold(*buttons, *facts)
 
     def _share_height(self) -> None:
         """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
-        height = self._high
+        height = self._height_px
         self.instrument.set_low(height < KNOBS_HIGH)
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
         self._decks.setVisible(views)
@@ -358,12 +358,12 @@ class MainWindow(QMainWindow):
         self._hold_rest()
         home, place = (self._facts_row, 2) if height >= HIGH else (self._head, 4)
         if home.indexOf(self._solo) < 0:
-            shown = not self._solo.isHidden()
+            solo_visible = not self._solo.isHidden()
             home.insertWidget(place, self._solo)
-            self._solo.setVisible(shown)
+            self._solo.setVisible(solo_visible)
 
     def show_rate(self, text: str, tip: str, fault: bool) -> None:
-        """The sample rate, in the Lab; a fault of the sound output, in both faces."""
+        """Show the sample rate, in the Lab; a fault of the sound output, in both faces."""
         label = self.rate_label
         if label.text() == text:
             return
@@ -375,8 +375,8 @@ class MainWindow(QMainWindow):
 
     def _show_rate_label(self) -> None:
         fault = bool(self.rate_label.property("fault"))
-        known = bool(self.rate_label.text())
-        self.rate_label.setVisible(self._alive and known and (fault or self._shows("test")))
+        has_text = bool(self.rate_label.text())
+        self.rate_label.setVisible(self._alive and has_text and (fault or self._shows("test")))
 
     def show_through(self, text: str, *shorter: str) -> None:
         """Show the instrument that keys sound through in the Lab; "" where a string sounds alone."""
@@ -394,7 +394,7 @@ class MainWindow(QMainWindow):
         self._show_outside()
 
     def show_error(self, error: float) -> None:
-        """The largest relative error of the pluck that is shown; not a number until it is measured."""
+        """Show the largest relative error of the pluck that is shown; not a number until it is measured."""
         self._error = error
         self._show_outside()
 
@@ -416,7 +416,7 @@ class MainWindow(QMainWindow):
         self.growth_sign.setVisible(self._shows("growth") and bool(self.growth_sign.toolTip()))
 
     def show_solo(self, mode: int) -> None:
-        """The soloed mode; 0: none, all are heard."""
+        """Show the soloed mode; 0: none, all are heard."""
         self._solo.setText(f"Mode {mode} solo  ✕")
         self._solo.setVisible(mode > 0)
 
@@ -445,8 +445,8 @@ class MainWindow(QMainWindow):
     def _fit(self) -> None:
         self._share_width()
         self._share_height()
-        narrow, low = self._wide < COMPACT_BELOW_PX, self._high < AIRY
-        self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
+        narrow, low = self._width_px < COMPACT_BELOW_PX, self._height_px < AIRY
+        self.transport.set_compact(narrow, self._width_px < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)

@@ -84,8 +84,8 @@ class MidiControl(QObject):
         """Open the dialog, which does not block the window, or bring it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
-                {id: f"instrument: {each.name}" if id in OF_PATCHES else each.name for id, each in LEARNABLE.items()},
-                {each.id: each.name for each in modulated_by("wheel")},
+                {id: f"instrument: {knob.name}" if id in OF_PATCHES else knob.name for id, knob in LEARNABLE.items()},
+                {knob.id: knob.name for knob in modulated_by("wheel")},
                 window,
             )
             dialog.patch_turned.connect(self._turn_patch)
@@ -115,7 +115,7 @@ class MidiControl(QObject):
             self._dialog.show_choices(self.choices.notes, controllers, self._learning)
 
     def show_patch(self, patch: Patch | None) -> None:
-        """The patch that is played; None for none."""
+        """Show the patch that is played; None for none."""
         self._patch = patch
         if self._dialog is not None:
             self._dialog.set_patch_turnable(patch is not None)

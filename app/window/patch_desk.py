@@ -97,8 +97,12 @@ class PatchDesk(QObject):
         favourites: Iterable[str] = (),
     ) -> None:
         super().__init__(panel)
-        self._session, self._library, self._performance = session, library, performance
-        self._instruments, self._panel, self.browser = instruments, panel, browser
+        self._session = session
+        self._library = library
+        self._performance = performance
+        self._instruments = instruments
+        self._panel = panel
+        self.browser = browser
         self._entries: list[PatchEntry] = []
         self.desk = BrowserDesk(
             browser,
@@ -124,7 +128,10 @@ class PatchDesk(QObject):
         self._connect()
 
     def _connect(self) -> None:
-        session, panel, bar, browser = self._session, self._panel, self._panel.bar, self.browser
+        session = self._session
+        panel = self._panel
+        bar = self._panel.bar
+        browser = self.browser
         panel.pressed.connect(self._press)
         panel.released.connect(lambda key, string: self._instruments.play(NoteOff(key, KEYS, string)))
         bar.previous_asked.connect(lambda: self.desk.step(-1))
@@ -157,14 +164,14 @@ class PatchDesk(QObject):
 
     @property
     def patch(self) -> Patch | None:
-        """The one that is there, played or not."""
+        """The patch that is there, played or not."""
         return self._session.choices.patch
 
     @property
     def entry(self) -> PatchEntry | None:
         """The saved patch whose name the present one has."""
         patch = self.patch
-        return next((each for each in self._entries if patch is not None and each.patch.name == patch.name), None)
+        return next((entry for entry in self._entries if patch is not None and entry.patch.name == patch.name), None)
 
     def reload(self) -> None:
         """Read patches and bodies again: the user may have added files."""
@@ -242,8 +249,8 @@ class PatchDesk(QObject):
         """Ask for a name and do what it is for; again, with the reason, where the name is impossible."""
         reason = ""
         while True:
-            name, wanted = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
-            if not wanted:
+            name, typed_name = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
+            if not typed_name:
                 return
             try:
                 do(name)
@@ -268,7 +275,7 @@ class PatchDesk(QObject):
 
     def rename(self, name: str = "") -> None:
         """Ask for a new name of one of the user's own patches, by default the present one."""
-        entry = next((each for each in self._entries if each.name == name), self.entry)
+        entry = next((entry for entry in self._entries if entry.name == name), self.entry)
         if entry is None or not entry.own:
             self.reported.emit("Only instruments of your own can be renamed: save this one first.")
             return
@@ -290,7 +297,7 @@ class PatchDesk(QObject):
 
     def delete(self, name: str) -> None:
         """Delete one of the user's own patches."""
-        entry = next((each for each in self._entries if each.name == name and each.own), None)
+        entry = next((entry for entry in self._entries if entry.name == name and entry.own), None)
         if entry is None:
             return
         try:
@@ -351,9 +358,13 @@ class PatchDesk(QObject):
         if patch is None:
             self.reported.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
             return
-        field, other, kind = "scale", patch.tuning.keymap, "keyboard mapping"
+        field = "scale"
+        other = patch.tuning.keymap
+        kind = "keyboard mapping"
         if file.suffix.lower() == ".kbm":
-            field, other, kind = "keymap", patch.tuning.scale, "scale"
+            field = "keymap"
+            other = patch.tuning.scale
+            kind = "scale"
         tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
         joined = f", with the {kind} that it had" if other else ""
@@ -411,33 +422,35 @@ class PatchDesk(QObject):
         """The lowest and the highest octave at which one of the computer's keys sounds."""
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
 
-    def _keep_octave_in_range(self, asked: bool) -> None:
+    def _keep_octave_in_range(self, by_user: bool) -> None:
         """Move the octave of the computer's keys to where one sounds, or most do with another range; say why.
 
-        `asked`: the octave was to change; otherwise another patch made it change.
+        `by_user`: the octave was to change; otherwise another patch made it change.
         """
-        patch, octave, (lowest, highest) = self.patch, self._session.choices.octave, self._octaves
+        patch = self.patch
+        octave = self._session.choices.octave
+        lowest, highest = self._octaves
         within = min(max(octave, lowest), highest)
         before, self._sounding = self._sounding, frozenset() if patch is None else _keys_of(patch)
-        if self._sounding and not asked and self._sounding != before:
+        if self._sounding and not by_user and self._sounding != before:
             within = octave_near(octave, self._sounding)
         if patch is None or within == octave:
             return
         end = "Lowest octave" if octave < lowest else "Highest octave"
         low, high = map(note_name, patch.range)
         self._session.update(octave=within)
-        self._panel.bar.say_octave(f"{end if asked else 'Octave moved'}: {patch.name} has {low} to {high}")
+        self._panel.bar.say_octave(f"{end if by_user else 'Octave moved'}: {patch.name} has {low} to {high}")
 
     def _show_source(self) -> None:
         """Light keys in the colour of their source.
 
         Say once that keys do not play another preset which a slot holds.
         """
-        choices, heard = self._session.choices, self._session.choices.source_heard
-        other = heard if choices.plays_patch and other_preset(heard) else ""
+        choices, heard_source = self._session.choices, self._session.choices.source_heard
+        other = heard_source if choices.plays_patch and other_preset(heard_source) else ""
         if self._reported_other not in (choices.a, choices.b):
             self._reported_other = ""
-        self._panel.show_source("model" if other else heard)
+        self._panel.show_source("model" if other else heard_source)
         if other and other != self._reported_other:
             self.informed.emit(
                 f"Keys sound with the model of their instrument, not with {source_title(other, self._library)}: that "
@@ -455,7 +468,9 @@ class PatchDesk(QObject):
 
         Another patch, or keys that choose places, leave nothing to say.
         """
-        patch, before, self._noted = self.patch, self._noted, self.patch
+        patch = self.patch
+        before = self._noted
+        self._noted = patch
         if patch is None or not self._session.choices.plays_patch or before is None or is_another(patch, before):
             self._instruments.latest = None
         if self._instruments.latest is not None:
@@ -468,8 +483,8 @@ class PatchDesk(QObject):
         if self.patch is not None:
             self._show_string(self.patch)
         latest, patch = self._instruments.latest, self.patch
-        turned = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
-        self._say("; ".join(self._outside()), of_shown=not turned)
+        is_outdated = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
+        self._say("; ".join(self._outside()), of_shown=not is_outdated)
 
     def _say(self, outside: str, of_shown: bool = True) -> None:
         """Report what is outside the training; in the bar, how pitches are had where there is no patch."""
@@ -478,7 +493,9 @@ class PatchDesk(QObject):
 
     def _outside(self) -> list[str]:
         """The parts of the latest note, with the present knobs, that lie outside the training of its model."""
-        choices, latest, patch = self._session.choices, self._instruments.latest, self.patch
+        choices = self._session.choices
+        latest = self._instruments.latest
+        patch = self.patch
         entry = self._library.find(choices.preset)
         if entry is None:
             return []
@@ -493,22 +510,22 @@ class PatchDesk(QObject):
 
     def _show_string(self, patch: Patch) -> KeyString | None:
         """Show that string in figures, or why there is none; None where it is silent or impossible."""
-        found: KeyString | None = None
+        key_string: KeyString | None = None
         facts: dict[str, str] = {}
         knobs = self._panel.knobs
         if isinstance(patch.strings, Drums):
             key = self._instruments.drum_key
-            played = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
-            knobs.show_facts(facts_of_drum(played))
+            drum = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
+            knobs.show_facts(facts_of_drum(drum))
             knobs.show_figures({})
             return None
         try:
-            found = Strings(patch).of_key(*self._instruments.shown_key(patch))
+            key_string = Strings(patch).of_key(*self._instruments.shown_key(patch))
         except ValueError as error:
             facts = {"string": str(error)}
-        knobs.show_facts(facts if found is None else facts_of(found))
-        knobs.show_figures({} if found is None else figures_of(found.parameters, patch))
-        return found
+        knobs.show_facts(facts if key_string is None else facts_of(key_string))
+        knobs.show_figures({} if key_string is None else figures_of(key_string.parameters, patch))
+        return key_string
 
     def tick(self) -> None:
         """Show the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
@@ -531,7 +548,9 @@ class PatchDesk(QObject):
         self.recordings.close()
 
     def _show_patch(self) -> None:
-        patch, entry, panel = self.patch, self.entry, self._panel
+        patch = self.patch
+        entry = self.entry
+        panel = self._panel
         if patch is None:
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
@@ -541,7 +560,7 @@ class PatchDesk(QObject):
         strings = patch.strings
         panel.set_drums(isinstance(strings, Drums))
         if isinstance(strings, StringSet):
-            panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
+            panel.neck.set_strings([(note_name(string.note), string.note) for string in strings.strings])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
         self.desk.show_chosen()
@@ -572,8 +591,8 @@ class PatchDesk(QObject):
 
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
-            chosen = {**dict(self.patch.body), "name": name}
-            body = Body(**chosen) if chosen["mix"] > 0 else Body(name=name, size=chosen["size"])
+            body_fields = {**dict(self.patch.body), "name": name}
+            body = Body(**body_fields) if body_fields["mix"] > 0 else Body(name=name, size=body_fields["size"])
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
 
 

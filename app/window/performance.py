@@ -1,6 +1,6 @@
 """The note that is played and the pluck that is shown.
 
-An event begins a note, which sounds at once; the picture follows: the render worker makes the motion of the same
+An event begins a note, which sounds at once; the picture follows. The render worker makes the motion of the same
 pluck, and the views show it at the note's own time. All but `play_preset` runs in the window's thread.
 """
 
@@ -43,7 +43,7 @@ PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what pluc
 
 
 class Performance(QObject):
-    """Owns the notes and the render worker. Times are in s from the pluck.
+    """The owner of the notes and the render worker. Times are in s from the pluck.
 
     Attributes:
         by_hand: the chosen pluck as an event, which loops play.
@@ -53,7 +53,10 @@ class Performance(QObject):
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
     ) -> None:
         super().__init__(window)
-        self._window, self._session, self._library, self._sound = window, session, library, sound
+        self._window = window
+        self._session = session
+        self._library = library
+        self._sound = sound
         self._panels = panels
         self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self._asked: RenderRequest | None = None
@@ -79,16 +82,16 @@ class Performance(QObject):
     @property
     def take(self) -> Take | None:
         """The motion that is shown; None while drums are played."""
-        return None if self._of_drums else self._shown.take
+        return None if self._plays_drums else self._shown.take
 
     @property
-    def _of_drums(self) -> bool:
+    def _plays_drums(self) -> bool:
         return self._session.choices.drums is not None
 
     @property
     def _playhead(self) -> Playhead[Take] | Playhead[BlowTake]:
         """The playhead of the motion that is shown."""
-        return self._blows.shown if self._of_drums else self._shown
+        return self._blows.shown if self._plays_drums else self._shown
 
     @property
     def ready(self) -> bool:
@@ -103,7 +106,7 @@ class Performance(QObject):
     @property
     def playable(self) -> bool:
         """Return True if a pluck and the patch's key, if any, would sound at once; of drums a key alone."""
-        if self._of_drums:
+        if self._plays_drums:
             return self._sound.status().changes_done > 0 and self.notes.keys.player is not None
         return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)
 
@@ -125,7 +128,7 @@ class Performance(QObject):
     @property
     def settled(self) -> bool:
         """Return True if motion and signals are complete, so that views need not look for more."""
-        if self._of_drums:
+        if self._plays_drums:
             return self._blows.settled
         return self.take is None or (self.take.complete and self.take.listened.complete)
 
@@ -138,12 +141,12 @@ class Performance(QObject):
 
     def moment(self, elapsed_s: float) -> Moment:
         """The moment that panels show now; `elapsed_s`: since they were shown the last one."""
-        blow = self._blows.shown.take if self._of_drums else None
+        blow = self._blows.shown.take if self._plays_drums else None
         return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, self._playhead.audible)
 
     def catch_up(self, panel: Panel) -> None:
         """Show a panel that was made late the motion that it has missed."""
-        if self._of_drums and (blow := self._blows.shown.take) is not None:
+        if self._plays_drums and (blow := self._blows.shown.take) is not None:
             if not panel.of_strings:
                 panel.take_started(blow)
         elif self.take is not None:
@@ -157,7 +160,7 @@ class Performance(QObject):
         """Show the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
         latest = self.notes.latest
         if isinstance(latest, KeyNote) and latest.of_drum:
-            if self._of_drums:
+            if self._plays_drums:
                 self._blows.follow(latest)
             return
         if latest is None or latest is self._shown.note or latest.released or latest.over:
@@ -167,7 +170,7 @@ class Performance(QObject):
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
     def stop(self) -> None:
-        """Everything fades out; the playhead stays."""
+        """Fade all sound out; the playhead stays."""
         self._forget_turn()
         self._playhead.park(self.position_s)
         self.notes.stop()
@@ -179,7 +182,7 @@ class Performance(QObject):
         position_s = min(max(position_s, 0.0), take.seconds)
         self._forget_turn()
         self._playhead.park(position_s)
-        if not self._of_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
+        if not self._plays_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
             self.notes.latest = self._shown.note = note
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -193,27 +196,27 @@ class Performance(QObject):
             self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
-        asked = None if self._of_drums else request_of(choices, self._library)
-        if self._of_drums:
+        request = None if self._plays_drums else request_of(choices, self._library)
+        if self._plays_drums:
             self._blows.listen()
         elif names & {"instrument", "patch"}:
             self._blows.forget()
-        if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
-            plucks = [replace(asked.pluck, position=place) for place in PluckRange.of(entry.info).row]
-            self.notes.prepare_plucks(asked.preset, plucks)
+        if names & PLACED and not (choices.plays_patch or entry is None or request is None):
+            plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
+            self.notes.prepare_plucks(request.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
-        if asked != self._asked:  # else an event may have chosen another pluck, which the session takes later
-            self._asked = asked
-            self.notes.choose(asked)
-            if asked is None:
+        if request != self._asked:  # else an event may have chosen another pluck, which the session takes later
+            self._asked = request
+            self.notes.choose(request)
+            if request is None:
                 self._forget_turn()
                 self._shown = Playhead()
-                self._tell("")
+                self._show_error("")
                 self._window.show_growth("")
             else:
-                self.notes.prepare(asked.preset, *asked.others)
-                self._worker.submit(asked)
+                self.notes.prepare(request.preset, *request.others)
+                self._worker.submit(request)
         self.follow()
 
     def play_preset(self, name: str) -> None:
@@ -244,13 +247,13 @@ class Performance(QObject):
         """Forget notes that ended, continue with the loop, and update the header."""
         self.notes.poll()
         if self._session.choices.loop:
-            self._turn()
-        waits = self._waiting()
+            self._hand_over_turn()
+        waits = self._buffering_words()
         if waits != self._waiting_words:
             self._waiting_words = waits
             self._show_words()
 
-    def _waiting(self) -> str:
+    def _buffering_words(self) -> str:
         """The time until a model that is rendered ahead will sound, in words; "" where none waits."""
         latest = self.notes.latest
         if not isinstance(latest, Note) or not latest.waits_s:
@@ -259,10 +262,12 @@ class Performance(QObject):
         name = model_word(entry.info.model) if entry else "model"
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
-    def _turn(self) -> None:
+    def _hand_over_turn(self) -> None:
         """Hand the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
-        note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
+        note = self._shown.note or self.notes.latest
+        take = self._shown.take
+        turn = self._next_turn
         if note is None or take is None or note.request is None or not note.began:
             return
         if turn is not None:
@@ -289,24 +294,24 @@ class Performance(QObject):
 
     def _take_started(self, take: Take | BlowTake) -> None:
         if isinstance(take, BlowTake):
-            if not self._of_drums or not self._blows.started(take):  # overtaken by the next one
+            if not self._plays_drums or not self._blows.started(take):  # overtaken by the next one
                 return
         elif take is self._shown.take or not self._is_of_chosen(take):  # shown already, or overtaken
             return
         else:
             self._shown = Playhead(take)
         for panel in self._panels:
-            if not (panel.of_strings and self._of_drums):
+            if not (panel.of_strings and self._plays_drums):
                 panel.take_started(take)
         self.follow()
-        self._tell("Rendering …")
+        self._show_error("Rendering …")
         self._window.show_error(math.nan)
         self._window.show_growth("")
 
     def _take_finished(self, take: Take | BlowTake) -> None:
         if isinstance(take, BlowTake):
-            if self._of_drums and take is self._blows.shown.take:
-                self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
+            if self._plays_drums and take is self._blows.shown.take:
+                self._show_error(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
             return
         if take is not self.take or self._shown.finished:
             return
@@ -317,7 +322,7 @@ class Performance(QObject):
             self._window.notices.report(reason)
         errors, places = take.errors_by_training, ("in the training range", "beyond")
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
-        self._tell("Error of this pluck: " + ", ".join(parts))
+        self._show_error("Error of this pluck: " + ", ".join(parts))
         self._window.show_error(take.error)
         self._window.show_growth(growth_words(errors, take.info.rel_mae))
 
@@ -325,12 +330,12 @@ class Performance(QObject):
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
 
     def _render_failed(self, message: str, detail: str) -> None:
-        self._tell("")
+        self._show_error("")
         self._window.notices.report(message, detail)
 
     # Helpers
 
-    def _tell(self, words: str) -> None:
+    def _show_error(self, words: str) -> None:
         self._error_words = words
         self._show_words()
 
@@ -340,32 +345,32 @@ class Performance(QObject):
 
     def _is_chosen(self, note: Note | KeyNote) -> bool:
         """Return True if a note is of the chosen pluck."""
-        asked, request = self._asked, note.request
+        chosen_request, request = self._asked, note.request
         return (
-            asked is not None
+            chosen_request is not None
             and request is not None
-            and (request.preset, request.pluck) == (asked.preset, asked.pluck)
+            and (request.preset, request.pluck) == (chosen_request.preset, chosen_request.pluck)
         )
 
     def _is_of_chosen(self, take: Take) -> bool:
         """Return True if a take is of the chosen pluck."""
-        asked, entry = self._asked, self.entry
-        if asked is None or entry is None:
+        request, entry = self._asked, self.entry
+        if request is None or entry is None:
             return False
-        string = string_of(asked.preset) or entry.info.string
-        chosen = entry.name, string, asked.pluck, asked.seconds
+        string = string_of(request.preset) or entry.info.string
+        chosen = entry.name, string, request.pluck, request.seconds
         return (take.preset_name, take.info.string, take.pluck, take.seconds) == chosen
 
 
-def growth_words(errors: Sequence[float], own: float | None) -> str:
+def growth_words(errors: Sequence[float], validation_mae: float | None) -> str:
     """The words for people that the error of a pluck has grown; "" where it has not.
 
     Args:
         errors: relative mean absolute errors within the training range and beyond, as far as there are.
-        own: that of the preset on validation data; None: not known.
+        validation_mae: that of the preset on validation data; None: not known.
     """
     largest = max((error for error in errors if not math.isnan(error)), default=0.0)
-    if largest < max(NOTICEABLE, GROWN * (own or 0.0)):
+    if largest < max(NOTICEABLE, GROWN * (validation_mae or 0.0)):
         return ""
     where = "on this pluck" if errors and errors[0] == largest else "past the end of its training"
     return f"The model's error grows to {percent(largest)} {where}. The Lab shows it (F9)."

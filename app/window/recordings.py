@@ -21,7 +21,9 @@ from app.window.journaling import Journaling
 from engine.plain_text import duration, one_line
 
 LONGEST_NAME = 60  # characters of an instrument
-RECOVER, LATER, DISCARD = "Recover", "Later", "Discard"
+RECOVER = "Recover"
+LATER = "Later"
+DISCARD = "Discard"
 
 
 class Recordings(QObject):
@@ -40,7 +42,9 @@ class Recordings(QObject):
 
     def __init__(self, session: Session, keys: Keys, bar: PatchBar, parent: QObject) -> None:
         super().__init__(parent)
-        self._session, self._keys, self._bar = session, keys, bar
+        self._session = session
+        self._keys = keys
+        self._bar = bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: dict[Played, Journal | None] = {}  # in their order
         self._journaling = Journaling(keys.recorder, self)
@@ -110,21 +114,21 @@ class Recordings(QObject):
         """Read what an earlier run has left, in the background, then ask whether to recover or discard it."""
         self._reading.start(lambda job: _read_left(job.check))
 
-    def _ask_about(self, found: dict[Played, Journal], problems: list[str]) -> None:
-        """`found`: was left; `problems`: why other journals cannot be read."""
+    def _ask_about(self, journals: dict[Played, Journal], problems: list[str]) -> None:
+        """Ask about journals that were left; `problems`: why others cannot be read."""
         for problem in problems:
             self.reported.emit(problem)
-        if not found:
+        if not journals:
             return
         if self._keys.recorder.recording:  # no question comes between a musician and the keys
             self.informed.emit("An earlier recording is not saved yet; the next start offers it.")
             answer = LATER
         else:
-            lines = "\n".join(_words(played) for played in found)
-            were = "These recordings were" if len(found) > 1 else "This recording was"
+            lines = "\n".join(_words(played) for played in journals)
+            were = "These recordings were" if len(journals) > 1 else "This recording was"
             question = f"{were} not saved when the app ended.\n\n{lines}"
             answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
-        for played, journal in found.items():
+        for played, journal in journals.items():
             if answer == RECOVER:
                 self._unsaved[played] = journal
             elif answer == DISCARD:
@@ -147,7 +151,7 @@ class Recordings(QObject):
         events = self._keys.recorder.end()
         journal = self._journaling.end()
         self._bar.show_recording(None)
-        patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
+        patches = [timed_event.event.patch for timed_event in events if isinstance(timed_event.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch
         if not events or patch is None:
             if journal is not None:
@@ -170,7 +174,7 @@ class Recordings(QObject):
 
 def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[str]]:
     """The recordings that an earlier run has left, and why others cannot be read. `check`: see `Journal.read`."""
-    found: dict[Played, Journal] = {}
+    journals: dict[Played, Journal] = {}
     problems: list[str] = []
     for journal in left_journals(recordings_folder()):
         try:
@@ -182,20 +186,21 @@ def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[s
         if played is None:
             journal.delete()
         else:
-            found[played] = journal
-    return found, problems
+            journals[played] = journal
+    return journals, problems
 
 
 def _heard(choices: Choices) -> tuple[PlayedSource, float]:
     """The source that is heard, and the gain of the difference."""
-    heard = choices.source_heard
-    source: PlayedSource = "truth" if heard == "truth" else "difference" if heard == DIFFERENCE else "model"
+    name = choices.source_heard
+    source: PlayedSource = "truth" if name == "truth" else "difference" if name == DIFFERENCE else "model"
     return source, choices.difference_gain_db
 
 
 def _words(played: Played) -> str:
     """A recording in a line: when, through what, how long, how many notes."""
-    notes = sum(isinstance(each.event, NoteOn) and each.event.velocity > 0 for each in played.events)
+    events = [timed_event.event for timed_event in played.events]
+    notes = sum(isinstance(event, NoteOn) and event.velocity > 0 for event in events)
     when = "" if played.recorded is None else f"{played.recorded.astimezone():%Y-%m-%d %H:%M}, "
     name = one_line(played.patch.name, LONGEST_NAME)
     return f"{when}{name}: {duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"

@@ -14,7 +14,7 @@ LOOK_EVERY_MS = 1_000
 
 
 class SettingsSaver(QObject):
-    """Looks at the settings each second, and writes them when they have changed and then stayed for one look.
+    """A writer of the settings: it looks each second, and writes those that changed and then stayed for one look.
 
     Of two instances the one that writes last is remembered.
 

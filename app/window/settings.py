@@ -60,45 +60,45 @@ class Settings(Value):
 
 def settings_file() -> Path:
     """LEARNED_STRINGS_SETTINGS, else the platform's place for a user's configuration."""
-    given = os.environ.get("LEARNED_STRINGS_SETTINGS")
-    return Path(given) if given else user_config_path("learned-strings", appauthor=False) / "settings.json"
+    path = os.environ.get("LEARNED_STRINGS_SETTINGS")
+    return Path(path) if path else user_config_path("learned-strings", appauthor=False) / "settings.json"
 
 
 def load_settings(path: Path) -> tuple[Settings, str]:
     """The settings and a notice: empty, or what was not usable and where the broken file went."""
     try:
-        text = _bytes(path)
+        text = _read_bytes(path)
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
-        reported = error.strerror or error
-        return Settings(), one_line(f"The settings {path} cannot be read ({reported}); starting with defaults.")
+        reason = error.strerror or error
+        return Settings(), one_line(f"The settings {path} cannot be read ({reason}); starting with defaults.")
     try:
-        return _parsed(text), ""
+        return _parse(text), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
             path.replace(aside)
         except OSError:
             aside = path
-        kept = _usable(text) if isinstance(error, ValidationError) else None
+        usable = _usable_settings(text) if isinstance(error, ValidationError) else None
         why = explained(error) if isinstance(error, ValueError) else str(error)
-        reported = (
-            f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
+        reason = (
+            f"{'Some' if usable else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
         )
-        return kept or Settings(), one_line(reported)
+        return usable or Settings(), one_line(reason)
 
 
-def _bytes(path: Path) -> bytes:
+def _read_bytes(path: Path) -> bytes:
     return read_bounded(path, bounds.LARGEST_TEXT_BYTES)
 
 
-def _parsed(text: bytes) -> Settings:
+def _parse(text: bytes) -> Settings:
     return Settings.model_validate(parse_json(text, "the file"))
 
 
-def _usable(text: bytes) -> Settings | None:
+def _usable_settings(text: bytes) -> Settings | None:
     """The settings less what is wrong in them; None where nothing is left to keep.
 
     One fault at a time: what is dropped for one may end others, or lack in what holds it.
@@ -111,8 +111,8 @@ def _usable(text: bytes) -> Settings | None:
             try:
                 return Settings.model_validate(data)
             except ValidationError as error:
-                found = error.errors(include_url=False, include_input=False)[0]["loc"]
-                path = [str(part) for part in found if part not in (PATCH, SINGLE)]
+                location = error.errors(include_url=False, include_input=False)[0]["loc"]
+                path = [str(part) for part in location if part not in (PATCH, SINGLE)]
             if path[:1] in ([], ["version"]):  # no settings, or those of another version
                 return None
             _drop(data, path)

@@ -23,8 +23,8 @@ def asked_to_end(end: Callable[[], None]) -> Iterator[None]:
         yield
         return
     woken, waker = socket.socketpair()
-    for each in (woken, waker):
-        each.setblocking(False)
+    for end_socket in (woken, waker):
+        end_socket.setblocking(False)
     before = {number: signal.signal(number, lambda *_: None) for number in SIGNALS}
     waker_before = signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
 

@@ -41,17 +41,19 @@ class Song(QObject):
 
     def load(self, name: str, events: Sequence[TimedEvent]) -> None:
         """Show a file and play it from its beginning."""
-        self._events = tuple(sorted(events, key=lambda each: each.time_s))
+        self._events = tuple(sorted(events, key=lambda timed_event: timed_event.time_s))
         self._strip.show_song(name, self.length_s)
         self.play(0.0)
 
     def play(self, from_s: float) -> None:
-        self._from_s, self._began_s, self._plays = from_s, time.monotonic(), True
+        self._from_s = from_s
+        self._began_s = time.monotonic()
+        self._plays = True
         self._playback.play(events_from(self._events, from_s))
         self.tick()
 
     def stop(self) -> None:
-        """Stop where it is."""
+        """Pause the song where it is."""
         if self._plays:
             self._from_s, self._plays = self.position_s, False
             self._playback.stop()
@@ -89,10 +91,10 @@ class Song(QObject):
 
 def events_from(events: Sequence[TimedEvent], from_s: float) -> list[TimedEvent]:
     """Events from a time on, which becomes 0; pedals, wheels and others before it count at 0, notes do not."""
-    moved = []
-    for each in events:
-        if each.time_s >= from_s:
-            moved.append(TimedEvent(each.time_s - from_s, each.event))
-        elif not isinstance(each.event, NoteOn | NoteOff):
-            moved.append(TimedEvent(0.0, each.event))
-    return moved
+    later = []
+    for timed_event in events:
+        if timed_event.time_s >= from_s:
+            later.append(TimedEvent(timed_event.time_s - from_s, timed_event.event))
+        elif not isinstance(timed_event.event, NoteOn | NoteOff):
+            later.append(TimedEvent(0.0, timed_event.event))
+    return later

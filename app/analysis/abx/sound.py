@@ -64,18 +64,18 @@ def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume
     gains = [gain * room for gain in gains]
     fade = min(round(END_S * rate_hz), len(a))
     falling = (0.5 + 0.5 * np.cos(np.pi * (np.arange(fade) + 0.5) / fade))[:, None]
-    made: dict[Identity, NDArray[np.float32]] = {}
+    stimuli: dict[Identity, NDArray[np.float32]] = {}
     identities: tuple[Identity, Identity] = ("A", "B")
     for identity, gain, samples in zip(identities, gains, (a, b), strict=True):
         levelled = gain * samples
         levelled[len(levelled) - fade :] *= falling
-        made[identity] = levelled.astype(np.float32)
+        stimuli[identity] = levelled.astype(np.float32)
     # differences in phase alone are hardly heard
     convergence, _ = spectral_distances(gains[0] * a.mean(axis=1)[None], gains[1] * b.mean(axis=1)[None])
     return Stimuli(
         rate_hz,
-        made,
+        stimuli,
         (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
-        same=bool(np.array_equal(made["A"], made["B"])),
+        same=bool(np.array_equal(stimuli["A"], stimuli["B"])),
         trivial=bool(convergence[0] > TRIVIAL_CONVERGENCE),
     )

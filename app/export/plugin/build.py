@@ -54,8 +54,8 @@ def build_plugin(
         form: one of FORMATS.
         path: see `plugin_path`.
         cache: a folder that keeps object files for the next build.
-        advanced: is called a few times a second with the name of the step and the share of the whole build that is
-            done, 0 … 1; may raise, to end it.
+        advanced: is called a few times a second with the name of the step and the done share of the whole, 0 … 1.
+            May raise, to end it.
         replace: a plug-in that is there and holds other instruments, too.
 
     Raises:
@@ -74,7 +74,7 @@ def build_plugin(
     path = plugin_path(path, form)
     (lost_with if replace else check_kept)(path, {image.id for image in images})
     try:
-        return _built(images, form, target, path, cache, advanced)
+        return _build_files(images, form, target, path, cache, advanced)
     except OSError as error:
         raise WriteError(explain(Path(os.fsdecode(error.filename or path)), error)) from error
 
@@ -85,7 +85,7 @@ def plugin_path(path: Path, form: str) -> Path:
     return path if path.suffix == ending else path.with_name(path.name + ending)
 
 
-def _built(
+def _build_files(
     images: Sequence[Image],
     form: str,
     target: str,
@@ -93,7 +93,7 @@ def _built(
     cache: Path,
     advanced: Callable[[str, float], None],
 ) -> Path:
-    own = FORMATS[form]
+    plugin_format = FORMATS[form]
     path.parent.mkdir(parents=True, exist_ok=True)
     with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
         pass
@@ -109,22 +109,22 @@ def _built(
         library = folder / "library"
         _link(
             folder,
-            (*COMMON, *own.sources, "images.c", "stubs.c"),
+            (*COMMON, *plugin_format.sources, "images.c", "stubs.c"),
             kernels,
             target,
             library,
             lambda: advanced("linking", COMPILING),
         )
-        return _placed(library, images, form, target, path)
+        return _place_library(library, images, form, target, path)
 
 
-def _placed(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
+def _place_library(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
     """Put the linked library where hosts look for it within what is built."""
     system = target.partition("-")[0]
     inside: dict[str, Path | str] = {}
     if form == "lv2":
         binary = f"{path.stem}{LIBRARY_ENDINGS[system]}"
-        inside = {binary: library, **_turtle(images, binary)}
+        inside = {binary: library, **_lv2_descriptions(images, binary)}
     elif system == "macos":
         plist = {
             "CFBundleExecutable": path.stem,
@@ -144,9 +144,9 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
         with whole_file(path) as part:
             shutil.copyfile(library, part)
         return path
-    with whole_folder(path) as made:
+    with whole_folder(path) as bundle:
         for name, content in inside.items():
-            place = made / name
+            place = bundle / name
             place.parent.mkdir(parents=True, exist_ok=True)
             if isinstance(content, Path):
                 shutil.copyfile(content, place)
@@ -193,23 +193,23 @@ def _link(
     command += [*(str(folder / name) for name in sources), *map(str, kernels), "-lm"]
     if target.startswith("linux"):
         command.append("-lpthread")
-    code, said = run_waiting([command], python_environment(), lambda _: waiting())
+    code, output = run_waiting([command], python_environment(), lambda _: waiting())
     full = code and shutil.disk_usage(folder).free < FULL_BYTES  # then even words of the compiler may be lost
-    if full or "NoSpaceLeft" in said or os.strerror(errno.ENOSPC) in said:
+    if full or "NoSpaceLeft" in output or os.strerror(errno.ENOSPC) in output:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder.parent))
     if code:
-        remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in said else ""
-        raise PluginError(f"linking for {target} failed: {reason_of(code, said)}{remedy}")
+        remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in output else ""
+        raise PluginError(f"linking for {target} failed: {reason_of(code, output)}{remedy}")
 
 
-def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
+def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:
     """The descriptions of an LV2 bundle, by file name."""
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
-    listed, described = [prefixes], [prefixes]
+    manifest, instruments = [prefixes], [prefixes]
     minor, micro = _lv2_version(program_version())
     for image in images:
         head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
-        listed.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
+        manifest.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
             '    lv2:designation lv2:control ; lv2:index 0 ; lv2:symbol "events" ; lv2:name "Events"',
@@ -219,20 +219,21 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
             "    lv2:designation lv2:latency ; lv2:portProperty lv2:reportsLatency, lv2:integer ;\n"
             "    lv2:minimum 0.0 ; lv2:maximum 192000.0",
         ]
-        for number, each in enumerate(image.parameters):
-            symbol = "".join(c if c.isalnum() else "_" for c in each.id)
-            stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if each.steps else ""
+        for number, control in enumerate(image.parameters):
+            symbol = "".join(c if c.isalnum() else "_" for c in control.id)
+            stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if control.steps else ""
             points = "".join(
                 f' lv2:scalePoint [ rdfs:label "{word}" ; rdf:value {value} ] ;'
-                for value, word in enumerate(each.steps, round(each.low))
+                for value, word in enumerate(control.steps, round(control.low))
             )
             ports.append(
                 f'a lv2:InputPort, lv2:ControlPort ; lv2:index {4 + number} ; lv2:symbol "{symbol}" ;\n'
-                f'    lv2:name "{_quoted(each.name)}" ;{stepped}{points}\n'
-                f"    lv2:minimum {each.low:.9f} ; lv2:maximum {each.high:.9f} ; lv2:default {each.standard:.9f}"
+                f'    lv2:name "{_escape_quotes(control.name)}" ;{stepped}{points}\n'
+                f"    lv2:minimum {control.low:.9f} ; lv2:maximum {control.high:.9f} ; "
+                f"lv2:default {control.standard:.9f}"
             )
-        described.append(
-            f'{head}\n  doap:name "{_quoted(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
+        instruments.append(
+            f'{head}\n  doap:name "{_escape_quotes(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
             "  doap:license <https://opensource.org/license/mit> ;\n"
             f"  lv2:minorVersion {minor} ; lv2:microVersion {micro} ;\n"
             "  lv2:requiredFeature urid:map ;\n  lv2:optionalFeature lv2:hardRTCapable ;\n"
@@ -240,19 +241,19 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
             + " ,\n  ".join(f"[\n    {port} ;\n  ]" for port in ports)
             + " .\n"
         )
-    return {"manifest.ttl": "\n".join(listed), "instruments.ttl": "\n".join(described)}
+    return {"manifest.ttl": "\n".join(manifest), "instruments.ttl": "\n".join(instruments)}
 
 
 def _lv2_version(version: str) -> tuple[int, int]:
     """The minor and the micro version, which rise with the program's: even for a release, odd for all before it."""
-    found = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
-    if found is None:
+    match = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
+    if match is None:
         return 1, 1
-    major, minor, patch, rest = found.groups()
+    major, minor, patch, rest = match.groups()
     return 2 * (1000 * int(major) + int(minor)), 2 * int(patch or 0) + bool(rest)
 
 
-def _quoted(text: str) -> str:
+def _escape_quotes(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"')
 
 

@@ -65,8 +65,8 @@ class Target:
 
     Attributes:
         triple: of LLVM; `linker`: of the linker, where it has another name for it.
-        cpus: processors whose kernels are built in; the first is the oldest that is served, and the plug-in takes the
-            last that the computer has all instructions of.
+        cpus: processors whose kernels are built in, the oldest first. The plug-in takes the last of which the
+            computer has all instructions.
     """
 
     triple: str
@@ -86,10 +86,10 @@ TARGETS: Mapping[str, Target] = {
 
 def this_target() -> str:
     """The target of this computer. Raises PluginError: it is none of `TARGETS`."""
-    found = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
-    if found not in TARGETS:
+    target = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
+    if target not in TARGETS:
         raise PluginError(f"no plug-ins are built for this system; choose one of {', '.join(TARGETS)}")
-    return found
+    return target
 
 
 def install_folder(form: str, target: str) -> Path:

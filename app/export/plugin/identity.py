@@ -27,10 +27,10 @@ def identifier(name: str) -> str:
     without more: the factory instrument's, else the one of words with spaces between them, the first capitalised. All
     others, as those too long, end with a digest of the name.
     """
-    folded = _folded(name)
+    folded = _folded_name(name)
     plain = PREFIX + folded
     digested = re.search(rf"-[0-9a-f]{{{DIGITS}}}$", folded)
-    if folded and name == _spelled(folded) and not digested and len(plain.encode()) <= MOST_BYTES:
+    if folded and name == _default_spelling(folded) and not digested and len(plain.encode()) <= MOST_BYTES:
         return plain
     digest = hashlib.sha256(name.encode(errors="surrogatepass")).hexdigest()[:DIGITS]
     short = plain.encode(errors="ignore")[: MOST_BYTES - DIGITS - 1].decode(errors="ignore")
@@ -43,9 +43,9 @@ def held_in(path: Path) -> frozenset[str]:
     Raises:
         OSError: it cannot be read.
     """
-    files = [each for each in path.rglob("*") if each.is_file()] if path.is_dir() else [path]
-    found = {match.decode(errors="replace") for file in files for match in _HELD.findall(file.read_bytes())}
-    return frozenset(PREFIX + each for each in found)
+    files = [file for file in path.rglob("*") if file.is_file()] if path.is_dir() else [path]
+    suffixes = {match.decode(errors="replace") for file in files for match in _HELD.findall(file.read_bytes())}
+    return frozenset(PREFIX + suffix for suffix in suffixes)
 
 
 def lost_with(path: Path, ids: Collection[str]) -> frozenset[str]:
@@ -57,12 +57,12 @@ def lost_with(path: Path, ids: Collection[str]) -> frozenset[str]:
     if not path.exists():
         return frozenset()
     try:
-        held = held_in(path)
+        identifiers = held_in(path)
     except OSError as error:
         raise PluginError(f"{path}: cannot be read ({error.strerror}); remove it, or choose another name") from error
-    if not held:
+    if not identifiers:
         raise PluginError(f"{path}: is no plug-in of this program; remove it, or choose another name")
-    return held.difference(ids)
+    return identifiers.difference(ids)
 
 
 def check_kept(path: Path, ids: Collection[str]) -> None:
@@ -77,16 +77,16 @@ def holding(ids: frozenset[str]) -> str:
     return f"holds {f'{len(ids)} other instruments, as' if rest else 'another instrument,'} {first}"
 
 
-def _folded(name: str) -> str:
+def _folded_name(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower())
 
 
-def _spelled(folded: str) -> str:
-    """The one name that has an identifier without a digest."""
+def _default_spelling(folded: str) -> str:
+    """The name that has an identifier without a digest."""
     words = folded.replace("-", " ")
     return _factory_names().get(folded, words[:1].upper() + words[1:])
 
 
 @cache
 def _factory_names() -> dict[str, str]:
-    return {_folded(each.patch.name): each.patch.name for each in list_patches(SHIPPED)[0]}
+    return {_folded_name(entry.patch.name): entry.patch.name for entry in list_patches(SHIPPED)[0]}

@@ -1,7 +1,7 @@
 """An instrument as one block of bytes, and the header from which the shell has all places in memory.
 
-It holds the sound of an instrument: the table of its keys with their gains, the model's and the solver's
-programs, the modes of its body, its macros and parameters. Nothing depends on the rate, which the shell sets when
+It holds the table of an instrument's keys with their gains, the programs of model and solver, the modes of its
+body, macros and parameters. Nothing depends on the rate, which the shell sets when
 the host does. The responses of body and room are computed then.
 """
 
@@ -199,22 +199,26 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     taps = differentiator_taps(1) * (FULL_SCALE_M / FULL_SCALE_M_S)
     header.taps = put(taps.tobytes()) // 8
     parameters = list(_parameters(patch))
-    header.parameters = put(b"".join(bytes(each) for _, each in parameters))
+    header.parameters = put(b"".join(bytes(knob) for _, knob in parameters))
     header.parameter_count = len(parameters)
     ids = tuple(id for id, _ in parameters)
     macros, left_out = _macros(patch, ids)
-    header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
+    header.macros, header.macro_count = put(b"".join(bytes(macro) for macro in macros)), len(macros)
     header.wheel_effect = EFFECTS.index(patch.mod_wheel) if patch.mod_wheel in EFFECTS else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
     header.level_db = patch.level_db
 
     if kit is not None:
-        header.kit, header.kit_slots, header.kit_room = put(kit.memory.tobytes()) // 8, len(kit.memory), kit.room
+        header.kit = put(kit.memory.tobytes()) // 8
+        header.kit_slots = len(kit.memory)
+        header.kit_room = kit.room
         header.table_room, header.modes = kit.table_room, kit.modes
     header.body = put(body_of(patch).tobytes()) // 8
     header.longest_s = MOST_LOUD_S
     id = identifier(patch.name)
-    header.id, header.name, header.maker = id.encode(), _bytes(patch.name, 63), MAKER.encode()
+    header.id = id.encode()
+    header.name = _bytes(patch.name, 63)
+    header.maker = MAKER.encode()
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
     header.features = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()
@@ -222,18 +226,18 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.bytes = len(whole)
     whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (
-        Control(id, each.name.decode(), each.low, each.high, each.standard, tuple(each.words.decode().split()))
-        for id, each in parameters
+        Control(id, knob.name.decode(), knob.low, knob.high, knob.standard, tuple(knob.words.decode().split()))
+        for id, knob in parameters
     )
     return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
 
 
 def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
     try:
-        found = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
+        key_sound = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
     except ValueError:
         return False
-    return found is not None
+    return key_sound is not None
 
 
 def _bytes(text: str, most: int) -> bytes:
@@ -248,6 +252,7 @@ def _id(name: str) -> int:
 def _record(
     name: str, kind: int, index: int, value: float, parameter: Parameter, module: str, label: str = ""
 ) -> tuple[str, _Parameter]:
+    """The name of a parameter, and its record for the shell."""
     low, high = parameter.limits
     unit = parameter.taper.text.rpartition("}")[2].strip()
     words = [parameter.shown(low + step) for step in range(round(high - low) + 1)] if parameter.whole else []
@@ -306,26 +311,26 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
 
 def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str, ...]]:
     """The shell's macros, and the targets that it cannot move."""
-    found, left_out = [], []
+    macros, left_out = [], []
     for macro in patch.macros:
         targets = [target for target in macro.targets if target.field in ids]
         left_out += [target.field for target in macro.targets if target.field not in ids]
         record = _Macro(len(targets))
         for place, target in enumerate(targets):
             record.targets[place] = _Target(ids.index(target.field), 0, target.low, target.high)
-        found.append(record)
-    return found, tuple(dict.fromkeys(left_out))
+        macros.append(record)
+    return macros, tuple(dict.fromkeys(left_out))
 
 
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
-    wanted = {
+    layout = {
         mixed: "EARLY REACH",
         of: "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
         "MOST_SOURCES KEYS CHANNELS BEGAN BODY_MIX BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
-    for module, names in wanted.items():
+    for module, names in layout.items():
         lines += [f"#define {name} {getattr(module, name)}" for name in names.split()]
     for name, kind in (
         ("PLAYER", PLAYER),

@@ -52,8 +52,8 @@ class PluginExport:
         def advanced(step: str, share: float) -> None:
             progress(share, step.capitalize())
 
-        kept = cache.folder() or Path(tempfile.gettempdir())
-        path = build_plugin([image], self.form, self.target, self.path, kept, advanced, replace=True)
+        cache_folder = cache.folder() or Path(tempfile.gettempdir())
+        path = build_plugin([image], self.form, self.target, self.path, cache_folder, advanced, replace=True)
         if self.target != this_target():
             return f"Built {path}. Copy it to the other computer."
         if path.parent == install_folder(self.form, self.target):

@@ -50,12 +50,12 @@ class ObjectError(ValueError):
 def digest() -> str:
     """The digest of the kernels and of what compiles them: it changes with either."""
     kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for source in (*sorted(kernels.rglob("*.py")), Path(__file__), Path(texts.__file__)):
-        found.update(source.read_bytes())
+        sha256.update(source.read_bytes())
     for package in ("numba", "llvmlite"):
-        found.update(version(package).encode())
-    return found.hexdigest()[:16]
+        sha256.update(version(package).encode())
+    return sha256.hexdigest()[:16]
 
 
 def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> tuple[Path, ...]:
@@ -72,37 +72,37 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
     """
     if target not in TARGETS:
         raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
-    made = {
+    object_files = {
         folder / f"kernels-{digest()}-{target}-{cpu}-{part}.o": (part, number)
         for number, cpu in enumerate(TARGETS[target].cpus)
         for part in texts.PARTS
     }
-    missing = [(*wanted, path) for path, wanted in made.items() if not path.exists()]
+    missing = [(*part_and_cpu, path) for path, part_and_cpu in object_files.items() if not path.exists()]
     if missing:
         folder.mkdir(parents=True, exist_ok=True)
-        found = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
+        text_files = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
         with contextlib.ExitStack() as parts:
             _run(
                 __name__,
                 [
-                    [str(found[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
+                    [str(text_files[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
                     for part, number, path in missing
                 ],
                 STEPS,
                 lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
             )
-    return tuple(made)
+    return tuple(object_files)
 
 
 def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
     """LLVM code of each part."""
-    found = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
-    missing = [(part, path) for part, path in found.items() if not path.exists()]
+    text_files = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
+    missing = [(part, path) for part, path in text_files.items() if not path.exists()]
     if missing:
         with contextlib.ExitStack() as parts:
             calls = [[part, str(parts.enter_context(whole_file(path)))] for part, path in missing]
             _run(texts.__name__, calls, FUNCTIONS, advanced)
-    return found
+    return text_files
 
 
 def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
@@ -116,18 +116,18 @@ def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Call
     Raises:
         ObjectError: one failed.
     """
-    code, said = run_waiting(
+    code, output = run_waiting(
         [python_command("-m", module, *arguments) for arguments in calls],
         _environment(),
         lambda dots: advanced(min(dots / (steps * len(calls)), 1.0)),
     )
     if code:
-        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, said)}")
+        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, output)}")
 
 
-def reason_of(code: int, said: str) -> str:
+def reason_of(code: int, output: str) -> str:
     """The reason why a process failed: its first line with an error, else its last; else its exit status."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     named = [line for line in lines if "error:" in line.lower()]
     return next(iter(named or lines[-1:]), f"its process ended with status {code}; free some memory and try again")
 
@@ -142,8 +142,8 @@ def run_waiting(
     Args:
         waiting: is called a few times a second with the number of bytes that the commands have printed.
     """
-    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as printed:
-        running = [subprocess.Popen(each, env=environment, stdout=printed, stderr=said) for each in commands]
+    with tempfile.TemporaryFile() as errors, tempfile.TemporaryFile() as printed:
+        running = [subprocess.Popen(command, env=environment, stdout=printed, stderr=errors) for command in commands]
         try:
             for process in running:
                 while process.poll() is None:
@@ -156,14 +156,15 @@ def run_waiting(
             for process in running:
                 process.kill()
                 process.wait()
-        said.seek(0)
-        return next((each.returncode for each in running if each.returncode), 0), said.read().decode(errors="replace")
+        errors.seek(0)
+        status = next((process.returncode for process in running if process.returncode), 0)
+        return status, errors.read().decode(errors="replace")
 
 
 def _environment() -> dict[str, str]:
-    kept = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
+    environment = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
     processor = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
+    return {**environment, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
 
 
 def _compiled(text: str, target: Target, number: int) -> bytes:
@@ -218,8 +219,10 @@ def _without_counts(text: str) -> str:
 def _check_names(module: object, entries: set[str]) -> None:
     """Raise ObjectError where the code refers to anything that the shell or the C library does not give."""
     functions = module.functions  # type: ignore[attr-defined]
-    asked = {each.name for each in functions if each.is_declaration and not each.name.startswith("llvm.")}
-    unknown = asked - ALLOWED - STUBS - entries
+    declared = {
+        function.name for function in functions if function.is_declaration and not function.name.startswith("llvm.")
+    }
+    unknown = declared - ALLOWED - STUBS - entries
     if unknown:
         raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")
 

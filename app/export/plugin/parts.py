@@ -35,7 +35,7 @@ def body_of(patch: Patch) -> Array:
 
 def effects_there(patch: Patch) -> tuple[str, ...]:
     """The parameters of body and room that change an instrument's sound."""
-    return tuple(each for each in EFFECTS if patch.body.name or not each.startswith("body."))
+    return tuple(parameter for parameter in EFFECTS if patch.body.name or not parameter.startswith("body."))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +57,19 @@ class Kit:
         return of.KEYS * (1 + slots(DRUM) + DRUM_ROWS * self.modes)
 
 
-def kit_of(own: DrumKeys) -> Kit:
+def kit_of(keys: DrumKeys) -> Kit:
     """The kit of an instrument of drums; keys that are silent at any modulus have no drum in it."""
-    patch, drums, highest_hz, most = own.patch, own.drums.drums, own.drums.highest_hz, kernel.LOW_MODES
-    slack = DrumKeys(patch.with_value("knobs.modulus", OF_PATCHES["knobs.modulus"].limits[0]), own.ear, own)
+    patch = keys.patch
+    drums = keys.drums.drums
+    highest_hz = keys.drums.highest_hz
+    most = kernel.LOW_MODES
+    slack = DrumKeys(patch.with_value("knobs.modulus", OF_PATCHES["knobs.modulus"].limits[0]), keys.ear, keys)
     possible = [played.drum for played in drums]
-    for each, key in product((slack, own), range(of.KEYS)):  # the softer, the more modes are below a frequency
+    for variant, key in product((slack, keys), range(of.KEYS)):  # the softer, the more modes are below a frequency
         with contextlib.suppress(ValueError):
-            if (found := each.of_key(key)) is not None:
-                possible.append(found.modes.drum)
-                most = max(most, len(found.modes))
+            if (drum_key := variant.of_key(key)) is not None:
+                possible.append(drum_key.modes.drum)
+                most = max(most, len(drum_key.modes))
     around = dict[tuple[str, float], kernel.Around]()  # what is longest of each kind
     for drum in possible:
         kind, (rows, air, reach) = (drum.shape, drum.aspect), around_of(drum, highest_hz, of.MOST_DRUM_MODES)
@@ -74,7 +77,9 @@ def kit_of(own: DrumKeys) -> Kit:
         if air.size < known_air.size:
             air, reach = known_air, known_reach
         around[kind] = max(rows, longest, key=np.size), air, reach
-    memory, places_of, furthest = np.zeros(slots(KIT)), dict[int, int](), 0.0
+    memory = np.zeros(slots(KIT))
+    places_of = dict[int, int]()
+    furthest = 0.0
 
     def put(part: Array) -> int:
         nonlocal memory
@@ -86,12 +91,12 @@ def kit_of(own: DrumKeys) -> Kit:
         kind = drum.shape, drum.aspect
         (rows, air, reach), (rows_at, air_at) = around[kind], places[kind]
         furthest = max(furthest, reach / 2, rows[0, -1] * math.hypot(*played.place))
-        struck = np.zeros(1, KIT_DRUM)
-        struck[0] = struck_drum(played, drum), rows_at, rows.shape[1], air_at, *air.shape[1:], reach
-        places_of[played.note] = put(struck.view(np.float64))
+        record = np.zeros(1, KIT_DRUM)
+        record[0] = struck_drum(played, drum), rows_at, rows.shape[1], air_at, *air.shape[1:], reach
+        places_of[played.note] = put(record.view(np.float64))
     kit = record_of(memory, KIT)
     for key in range(of.KEYS):
-        if (tuned := own.tuned_to(key)) is not None:
+        if (tuned := keys.tuned_to(key)) is not None:
             played, ratio = tuned
             written = kit["keys"][key]
             written["drum"], written["ratio"] = places_of[played.note], ratio
@@ -101,7 +106,11 @@ def kit_of(own: DrumKeys) -> Kit:
     steps, columns = int(furthest / kernel.STEP) + 2, int(furthest + 12 * math.cbrt(furthest)) + 20 + 2 * kernel.TERMS
     work = len(memory) + steps * columns
     first_mode = work + 4 * surface + kernel.ORDERS
-    kit["highest_hz"], kit["capacity"], kit["most"] = highest_hz, modes, surface
-    kit["bessels"], kit["steps"], kit["columns"] = len(memory), steps, columns
+    kit["highest_hz"] = highest_hz
+    kit["capacity"] = modes
+    kit["most"] = surface
+    kit["bessels"] = len(memory)
+    kit["steps"] = steps
+    kit["columns"] = columns
     kit["work"], kit["found"] = work, first_mode
     return Kit(memory, first_mode + of.KEYS * kernel.ROWS * modes - len(memory), modes)

@@ -29,12 +29,12 @@ def _libraries(library: Any, seen: set[int]) -> Iterator[Any]:
     if id(library) not in seen:
         seen.add(id(library))
         yield library
-        for each in library._linking_libraries:
-            yield from _libraries(each, seen)
+        for callee in library._linking_libraries:
+            yield from _libraries(callee, seen)
 
 
-def _elsewhere(name: str) -> Any:
-    """An entry of another part, of two addresses."""
+def _external_entry(name: str) -> Any:
+    """A stand-in for an entry of another part: it calls that symbol with two addresses."""
     from llvmlite import ir
     from numba import types
     from numba.core import cgutils
@@ -70,18 +70,20 @@ def text(part: str) -> str:
 
     for kind in (bank, rendered):  # of voices, which the compiled player does not make
         kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
-    for name in (each for entries in PARTS.values() for each in entries if hasattr(mixer, each)):
+    for name in (entry for entries in PARTS.values() for entry in entries if hasattr(mixer, entry)):
         if name not in PARTS[part]:
-            setattr(mixer, name, _elsewhere(name))
-    own = llvm.Linkage.internal, llvm.Linkage.private
-    whole, seen, defined = llvm.parse_assembly(""), set[int](), set[str]()
+            setattr(mixer, name, _external_entry(name))
+    private = llvm.Linkage.internal, llvm.Linkage.private
+    whole = llvm.parse_assembly("")
+    seen = set[int]()
+    defined = set[str]()
     for name in PARTS[part]:
         entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
         overload = entry.overloads[entry.signatures[0]]
         for library in _libraries(overload.library, seen):
             module = library._final_module
             for function in module.functions:
-                if not function.is_declaration and function.linkage not in own:
+                if not function.is_declaration and function.linkage not in private:
                     function.linkage = "linkonce_odr" if function.name in defined else "external"
                     defined.add(function.name)
             whole.link_in(module)

@@ -14,7 +14,7 @@ from engine.presets import load_preset
 
 @dataclass(frozen=True)
 class SampledExport:
-    """Writes an instrument for samplers. See `ExportJob`.
+    """The export of an instrument for samplers. See `ExportJob`.
 
     Attributes:
         preset: the file of the preset that plays the patch.

@@ -42,8 +42,8 @@ class SampledReport:
         samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: by how much the whole is louder than the patch: an SFZ is softer where a note would clip, a SoundFont
-            is raised to full level.
+        gain_db: of the whole over the patch. An SFZ is softer where a note would clip; a SoundFont is raised to full
+            level.
         peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 
@@ -56,7 +56,7 @@ class SampledReport:
 
 
 def plain_stem(text: str) -> str:
-    """`text` with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
+    """The text with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
     return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
 
 
@@ -98,21 +98,21 @@ def export_sampled(
     try:
         replaceable(out)
         with working_folder(out.parent, folder.name) as unfinished:
-            made = unfinished / folder.name
-            made.mkdir()
-            samples = _rendered(plan, made, render, progress)
+            samples_folder = unfinished / folder.name
+            samples_folder.mkdir()
+            samples = _write_samples(plan, samples_folder, render, progress)
             if soundfont:
                 with whole_file(out) as file:
-                    gain_db = write_sf2(file, plan, samples, made, progress)
+                    gain_db = write_sf2(file, plan, samples, samples_folder, progress)
                 size = out.stat().st_size
             else:
-                size = sum(path.stat().st_size for path in made.iterdir())
+                size = sum(path.stat().st_size for path in samples_folder.iterdir())
                 with whole_file(out) as file:
                     size += file.write(sfz_text(plan, samples, folder.name).encode())
                     file.flush()
                     if folder.exists():
                         shutil.rmtree(folder)
-                    made.replace(folder)
+                    samples_folder.replace(folder)
                 gain_db = sfz_gain_db(plan.patch, samples)
     except OSError as error:
         raise WriteError(explain(out, error)) from error
@@ -136,9 +136,11 @@ def _check_replaceable(folder: Path, out: Path) -> None:
         raise WriteError(f"{folder}: holds other files; remove it, or choose another name for {out.name}")
 
 
-def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress) -> dict[Zone, StoredSample]:
+def _write_samples(
+    plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress
+) -> dict[Zone, StoredSample]:
     """Write the sample of each zone into a folder."""
-    made = {}
+    stored_samples = {}
     started = time.monotonic()
     for done, zone in enumerate(plan.zones):
         share, text = done / len(plan.zones), f"{note_name(zone.key)}, velocity {zone.velocity}"
@@ -155,8 +157,8 @@ def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: P
             raise WriteError(f"{path.name}: {error}") from error
         path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
         frames, channels = sample.sound.shape
-        made[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
-    return made
+        stored_samples[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
+    return stored_samples
 
 
 def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:

@@ -45,10 +45,10 @@ def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]
 
 def headroom_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, float]:
     """The headroom by zone, in dB: the level of its loudest velocity above that of the rendered one."""
-    found = {}
+    headrooms_db = {}
     for layers, stored in by_key(samples):
         levels_db = velocity_levels(patch, layers, stored)
         for zone in layers:
             softest, hardest = zone.velocities
-            found[zone] = float(levels_db[softest : hardest + 1].max() - levels_db[zone.velocity])
-    return found
+            headrooms_db[zone] = float(levels_db[softest : hardest + 1].max() - levels_db[zone.velocity])
+    return headrooms_db

@@ -34,7 +34,7 @@ RANGES = {
 
 
 class NoteRenderer(Protocol):
-    """Renders one note of a patch, struck at the first frame and released after `held_s`.
+    """A renderer of one note of a patch, struck at the first frame and released after `held_s`.
 
     Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. `advanced` is
     called several times a second with the seconds rendered, and may raise to stop the rendering. Raises ValueError

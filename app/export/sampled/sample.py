@@ -71,8 +71,8 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
     peak = float(level.max())
     if peak <= 10 ** (INAUDIBLE_DBFS / 20):
         return Sample(np.zeros((FEWEST_FRAMES, sound.shape[1])), 0.0, INAUDIBLE_DBFS, False)
-    heard = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
-    end = heard + round(END_FADE_S * rate_hz)
+    audible_frames = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
+    end = audible_frames + round(END_FADE_S * rate_hz)
     cut = end > len(sound)
     sound = sound[:end]
     fade = min(round(CUT_FADE_S * rate_hz), len(sound) // 4) if cut else round(END_FADE_S * rate_hz)
@@ -87,6 +87,6 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
 def encoded(sample: Sample, rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
     """The whole file; the same samples make the same bytes."""
     buffer = io.BytesIO()
-    stored, _ = quantised(sample.sound, bits)
-    soundfile.write(buffer, stored, rate_hz, _SUBTYPES[bits], format=form.upper())
+    numbers, _ = quantised(sample.sound, bits)
+    soundfile.write(buffer, numbers, rate_hz, _SUBTYPES[bits], format=form.upper())
     return buffer.getvalue()

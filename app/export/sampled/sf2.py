@@ -35,15 +35,24 @@ TIMECENTS_RANGE = (-12_000, 8_000)
 HARD_PAN = 500  # per mille to either side
 
 # Generators (8.1.2)
-PAN, RELEASE_VOL_ENV, INSTRUMENT, KEY_RANGE, VEL_RANGE, SAMPLE_ID, EXCLUSIVE_CLASS = 17, 38, 41, 43, 44, 53, 57
-ATTENUATION, FILTER_CUTOFF = 48, 8
+FILTER_CUTOFF = 8
+PAN = 17
+RELEASE_VOL_ENV = 38
+INSTRUMENT = 41
+KEY_RANGE = 43
+VEL_RANGE = 44
+ATTENUATION = 48
+SAMPLE_ID = 53
+EXCLUSIVE_CLASS = 57
 # Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
 # attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
 SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
 MOST_RAISED_DB = 6.0  # of a layer above the hardest: a bit of resolution
 FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
 # Kinds of samples (7.10)
-MONO, RIGHT, LEFT = 1, 2, 4
+MONO = 1
+RIGHT = 2
+LEFT = 4
 
 Generator = tuple[int, int]
 
@@ -94,7 +103,7 @@ def write_sf2(
     channels = _channels(samples)
     attenuations_cb = _attenuations_cb(plan.patch, samples)
     tables = _tables(plan, channels, attenuations_cb)
-    size = 2 * sum(one.frames + ZEROS_BEHIND for one in channels)
+    size = 2 * sum(channel.frames + ZEROS_BEHIND for channel in channels)
     info = _list(b"INFO", _information(plan))
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
@@ -120,10 +129,10 @@ def write_sf2(
 def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
     """The attenuation by zone, in cB, that a velocity of 0 would have against one of 128.
 
-    So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
-    raised for it, would be much louder than the hardest.
+    So the level continues within a layer as it does from layer to layer. A soft layer has to be raised for it; the
+    attenuation is less where that layer would become much louder than the hardest.
     """
-    found = {}
+    attenuations_cb = {}
     for layers, stored in by_key(samples):
         levels_db = velocity_levels(patch, layers, stored)
         for zone in layers:
@@ -131,8 +140,8 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
             below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
             step = (levels_db[hardest] - levels_db[below]) / max(1, hardest - below)
             most = (levels_db[-1] - levels_db[hardest] + MOST_RAISED_DB) / (128 - hardest)
-            found[zone] = round(10 * 128 * max(0.0, min(step, most)))
-    return found
+            attenuations_cb[zone] = round(10 * 128 * max(0.0, min(step, most)))
+    return attenuations_cb
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
@@ -153,21 +162,22 @@ def release_timecents(patch: Patch) -> int:
 
 
 def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
-    made: list[_Channel] = []
+    """The channels of all samples, one or two each, with their first frames."""
+    channels: list[_Channel] = []
     start = 0
     for zone, stored in samples.items():
-        here = len(made)
+        here = len(channels)
         sides = [("", MONO, 0, 0)]
         if stored.channels == 2:
             sides = [("_L", LEFT, here + 1, -HARD_PAN), ("_R", RIGHT, here, HARD_PAN)]
         for suffix, kind, link, pan in sides:
-            made.append(_Channel(zone, zone.stem + suffix, start, stored.frames, kind, link, pan))
+            channels.append(_Channel(zone, zone.stem + suffix, start, stored.frames, kind, link, pan))
             start += stored.frames + ZEROS_BEHIND
-    return made
+    return channels
 
 
 def _information(plan: SampledPlan) -> bytes:
-    """Version, engine and name are compulsory (5)."""
+    """The chunks of information, of which version, engine and name are compulsory (5)."""
     made_by = f"{PROGRAM} {program_version()}"
     lines = [one_line(plan.patch.description)] if plan.patch.description else []
     if plan.every > 1:
@@ -198,10 +208,10 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
         zones.append([*zone, (SAMPLE_ID, number)])
     modulators = [struct.pack("<HHhHH", source, to, 0, by, 0) for source, to, by in SWITCHED_OFF]
     bags = [struct.pack("<HH", 0, 0)]
-    generators = [struct.pack("<HH", *one) for one in zones[0]]
+    generators = [struct.pack("<HH", *generator) for generator in zones[0]]
     for channel, zone in zip(channels, zones[1:], strict=True):
         bags.append(struct.pack("<HH", len(generators), len(modulators)))
-        generators += [struct.pack("<HH", *one) for one in zone]
+        generators += [struct.pack("<HH", *generator) for generator in zone]
         amount_cb = attenuations_cb[channel.zone]
         modulators.append(struct.pack("<HHhHH", FALLING_VELOCITY, ATTENUATION, amount_cb, 0, 0))
     bags.append(struct.pack("<HH", len(generators), len(modulators)))
@@ -217,7 +227,7 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
                 _table(b"ibag", bags),
                 _table(b"imod", [*modulators, bytes(10)]),
                 _table(b"igen", [*generators, bytes(4)]),
-                _table(b"shdr", [*(_header(plan, one) for one in channels), struct.pack("<20s26x", b"EOS")]),
+                _table(b"shdr", [*(_header(plan, channel) for channel in channels), struct.pack("<20s26x", b"EOS")]),
             ]
         ),
     )
@@ -228,14 +238,16 @@ def _preset(name: bytes, bag: int) -> bytes:
     return struct.pack("<20sHHHIII", name, 0, 0, bag, 0, 0, 0)
 
 
-def _header(plan: SampledPlan, one: _Channel) -> bytes:
+def _header(plan: SampledPlan, channel: _Channel) -> bytes:
     """The header of a sample: its place, in frames, and its key (7.10).
 
     Its loop is not played, but has to lie within it.
     """
-    end = one.start + one.frames
-    places = (one.start, end, one.start + 8, end - 8)
-    return struct.pack("<20sIIIIIBbHH", _name(one.name), *places, plan.rate_hz, one.zone.key, 0, one.link, one.kind)
+    end = channel.start + channel.frames
+    places = (channel.start, end, channel.start + 8, end - 8)
+    return struct.pack(
+        "<20sIIIIIBbHH", _name(channel.name), *places, plan.rate_hz, channel.zone.key, 0, channel.link, channel.kind
+    )
 
 
 def _span(ends: tuple[int, int]) -> int:

@@ -32,7 +32,7 @@ def sfz_gain_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> float:
 
 
 def release_s(patch: Patch) -> float:
-    """`ampeg_release` that lets a note fall by 60 dB in the patch's damping time."""
+    """The `ampeg_release` that lets a note fall by 60 dB in the patch's damping time."""
     return patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
 
 

@@ -57,15 +57,15 @@ def megabytes(size: int) -> str:
 
 def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
     """Notes for a musician on what was written. `dry`: what takes the room out, as in "--dry leaves"."""
-    reported = []
+    lines = []
     if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
-        reported.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
+        lines.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
     if report.cut:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
-        reported.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
+        lines.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
     if abs(report.gain_db) >= SMALLEST_REPORTED_DB:
         why = "softer than the instrument, so that no note clips"
         if report.gain_db > 0:
             why = "louder than the instrument, at the full level of 16 bits"
-        reported.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
-    return reported
+        lines.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
+    return lines

@@ -88,7 +88,7 @@ LOOK_MENU = "&View"  # has the theme and the text size too
 
 
 class AppMenu(QMenu):
-    """Emits `look_asked`; shows `show_look`. `action`: each QAction by the name of its entry."""
+    """The menu of the app: emits `look_asked`, shows `show_look`. `action`: each QAction by the name of its entry."""
 
     look_asked = Signal(str, object)  # a field of `Look` and its new value
 

@@ -89,7 +89,9 @@ class Browser(QFrame):
         super().__init__(parent)
         self.setObjectName("browser")
         self.setAccessibleName(f"Browser of {what}")
-        self.what, self._size, self._at_rest = what, size, at_rest
+        self.what = what
+        self._size = size
+        self._at_rest = at_rest
         self.loaded = self.selected = self._folder = ""
         self._before: QWidget | None = None  # had the focus
         self._filling = False
@@ -124,7 +126,7 @@ class Browser(QFrame):
         self.play_button = _button(f"▶  {plays}", f"{plays} (Space)", self.play)
         self.star = _button("☆  Favourite", "Add to the favourites, or remove (Ctrl+D)", self.ask_favourite)
         tip = "Give your own another name"
-        self.rename = _button("Rename …", tip, lambda: self._tell(self.rename_asked))
+        self.rename = _button("Rename …", tip, lambda: self._emit_selected(self.rename_asked))
         self.delete = _button(DELETE, "Delete your own; needs a second click", self._ask_delete)
         self._lay_out(folder_tip, f"↑ ↓ load{' and play' if at_rest else ''}")
         for widget in self.findChildren(QWidget):
@@ -135,23 +137,23 @@ class Browser(QFrame):
         self.hide()
 
     def _build_list(self, columns: Sequence[Column]) -> RowList:
-        made = RowList(columns)
-        made.setAccessibleName(self.what.capitalize())
-        made.setToolTip("Arrows load, Space plays, Enter closes")
-        made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
-        made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        made.setHeaderHidden(len(columns) == 1)
-        header = made.header()
+        rows = RowList(columns)
+        rows.setAccessibleName(self.what.capitalize())
+        rows.setToolTip("Arrows load, Space plays, Enter closes")
+        rows.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
+        rows.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        rows.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        rows.setHeaderHidden(len(columns) == 1)
+        header = rows.header()
         header.setStretchLastSection(False)
         header.setMinimumSectionSize(26)
         for column in range(1 + len(columns)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(TITLE, QHeaderView.ResizeMode.Stretch)
-        made.selectionModel().currentChanged.connect(self._current_changed)
-        made.clicked.connect(self._clicked)
-        made.doubleClicked.connect(self._double_clicked)
-        return made
+        rows.selectionModel().currentChanged.connect(self._current_changed)
+        rows.clicked.connect(self._click_row)
+        rows.doubleClicked.connect(self._double_click_row)
+        return rows
 
     def _lay_out(self, folder_tip: str, arrows: str) -> None:
         close = tool_button("✕", "Close the browser", "Close (Escape)")
@@ -180,7 +182,7 @@ class Browser(QFrame):
     # What is shown
 
     def show_rows(self, rows: Sequence[Row], favourites: Collection[str], loaded: str, folder: str) -> None:
-        """All rows there are; which are favourites; which one is loaded; the user's own folder."""
+        """Show all rows there are; which are favourites; which one is loaded; the user's own folder."""
         self._folder = folder
         self._filling = True
         for number, box in enumerate(self.filters.values()):
@@ -200,8 +202,8 @@ class Browser(QFrame):
             self._favourites,
         )
         self._filling = False
-        found, total = len(self.listed), self.total
-        count = f"{found} of {total} {self.what}" if found < total else f"{total} {self.what}"
+        matches, total = len(self.listed), self.total
+        count = f"{matches} of {total} {self.what}" if matches < total else f"{total} {self.what}"
         self.state.setText(f"{count}   ·   your own: {self._folder}")
         self.select(self.selected)
         self.listed_changed.emit()
@@ -280,9 +282,9 @@ class Browser(QFrame):
 
     def take_typed(self, event: QKeyEvent) -> bool:
         """Give a key that writes to the search, wherever the focus is; False for another key."""
-        held = event.modifiers() & _COMMAND
+        modifiers = event.modifiers() & _COMMAND
         writes = event.key() == KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
-        if not writes or (held and held != _ALT_GR):
+        if not writes or (modifiers and modifiers != _ALT_GR):
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
             event.accept()  # or a shortcut of the window would get it
@@ -339,15 +341,15 @@ class Browser(QFrame):
 
     def move_selection(self, key: Qt.Key) -> None:
         """Load the selected entry, or, where it is loaded already, the one that one of MOVES goes to."""
-        listed = self.listed
-        if listed:
+        names = self.listed
+        if names:
             self.list.setFocus()  # where Space plays
-            row = listed.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
-            self.load(listed[min(max(row, 0), len(listed) - 1)])
+            row = names.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
+            self.load(names[min(max(row, 0), len(names) - 1)])
             self._start_rest()
 
     def press(self, key: Qt.Key) -> None:
-        """Handle one of MOVES, Space, D or one of CLOSES."""
+        """Handle a key of MOVES, Space, D or one of CLOSES."""
         if key in MOVES:
             self.move_selection(key)
         elif key == KEYS.Key_Space:
@@ -361,15 +363,15 @@ class Browser(QFrame):
 
     def ask_favourite(self) -> None:
         """Ask for the selected row to become a favourite, or none."""
-        self._tell(self.favourite_asked)
+        self._emit_selected(self.favourite_asked)
 
     def play(self) -> None:
         """Load the selected row, and have it played."""
         self._rest.stop()
         self.load(self.selected)
-        self._tell(self.played)
+        self._emit_selected(self.played)
 
-    def _tell(self, signal: SignalInstance) -> None:
+    def _emit_selected(self, signal: SignalInstance) -> None:
         if self.selected:
             signal.emit(self.selected)
 
@@ -378,7 +380,7 @@ class Browser(QFrame):
             self.delete.setText(REALLY)
         else:
             self.delete.setText(DELETE)
-            self._tell(self.delete_asked)
+            self._emit_selected(self.delete_asked)
 
     def _start_rest(self) -> None:
         if self._at_rest:
@@ -388,7 +390,7 @@ class Browser(QFrame):
         if not self._filling and index.isValid() and isinstance(line := self.list.line(index), Row):
             self.load(line.name)
 
-    def _clicked(self, index: QModelIndex) -> None:
+    def _click_row(self, index: QModelIndex) -> None:
         line = self.list.line(index)
         if isinstance(line, str):
             self.select(self.selected)  # a heading took the mark
@@ -398,12 +400,12 @@ class Browser(QFrame):
             self.load(line.name)  # the best hit may be selected and not loaded
             self._start_rest()
 
-    def _double_clicked(self, index: QModelIndex) -> None:
+    def _double_click_row(self, index: QModelIndex) -> None:
         if index.column() != STAR and isinstance(self.list.line(index), Row):
             self.dismiss()
 
     def page(self) -> int:
-        """Rows that a page up or down goes."""
+        """The number of rows that Page up or Page down moves."""
         return max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
 
     def step(self, key: Qt.Key) -> int:
@@ -418,7 +420,7 @@ class Browser(QFrame):
             return False
         if not isinstance(event, QKeyEvent) or event.type() == QEvent.Type.KeyRelease:
             return False
-        if self._is_ours(watched, event):
+        if self._is_browser_key(watched, event):
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()  # or a shortcut of the window would get it
             else:
@@ -426,7 +428,7 @@ class Browser(QFrame):
             return True
         return watched is not self.search and self.take_typed(event)
 
-    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
+    def _is_browser_key(self, watched: QObject, event: QKeyEvent) -> bool:
         """Return True if a key is one of `press`; buttons and boxes keep all of these but Escape."""
         control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if watched not in (self.search, self.list):
@@ -439,22 +441,22 @@ class Browser(QFrame):
 
 
 def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
-    made = QPushButton(text)
-    made.setAccessibleName(text.lstrip("▶☆ "))
-    made.setToolTip(tip)
-    made.clicked.connect(lambda: act())
-    return made
+    button = QPushButton(text)
+    button.setAccessibleName(text.lstrip("▶☆ "))
+    button.setToolTip(tip)
+    button.clicked.connect(lambda: act())
+    return button
 
 
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
     """Refill a box with the kinds to filter by, after the entry for no filter; what is chosen stays."""
     with QSignalBlocker(box):
-        chosen = box.currentData()
+        previous = box.currentData()
         while box.count() > 1:
             box.removeItem(1)
         for value, words in kinds:
             box.addItem(words, value)
-        box.setCurrentIndex(max(0, box.findData(chosen)))
+        box.setCurrentIndex(max(0, box.findData(previous)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

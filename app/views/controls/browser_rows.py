@@ -72,14 +72,14 @@ def listed_rows(
         order: which of `Row.ranks`.
     """
     headings = list(dict.fromkeys(row.heading for row in rows))
-    found = [
+    hits = [
         row
         for row in rows
         if all(word in row.searched for word in words)
-        and all(wanted in ("", kind) for wanted, (kind, _) in zip(kinds, row.kinds, strict=False))
+        and all(filter_kind in ("", kind) for filter_kind, (kind, _) in zip(kinds, row.kinds, strict=False))
         and (not starred or row.name in favourites)
     ]
-    return sorted(found, key=lambda row: (headings.index(row.heading), row.name not in favourites, row.ranks[order]))
+    return sorted(hits, key=lambda row: (headings.index(row.heading), row.name not in favourites, row.ranks[order]))
 
 
 class RowList(QTreeWidget):

@@ -19,7 +19,7 @@ class ElidedLabel(QLabel):
         self._shorter: tuple[str, ...] = ()
 
     def say(self, text: str, *shorter: str) -> None:
-        """`shorter` are other wordings, the longest first, for where there is no room for the text."""
+        """Show a text; `shorter`: other wordings, the longest first, for where there is no room for it."""
         self._shorter = shorter
         self.setText(text)
         self.update()

@@ -32,11 +32,11 @@ FILTERS = {
 
 def form_label(text: str) -> QLabel:
     """A form's label; all are of one width, so that the forms of a dialog are aligned."""
-    made = Label(text)
-    made.setFixedWidth(theme.px(LABEL_WIDTH))
-    made.setMinimumHeight(28)
-    made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return made
+    title = Label(text)
+    title.setFixedWidth(theme.px(LABEL_WIDTH))
+    title.setMinimumHeight(28)
+    title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return title
 
 
 def row_of(*widgets: QWidget) -> QHBoxLayout:

@@ -24,7 +24,7 @@ COARSE = 10  # of Page up and Page down
 
 
 class _Editor(QLineEdit):
-    """Takes a typed number; Enter and Escape, which are shortcuts of the window, are its own.
+    """A field for a typed number; Enter and Escape, which are shortcuts of the window, are its own.
 
     A key that no number with this unit has gives it up, and goes to the window: it plays.
     """
@@ -58,8 +58,8 @@ class _Editor(QLineEdit):
 
     def _is_alien(self, event: QKeyEvent) -> bool:
         """Return True if a key, as a letter, makes no number with the text before the cursor."""
-        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
-        if held or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
+        modifiers = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
+        if modifiers or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
             return False
         before = self.text()[: self.selectionStart() if self.hasSelectedText() else self.cursorPosition()]
         return not begins_number(before + event.text(), self._unit, self._prefix)
@@ -90,7 +90,7 @@ class Knob(QWidget):
         self.set_name(parameter.label, parameter.tip)
 
     def set_name(self, name: str, tip: str = "") -> None:
-        """The label and the tooltip, shown as plain text: both may come from a file."""
+        """Set the label and the tooltip, shown as plain text: both may come from a file."""
         self._name, self._tip = name, tip
         self.setAccessibleName(name)
         self._tell()
@@ -119,7 +119,7 @@ class Knob(QWidget):
             self._tell()
 
     def set_barred(self, why: str) -> None:
-        """Grey it out and say why in the tooltip; "" frees it."""
+        """Grey the knob out and say why in the tooltip; "" frees it."""
         if why != self._why_barred:
             self._why_barred = why
             self.setEnabled(not why)
@@ -257,11 +257,11 @@ class Knob(QWidget):
         elif self._figure:
             self.figure_asked.emit(value)
         else:
-            taken = self.parameter.clamped(value)
-            self.value_asked.emit(taken)
-            if taken != value:
-                end = "At most" if value > taken else "At least"
-                say_above(self, f"{end} {self.parameter.shown(taken)}")
+            clamped = self.parameter.clamped(value)
+            self.value_asked.emit(clamped)
+            if clamped != value:
+                end = "At most" if value > clamped else "At least"
+                say_above(self, f"{end} {self.parameter.shown(clamped)}")
 
     def _give_up(self) -> None:
         if self._editor is not None:

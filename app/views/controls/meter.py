@@ -32,7 +32,7 @@ class Meter(QWidget):
         return QSize(theme.px(84), theme.px(40))
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
-        """The peak in dBFS, and whether the limiter reduces it now."""
+        """Show the peak in dBFS, and whether the limiter reduces it now."""
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
         peak_db = max(peak_db, LOWEST_DB)
         if (peak_db, hold) == (self._peak_db, self._hold):

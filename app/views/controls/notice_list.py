@@ -51,7 +51,7 @@ class NoticeList(QDialog):
         column.addLayout(filled(QHBoxLayout(), copy, None, close))
 
     def set_notices(self, notices: Sequence[Notice]) -> None:
-        """`notices`: the latest last."""
+        """Show these notices, the latest last."""
         self._notices = list(reversed(notices))
         self._list.clear()
         for notice in self._notices:
@@ -62,7 +62,7 @@ class NoticeList(QDialog):
             self._details.setPlainText("No notices since the start.")
 
     def report(self) -> str:
-        """Everything as text."""
+        """The whole list as text."""
         return "\n\n".join(
             f"{notice.last_reported} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
             for notice in self._notices

@@ -68,15 +68,15 @@ class _Typed(QAbstractSpinBox if TYPE_CHECKING else object):  # type: ignore[mis
 
     def fixup(self, text: str) -> str:
         """Say that a text is refused, as it would count; Qt then shows the value again."""
-        kept = self.specialValueText() if self.value() == self.minimum() else ""
-        kept = kept or f"{self.prefix()}{self.textFromValue(self.value())}{self.suffix()}"
+        valid_text = self.specialValueText() if self.value() == self.minimum() else ""
+        valid_text = valid_text or f"{self.prefix()}{self.textFromValue(self.value())}{self.suffix()}"
         number = typed_number(
             text.removeprefix(self.prefix()).removesuffix(self.suffix()), self.suffix(), self.prefix()
         )
-        words = refusal(text, kept)
+        words = refusal(text, valid_text)
         if number is not None and not self.minimum() <= number <= self.maximum():
             low, high = self.textFromValue(self.minimum()), self.textFromValue(self.maximum())
-            words = f"Only {low} … {high}{self.suffix()}: {kept} is kept"
+            words = f"Only {low} … {high}{self.suffix()}: {valid_text} is kept"
         say_above(self, words)
         return text
 
@@ -94,16 +94,16 @@ class NumberBox(_Typed, QDoubleSpinBox):
         return int(self.decimals())
 
     def valueFromText(self, text: str) -> float:
-        found = self.understood(text)
-        return self.value() if found is None else found
+        number = self.understood(text)
+        return self.value() if number is None else number
 
 
 class CountBox(_Typed, QSpinBox):
     """A field for a whole number."""
 
     def valueFromText(self, text: str) -> int:
-        found = self.understood(text)
-        return self.value() if found is None else int(found)
+        number = self.understood(text)
+        return self.value() if number is None else int(number)
 
 
 def prepared(box: QAbstractSpinBox, name: str, tip: str, width: int) -> None:

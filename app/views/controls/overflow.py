@@ -35,7 +35,7 @@ class Overflow(QToolButton):
         self.hide()
 
     def hold(self, *parts: QWidget) -> None:
-        """Hold these from now on, in place of those before."""
+        """Hold these parts from now on, in place of those before."""
         self.parts = parts
         self.setVisible(bool(parts))
 

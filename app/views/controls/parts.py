@@ -70,9 +70,9 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 def faint(text: str = "") -> QLabel:
     """A line of text in the faint colour."""
-    made = Label(text)
-    made.setObjectName("faint")
-    return made
+    text_label = Label(text)
+    text_label.setObjectName("faint")
+    return text_label
 
 
 def words_label() -> ElidedLabel:
@@ -157,9 +157,9 @@ def vertical_rule() -> QFrame:
 
 def label(kind: str = "", text: str = "", selectable: bool = False) -> QLabel:
     """Text that wraps; `kind` is a name in the style sheet ("faint", "warning")."""
-    made = Label(text)
-    made.setObjectName(kind)
-    made.setWordWrap(True)
+    text_label = Label(text)
+    text_label.setObjectName(kind)
+    text_label.setWordWrap(True)
     if selectable:
-        made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-    return made
+        text_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return text_label

@@ -22,7 +22,7 @@ _HELD = (
 
 
 class PlayingKeys(QObject):
-    """Emits `pressed` for letters and digits, once for a key that is held down; not in text fields.
+    """The keys of the computer: `pressed` for letters and digits, once while a key is held; not in text fields.
 
     While a browser is open, keys that write go to its search instead.
 
@@ -66,6 +66,7 @@ class PlayingKeys(QObject):
         self._watched = None
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Take keys that play; return True for those, so that no other widget gets them."""
         if event.type() == QEvent.Type.WindowDeactivate:
             self._let_go(*self._down)
             return False
@@ -102,6 +103,7 @@ class PlayingKeys(QObject):
                 self.released.emit(press)
 
     def _release(self, event: QKeyEvent) -> bool:
+        """Release the key of an event, at once or after LEAVE_MS; return True if it plays."""
         number, time_ms = _number(event), event.timestamp()
         press = self._down.get(number)
         if press is None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class PresetBar(QWidget):
-    """`card`, the line of facts, is placed by the window."""
+    """The bar of presets; `card`, the line of facts, is placed by the window."""
 
     browse_asked = Signal()
     step_asked = Signal(int)

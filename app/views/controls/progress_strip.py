@@ -22,7 +22,7 @@ class ProgressStrip(QWidget):
         return self._share
 
     def show_share(self, share: float | None) -> None:
-        """0 … 1, or None where nothing is computed."""
+        """Show the share 0 … 1, or None where nothing is computed."""
         if share != self._share:
             self._share = share
             self.update()

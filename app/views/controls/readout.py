@@ -10,7 +10,7 @@ from app.views.controls.plain import plain_tip
 
 
 class Readout(ElidedLabel):
-    """Shows the text of `rest` while that of `tell` is empty."""
+    """A line that shows the text of `rest` while that of `tell` is empty."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

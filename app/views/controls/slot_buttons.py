@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
-WIDTH, NARROW_WIDTH, TIGHT_WIDTH = 148, 108, 82  # fixed, so that a longer title moves nothing
+WIDTH = 148  # this and the next two: fixed, so that a longer title moves nothing
+NARROW_WIDTH = 108
+TIGHT_WIDTH = 82
 PADDING = 16  # of the style sheet, with the borders
 
 _SOURCES = (
@@ -59,7 +61,7 @@ class SlotButtons(QWidget):
         self.show_choices(self._choices)
 
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
-        """The presets that a slot may hold."""
+        """Set the presets that a slot may hold."""
         self._entries = entries
         self._show()
 
@@ -85,7 +87,7 @@ class SlotButtons(QWidget):
             source = getattr(self._choices, slot)
             title, short = self._title(source)
             gain = self._gain_text(slot)
-            button.setText(self._fitted(slot.upper(), short, gain))
+            button.setText(self._fit_text(slot.upper(), short, gain))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             gain_line = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -108,7 +110,7 @@ class SlotButtons(QWidget):
         name = source.removeprefix("preset:")
         return name, "DIFF." if source == "difference" else name.upper()
 
-    def _fitted(self, letter: str, text: str, gain: str) -> str:
+    def _fit_text(self, letter: str, text: str, gain: str) -> str:
         """The text that fits a button: where room is short, the gain loses its unit, then `text` is cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
         room = theme.px(self._width) - PADDING
@@ -139,28 +141,28 @@ class SlotButtons(QWidget):
 
     def _fill(self, menu: QMenu, slot: str) -> None:
         menu.clear()
-        held = QActionGroup(menu)
+        group = QActionGroup(menu)
         for source, title in _SOURCES:
-            self._add(menu, held, title, slot, source, getattr(self._choices, slot) == source)
+            self._add(menu, group, title, slot, source, getattr(self._choices, slot) == source)
         others = menu.addMenu("Another preset's model")
         others.setToolTipsVisible(True)
         for entry in self._entries:
             source = f"preset:{entry.name}"
-            action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
-            reported = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
-            action.setToolTip(plain_tip(f"{reported}\n{entry.path.name}"))
+            action = self._add(others, group, entry.title, slot, source, getattr(self._choices, slot) == source)
+            tip = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
+            action.setToolTip(plain_tip(f"{tip}\n{entry.path.name}"))
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
         match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))
         menu.addAction(match)
         gains = menu.addMenu("Gain of the difference")
-        stated = QActionGroup(gains)
+        gain_group = QActionGroup(gains)
         for gain in DIFFERENCE_GAINS_DB:
-            chosen = abs(self._choices.difference_gain_db - gain) < 0.5
-            self._add(gains, stated, f"+{gain} dB", "difference_gain_db", float(gain), chosen)
+            checked = abs(self._choices.difference_gain_db - gain) < 0.5
+            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain), checked)
 
-    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, chosen: bool) -> QAction:
-        action = QAction(title, menu, checkable=True, checked=chosen)
+    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, checked: bool) -> QAction:
+        action = QAction(title, menu, checkable=True, checked=checked)
         action.triggered.connect(lambda: self.change_asked.emit(field, value))
         group.addAction(action)
         menu.addAction(action)

@@ -64,7 +64,10 @@ class AbxDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
         self.resize(680, 470)
-        self._output, self._material, self._seed, self._render = output, material, seed, render
+        self._output = output
+        self._material = material
+        self._seed = seed
+        self._render = render
         self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
         self._rate_hz = 0  # at which it is, or was, rendered
         self._pair: Pair | None = None
@@ -77,11 +80,9 @@ class AbxDialog(QDialog):
         self._folder = choices.folder
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
-        self._setup, self._trial, self._result = (
-            SetupPage(material.words, labels, choices),
-            TrialPage(labels),
-            ResultPage(),
-        )
+        self._setup = SetupPage(material.words, labels, choices)
+        self._trial = TrialPage(labels)
+        self._result = ResultPage()
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)
@@ -113,7 +114,9 @@ class AbxDialog(QDialog):
         self._leave()
 
     def _connect(self) -> None:
-        setup, trial, result = self._setup, self._trial, self._result
+        setup = self._setup
+        trial = self._trial
+        result = self._result
         setup.start.clicked.connect(self._start)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)
@@ -139,12 +142,12 @@ class AbxDialog(QDialog):
         rendering = self._rendering
         if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
             try:
-                made = make_stimuli(rendering.result(), self._rate_hz, self._volume_db)
+                stimuli = make_stimuli(rendering.result(), self._rate_hz, self._volume_db)
             except Exception as error:  # a model that ran away, or silence
                 self._silence = str(error)
             else:
-                self._stimuli, self._silence = made, ""
-                self._pair = Pair(self._output.mixer, {str(name): each for name, each in made.samples.items()})
+                self._stimuli, self._silence = stimuli, ""
+                self._pair = Pair(self._output.mixer, {str(name): sound for name, sound in stimuli.samples.items()})
         self._show_state()
 
     def _audition(self, sound: Sound, again: bool = False) -> None:
@@ -235,9 +238,9 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        if chosen := QFileDialog.getExistingDirectory(self, "Folder of the result"):
-            self._folder = chosen
-            self._save(Path(chosen))
+        if folder := QFileDialog.getExistingDirectory(self, "Folder of the result"):
+            self._folder = folder
+            self._save(Path(folder))
 
     # What is shown, and leaving
 
@@ -278,8 +281,8 @@ class AbxDialog(QDialog):
             self._leave()
             return
         answered, planned = len(self._run.trials), self._run.planned
-        kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
-        question = f"{answered} of {planned} trials are answered. {kept}"
+        consequence = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
+        question = f"{answered} of {planned} trials are answered. {consequence}"
         if ask(self, "Stop the test?", question, CONTINUE, STOP) == STOP and self.testing:
             self._end()
 

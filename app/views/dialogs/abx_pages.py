@@ -36,7 +36,7 @@ _LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
 
 
 class SetupPage(QWidget):
-    """Asks with signals; `show_state` says whether the test can start. `words`: what is compared."""
+    """The page before the test; `show_state` shows whether it can start. `words`: the compared sounds."""
 
     audition_asked = Signal(str)  # "A" or "B"
 
@@ -75,7 +75,7 @@ class SetupPage(QWidget):
             self.audition_asked.emit(name)
 
     def show_state(self, obstacle: str, advice: str) -> None:
-        """`obstacle`: why the test cannot start, or ""; `advice`: what to know before it does, or ""."""
+        """Show why the test cannot start, and what to know before it does; "": nothing."""
         for button in (self.start, *self._listen):
             button.setEnabled(not obstacle)
         self._warning.setText(obstacle or advice)
@@ -113,7 +113,7 @@ class TrialPage(QWidget):
         self._bar.setAccessibleName("Trials answered")
         self._hint = _centred()
         texts = {"A": labels[0], "X": "?", "B": labels[1]}
-        self._sounds = {name: self._soundpush_button(name, text) for name, text in texts.items()}
+        self._sounds = {name: self._sound_button(name, text) for name, text in texts.items()}
         self._answers = {
             "A": push_button("←  X is A", "Answer: X is A (1 or ←)"),
             "B": push_button("X is B  →", "Answer: X is B (2 or →)"),
@@ -141,7 +141,7 @@ class TrialPage(QWidget):
             Qt.Key.Key_Space: self.replay_asked.emit,
         }
 
-    def _soundpush_button(self, name: str, text: str) -> QPushButton:
+    def _sound_button(self, name: str, text: str) -> QPushButton:
         button = push_button(f"{name}\n{text}", f"Hear {name} ({name})")
         button.setObjectName(text.lower() if name != "X" else "")  # its colour in the style sheet
         button.setAccessibleName(f"Hear {name}: {text}" if name != "X" else "Hear X")
@@ -158,7 +158,7 @@ class TrialPage(QWidget):
             act()
 
     def show_trial(self, number: int, trials: int) -> None:
-        """A new trial, in which nothing has been heard."""
+        """Show a new trial, in which nothing has been heard."""
         self._number.setText(f"Trial {number} of {trials}")
         self._bar.setRange(0, trials)
         self._bar.setValue(number - 1)
@@ -211,10 +211,10 @@ class ResultPage(QWidget):
 
 
 def _centred(style: str = "") -> QLabel:
-    made = label("" if style else "faint")
-    made.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    made.setStyleSheet(style)
-    return made
+    text_label = label("" if style else "faint")
+    text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    text_label.setStyleSheet(style)
+    return text_label
 
 
 def _stack(page: QWidget, *parts: QWidget | QLayout | None) -> None:

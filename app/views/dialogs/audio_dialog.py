@@ -97,26 +97,26 @@ class AudioDialog(QDialog):
         return SoundChoice(rate_hz=self._rate.currentData(), buffer=self._buffer.currentData())
 
     def show_devices(self, devices: Sequence[DeviceChoice], chosen: DeviceChoice | None) -> None:
-        """The connected outputs; the chosen one is listed even where it is not connected."""
+        """Show the connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
-        wanted = (chosen.name, chosen.host_api) if chosen else None
+        selected = (chosen.name, chosen.host_api) if chosen else None
         with QSignalBlocker(self._device):
             self._device.clear()
             self._device.addItem("System default", None)
             for key in keys:
                 self._device.addItem(f"{key[0]}   ({key[1]})", key)
-            if wanted and wanted not in keys:
-                self._device.addItem(f"{wanted[0]}   ({wanted[1]}), not connected", wanted)
+            if selected and selected not in keys:
+                self._device.addItem(f"{selected[0]}   ({selected[1]}), not connected", selected)
             rows = [self._device.itemData(row) for row in range(self._device.count())]
-            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == wanted), 0))
+            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == selected), 0))
 
     def show_sound(self, sound: SoundChoice) -> None:
         self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))
         self._buffer.setCurrentIndex(self._buffer.findData(sound.buffer))
 
     def show_state(self, state: AudioState) -> None:
-        heard = bool(state.playing_on)
-        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "No audio output.")
+        output = bool(state.playing_on)
+        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if output else "No audio output.")
         _set(self._problem_label, state.problem)
         latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
         _set(self._gaps, f"{len(state.gaps)}{latest}")
@@ -128,7 +128,7 @@ class AudioDialog(QDialog):
             self._problem.setVisible(bool(state.problem))
             self.adjustSize()
         for button in self._tones:
-            button.setEnabled(heard)
+            button.setEnabled(output)
 
     def _choose(self) -> None:
         self.choice_made.emit(self.device, self.sound)
@@ -170,6 +170,6 @@ def _button(text: str, tip: str, signal: object = None) -> QPushButton:
     return button
 
 
-def _set(shown: QLabel, text: str) -> None:
-    if shown.text() != text:
-        shown.setText(text)
+def _set(target: QLabel, text: str) -> None:
+    if target.text() != text:
+        target.setText(text)

@@ -41,7 +41,7 @@ CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
 class ExportDialog(GrowingDialog):
-    """Follows what the window plays (`show_subjects`) until an export begins.
+    """The dialog of exports. It follows what the window plays (`show_subjects`) until an export begins.
 
     Attributes:
         state: a line or more on what is to come, on progress, or on the result.
@@ -58,9 +58,9 @@ class ExportDialog(GrowingDialog):
         self._export = export
         self._background = Background("export", self, expected=EXPECTED)
         self._background.progressed.connect(self._show_progress)
-        self._background.finished.connect(self._finished)
-        self._background.failed.connect(self._failed)
-        self._background.cancelled.connect(self._cancelled)
+        self._background.finished.connect(self._show_finished)
+        self._background.failed.connect(self._show_failure)
+        self._background.cancelled.connect(self._show_cancelled)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
         self.wav = WavForm(export)
@@ -73,13 +73,13 @@ class ExportDialog(GrowingDialog):
         self.tabs.setAccessibleName("What to export")
         self.tabs.setToolTip("A note, what was recorded, or the instrument for samplers or as a plug-in")
         self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
-        self._settled.timeout.connect(self._update)
+        self._settled.timeout.connect(self._show_offer)
         self._lay_out()
         for page in self.pages.values():
             self.tabs.addTab(page.title)
             page.changed.connect(self._settled.start)
         self.wav.changed.connect(self._settled.start)
-        self.tabs.currentChanged.connect(self._turn)
+        self.tabs.currentChanged.connect(self._turn_page)
 
     def _lay_out(self) -> None:
         self.state = label("faint", selectable=True)
@@ -111,7 +111,7 @@ class ExportDialog(GrowingDialog):
 
     @property
     def job(self) -> ExportJob | None:
-        """The one under way."""
+        """The job under way."""
         return self._job if self._background.busy else None
 
     def choices(self) -> ExportChoices:
@@ -125,7 +125,7 @@ class ExportDialog(GrowingDialog):
         """Show a page, unless an export is under way, and bring the dialog to the front."""
         if self.job is None:
             self.tabs.setCurrentIndex(KINDS.index(kind))
-            self._turn()
+            self._turn_page()
         self.show()
         self.raise_()
         self.activateWindow()
@@ -138,15 +138,15 @@ class ExportDialog(GrowingDialog):
                 page.show_subject(subjects.get(kind))
             self._settled.start()
 
-    def _turn(self) -> None:
+    def _turn_page(self) -> None:
         for page in self.pages.values():
             page.setVisible(page is self.page)
         self.wav.setVisible(self.page.writes_wav)
         self.setWindowTitle(self.page.window_title)
-        self._update()
+        self._show_offer()
         self.adjustSize()
 
-    def _update(self) -> None:
+    def _show_offer(self) -> None:
         """Show what would be written. Nothing is, until it begins."""
         self._settled.stop()
         if self.job is not None:
@@ -155,20 +155,20 @@ class ExportDialog(GrowingDialog):
         try:
             text, words = self.page.offer()
         except (ValueError, WriteError) as error:
-            self._tell(str(error), failed=True)
+            self._show_text(str(error), failed=True)
             self.save.setEnabled(False)
             return
         self.save.setText(text)
         self.save.setEnabled(True)
         for set_for_enter in (self.save.setDefault, self.save.setAutoDefault):
             set_for_enter(text != REPLACE)  # Enter replaces no file
-        self._tell(words)
+        self._show_text(words)
 
     # Work
 
     def _start(self) -> None:
         words = self.save.text()
-        self._update()  # of choices that have not settled
+        self._show_offer()  # of choices that have not settled
         if not self.save.isEnabled() or (self.save.text() == REPLACE != words):
             return
         self._job = job = self.page.job()
@@ -178,7 +178,7 @@ class ExportDialog(GrowingDialog):
         self.close_button.setText("Cancel")
         self.bar.setValue(0)
         self.bar.show()
-        self._tell("Rendering …")
+        self._show_text("Rendering …")
         self._background.start(lambda work: job.run(work.progress))
         if (parent := self.parentWidget()) is not None:
             parent.window().activateWindow()  # whose keys play on
@@ -188,9 +188,9 @@ class ExportDialog(GrowingDialog):
         if left_s is None and share > 0:
             left_s = (time.monotonic() - self._started_s) * (1 - share) / share
         left = f", about {duration(max(left_s, 1.0))} left" if left_s else ""
-        self._tell(f"{text or 'Rendering'}{left}. {MEANWHILE}")
+        self._show_text(f"{text or 'Rendering'}{left}. {MEANWHILE}")
 
-    def _finished(self, words: str) -> None:
+    def _show_finished(self, words: str) -> None:
         if self._job is not None and self.page.writes_wav:
             for page in (self.note, self.performance):
                 page.file.follow(str(self._job.folder))
@@ -199,11 +199,11 @@ class ExportDialog(GrowingDialog):
         self.show_folder.show()
         self.ended.emit(True)
 
-    def _failed(self, message: str, _details: str) -> None:
+    def _show_failure(self, message: str, _details: str) -> None:
         self._end(message, failed=True)
         self.ended.emit(False)
 
-    def _cancelled(self) -> None:
+    def _show_cancelled(self) -> None:
         assert self._job is not None
         try:
             self._end(f"Cancelled; {self._job.cancelled()}")
@@ -212,16 +212,16 @@ class ExportDialog(GrowingDialog):
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
-        """The job is over, with this result."""
+        """End the job, with this result."""
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)
         self.close_button.setText("Close")
         self.show_subjects(self._subjects)  # as they are by now
-        self._update()
-        self._tell(text, failed)
+        self._show_offer()
+        self._show_text(text, failed)
 
-    def _tell(self, text: str, failed: bool = False) -> None:
+    def _show_text(self, text: str, failed: bool = False) -> None:
         self.state.setObjectName("warning" if failed else "faint")
         self.state.style().polish(self.state)
         self.state.setText(text)
@@ -229,7 +229,7 @@ class ExportDialog(GrowingDialog):
     def _open_folder(self) -> None:
         assert self._job is not None
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._job.folder))):
-            self._tell(f"No file manager was found here; the folder is {self._job.folder}.")
+            self._show_text(f"No file manager was found here; the folder is {self._job.folder}.")
 
     def done(self, result: int) -> None:
         """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""

@@ -232,8 +232,8 @@ class NotePage(ExportPage):
 
     def _show(self) -> None:
         decays = self.length.currentData()
-        for spin, shown in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
-            spin.setVisible(shown)
+        for spin, visible in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
+            spin.setVisible(visible)
         if self._subject is None:
             return
         note = self._subject.note
@@ -244,8 +244,8 @@ class NotePage(ExportPage):
         self.through_words.setText(_through_words(note, alone, source))
         self.what.setText(_note_words(self._subject, alone))
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
-        own = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
-        self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else own)
+        model_rate = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
+        self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else model_rate)
         self.file.suggest(note.file_name("model" if source == "files" else source))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
@@ -271,10 +271,10 @@ class PerformancePage(ExportPage):
         self._subject = subject
         if subject is not None:
             played = subject.played
-            notes = number_of(sum(isinstance(each.event, NoteOn) for each in played.events), "note")
-            heard = source_words(played.source, played.difference_gain_db)
+            notes = number_of(sum(isinstance(timed_event.event, NoteOn) for timed_event in played.events), "note")
+            source_title = source_words(played.source, played.difference_gain_db)
             self.what.setText(
-                f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {heard}"
+                f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
             self.file.suggest(f"{played.patch.name}.wav")
 
@@ -295,7 +295,9 @@ class PerformancePage(ExportPage):
 class SamplerPage(ExportPage):
     """A patch as an instrument for samplers: format, keys, layers, length, source, place."""
 
-    title, missing, writes_wav = "Sampler", "There is no instrument to export: choose one first.", False
+    title = "Sampler"
+    missing = "There is no instrument to export: choose one first."
+    writes_wav = False
 
     def __init__(self, choices: SampledChoices) -> None:
         super().__init__()
@@ -347,8 +349,8 @@ class SamplerPage(ExportPage):
             return
         patch, preset = subject.patch, subject.preset
         low, high = patch.range
-        chosen = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
-        for box, key in zip((self.lowest, self.highest), chosen, strict=True):
+        keys_range = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
+        for box, key in zip((self.lowest, self.highest), keys_range, strict=True):
             with QSignalBlocker(box):
                 box.setRange(low, high)
                 box.setValue(key)
@@ -383,24 +385,26 @@ class SamplerPage(ExportPage):
             raise ValueError(self.missing)
         if self.lowest.value() > self.highest.value():
             raise ValueError("keys: the lowest is above the highest; exchange them")
-        patch, chosen = self._subject.patch, self.choices()
+        patch, choices = self._subject.patch, self.choices()
         plan = SampledPlan(
-            patch.with_value("room.mix", 0.0) if chosen.dry else patch,
-            chosen.keys,
-            chosen.every,
-            chosen.layers,
-            chosen.seconds,
-            chosen.rate_hz,
-            source=chosen.source,
+            patch.with_value("room.mix", 0.0) if choices.dry else patch,
+            choices.keys,
+            choices.every,
+            choices.layers,
+            choices.seconds,
+            choices.rate_hz,
+            source=choices.source,
         )
-        if chosen.form != "sf2":
-            plan = replace(plan, format=chosen.form, bits=chosen.bits)
+        if choices.form != "sf2":
+            plan = replace(plan, format=choices.form, bits=choices.bits)
         return SampledExport(plan, self.file.path, self._subject.preset.path)
 
     def offer(self) -> tuple[str, str]:
         self.size_text.setText("")
         job = self.job()
-        plan, out, soundfont = job.plan, job.out, job.out.suffix.lower() == ".sf2"
+        plan = job.plan
+        out = job.out
+        soundfont = job.out.suffix.lower() == ".sf2"
         try:
             planned(plan, out)
             free = disk_usage(out.parent).free
@@ -422,7 +426,9 @@ class SamplerPage(ExportPage):
 class PluginPage(ExportPage):
     """A patch as a plug-in for a DAW: format, system, place."""
 
-    title, missing, writes_wav = "Plug-in", "There is no instrument to export: choose one first.", False
+    title = "Plug-in"
+    missing = "There is no instrument to export: choose one first."
+    writes_wav = False
 
     def __init__(self) -> None:
         super().__init__()
@@ -480,10 +486,10 @@ def _this_system() -> str:
         return next(iter(SYSTEM_NAMES))
 
 
-def _note_words(heard: HeardNote, alone: bool) -> str:
+def _note_words(subject: HeardNote, alone: bool) -> str:
     """The subject of an export: a key as the instrument plays it, or a pluck."""
-    struck = None if alone else heard.note.struck
-    return heard.words if struck is None else f"Note: {struck.words}, held, with the present settings"
+    struck = None if alone else subject.note.struck
+    return subject.words if struck is None else f"Note: {struck.words}, held, with the present settings"
 
 
 def _through_words(note: Note, alone: bool, source: Chosen) -> str:

@@ -78,8 +78,8 @@ class LearnDialog(GrowingDialog):
         self._background = Background("learn", self, expected=EXPECTED)
         self._background.progressed.connect(self._show_progress)
         self._background.finished.connect(lambda result: self._then(result))
-        self._background.failed.connect(self._failed)
-        self._background.cancelled.connect(self._cancelled)
+        self._background.failed.connect(self._show_failure)
+        self._background.cancelled.connect(self._show_cancelled)
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
@@ -115,8 +115,8 @@ class LearnDialog(GrowingDialog):
         }
         for name, part in rows.items():
             form.addRow(form_label(name), part)
-        asked = label(text="String or body?")
-        column = filled(QVBoxLayout(question), asked, self.string, form, self.body, None)
+        heading = label(text="String or body?")
+        column = filled(QVBoxLayout(question), heading, self.string, form, self.body, None)
         column.setContentsMargins(0, 0, 0, 0)
         result, sounds = QWidget(), QHBoxLayout()
         for button in self.heard.values():
@@ -170,7 +170,7 @@ class LearnDialog(GrowingDialog):
             words = "Learned all the same, although:"
         else:
             words = "Learning takes about five seconds, and shows whether a string was found."
-        self.state.setText("\n".join([words, *(f"• {each}" for each in (*refusals, *warnings))]))
+        self.state.setText("\n".join([words, *(f"• {finding}" for finding in (*refusals, *warnings))]))
         self.start.setText("Use as body" if self.body.isChecked() else "Learn")
         self.start.setEnabled(self.body.isChecked() or self.string.isChecked())
 
@@ -223,15 +223,16 @@ class LearnDialog(GrowingDialog):
         self._pair = Pair(self._output.mixer, sounds)
         self.report.setPlainText("\n".join(as_text(self._learned)))
         self._pages.setCurrentIndex(1)
-        found = self._learned.verdict.found
-        self._ready(f"Nothing is written yet. {ON_KEYS if found else NOT_FOUND}")
-        self.start.setText("Keep and play" if found else "Keep all the same")
-        self.start.setDefault(found)
-        self.start.setAutoDefault(found)
+        has_string = self._learned.verdict.found
+        self._show_ready(f"Nothing is written yet. {ON_KEYS if has_string else NOT_FOUND}")
+        self.start.setText("Keep and play" if has_string else "Keep all the same")
+        self.start.setDefault(has_string)
+        self.start.setAutoDefault(has_string)
         self.start.setEnabled(True)
         self.heard["learned"].setFocus()
 
     def _hear(self, name: str) -> None:
+        """Play the sound of a button, or stop where none is checked."""
         for key, button in self.heard.items():
             button.setChecked(key == name and button.isChecked())
         if self._pair is None:
@@ -245,7 +246,9 @@ class LearnDialog(GrowingDialog):
     # The end
 
     def _keep(self) -> None:
-        learned, name, kind = self._learned, self.name.text(), self.kind.currentData()
+        learned = self._learned
+        name = self.name.text()
+        kind = self.kind.currentData()
 
         def work(job: Job) -> Any:
             from app.instrument.learned import keep
@@ -262,7 +265,7 @@ class LearnDialog(GrowingDialog):
         self.instrument_kept.emit(kept)
         self.accept()
 
-    def _failed(self, message: str, _details: str) -> None:
+    def _show_failure(self, message: str, _details: str) -> None:
         from app.instrument.learned import Reasons
 
         if self._against is None:  # not even examined: it can only be a body
@@ -271,14 +274,14 @@ class LearnDialog(GrowingDialog):
             self.body.setChecked(True)
             self._show_choice()
             return
-        self._ready(message)
+        self._show_ready(message)
         self.start.setEnabled(True)
 
-    def _cancelled(self) -> None:
-        self._ready("Cancelled. Learn continues there.")
+    def _show_cancelled(self) -> None:
+        self._show_ready("Cancelled. Learn continues there.")
         self.start.setEnabled(True)
 
-    def _ready(self, words: str) -> None:
+    def _show_ready(self, words: str) -> None:
         self.bar.hide()
         self._pages.setEnabled(True)
         self.state.setText(words)

@@ -51,7 +51,7 @@ class MidiDialog(QDialog):
     forget_asked = Signal(str)
     patch_turned = Signal(str, object)  # a field of the patch, and its value
 
-    def __init__(self, turned: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
+    def __init__(self, names: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
@@ -62,7 +62,7 @@ class MidiDialog(QDialog):
         self._notes.setToolTip("Velocity always sets how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
         self._channels = combo_box("Channels", CHANNELS)
-        self._bends = combo_box("Bend range", [(_semitones(each), each) for each in BENDS])
+        self._bends = combo_box("Bend range", [(_semitones(semitones), semitones) for semitones in BENDS])
         turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
         self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
         self._bends_by = combo_box("Pitch bend changes", BENDS_BY)
@@ -75,7 +75,7 @@ class MidiDialog(QDialog):
             box.setToolTip(f"{tip}.\n{OF_THE_PATCH}")
             box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
         self._problem = label("warning", selectable=True)
-        self._turned = turned
+        self._turned = names
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
         for name, box in (
@@ -96,32 +96,32 @@ class MidiDialog(QDialog):
         column.addWidget(self._problem)
         column.addWidget(faint("CONTROLLERS"))
         rows = QWidget()
-        rows.setLayout(self._build_rows(turned))
+        rows.setLayout(self._build_rows(names))
         column.addWidget(scrolled(rows), stretch=1)
         close = push_button("Close", "Close the dialog; MIDI plays on (Escape)")
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
         self.set_learnable("")
 
-    def _build_rows(self, turned: Mapping[str, str]) -> QGridLayout:
+    def _build_rows(self, names: Mapping[str, str]) -> QGridLayout:
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)
-        for row, (field, name) in enumerate(turned.items()):
+        for row, (field, name) in enumerate(names.items()):
             taught = Label()
             learn, forget = push_button("Learn"), push_button("Forget", f"Unassign {name}")
             learn.setCheckable(True)
             learn.setAccessibleName(f"Assign a controller to {name}")
             forget.setAccessibleName(f"Unassign {name}")
-            for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
-                button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
+            for button, signal in ((learn, self.learn_asked), (forget, self.forget_asked)):
+                button.clicked.connect(lambda _=False, signal=signal, field=field: signal.emit(field))
             for place, widget in enumerate((Label(name[:1].upper() + name[1:]), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget
         return grid
 
     def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
-        """The inputs that are connected, and the one that is open; `problem`: why there are none."""
+        """Show the inputs that are connected, and the one that is open; `problem`: why there are none."""
         with QSignalBlocker(self._inputs):
             self._inputs.clear()
             self._inputs.addItem("None" if names else "No MIDI input found", "")
@@ -149,7 +149,7 @@ class MidiDialog(QDialog):
             box.setEnabled(turnable)
 
     def set_learnable(self, why_not: str) -> None:
-        """`why_not`: why no controller can be assigned, with the remedy; "" where one can."""
+        """Show why no controller can be assigned, with the remedy; "" where one can."""
         for field, (_, learn, _) in self._rows.items():
             learn.setEnabled(not why_not)
             learn.setToolTip(why_not or f"Click, then move a control to assign it to {self._turned[field]}")

@@ -51,12 +51,12 @@ def preset_browser(parent: QWidget | None = None) -> Browser:
 
 def preset_row(entry: PresetEntry) -> Row:
     """The row of a preset in the browser: studio presets before research ones; unknown errors come last."""
-    info, heard = entry.info, heard_word(entry.heard)
+    info, test_result = entry.info, heard_word(entry.heard)
     model, rate = model_word(info.model), rate_word(info.rate_hz)
     kind = string_word(info.tension_modulated)
     searched = (
         *(info.title, entry.name, info.description, info.model, model, kind),
-        *(initial_word(info.initial), rate, f"{info.rate_hz}", heard),
+        *(initial_word(info.initial), rate, f"{info.rate_hz}", test_result),
     )
     distance_db = None if entry.heard is None else entry.heard.distance_db
     return Row(
@@ -66,7 +66,7 @@ def preset_row(entry: PresetEntry) -> Row:
         " ".join(searched).casefold(),
         ((info.string_kind, STRINGS[info.string_kind]), (info.model, model), (info.rate_hz, rate)),
         lambda: preset_card(entry),
-        ((rate, ""), (error_word(info), ""), (heard, heard_sentence(entry.heard, entry.name))),
+        ((rate, ""), (error_word(info), ""), (test_result, heard_sentence(entry.heard, entry.name))),
         f"{entry.title}\n{model}, {kind}\n{entry.path.name}",
         tuple((known is None, known or 0.0) for known in (distance_db, 0.0, info.rel_mae)),
     )

@@ -40,9 +40,9 @@ class HeadFrame:
 
 def fitting_scale_m(largest_m: float, air: float = 1.0) -> float:
     """The least of the round numbers that is at least `air` times a displacement."""
-    wanted = max(largest_m * air, LEAST_M)
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return next((step * decade for step in STEPS if step * decade >= wanted * (1 - 1e-9)), 10 * decade)
+    least_m = max(largest_m * air, LEAST_M)
+    decade = 10.0 ** math.floor(math.log10(least_m))
+    return next((step * decade for step in STEPS if step * decade >= least_m * (1 - 1e-9)), 10 * decade)
 
 
 def kept_scale_m(largest_m: float, before_m: float) -> float:
@@ -61,9 +61,9 @@ def image_of(picture_m: NDArray[np.float32], scale_m: float) -> QImage:
 
 @lru_cache(maxsize=4)
 def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
-    """(COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
+    """The colours (COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
     colours = [QColor(name) for name in ends_and_rest]
-    stops = np.array([(each.red(), each.green(), each.blue()) for each in colours], np.float64)
+    stops = np.array([(colour.red(), colour.green(), colour.blue()) for colour in colours], np.float64)
     places = np.linspace(-1, 1, COLOURS)
     red, green, blue = (np.rint(np.interp(places, (-1, 0, 1), part)).astype(np.uint32) for part in stops.T)
     return np.asarray(0xFF000000 | red << 16 | green << 8 | blue, np.uint32)
@@ -72,7 +72,7 @@ def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
 def paint_motion(
     painter: QPainter, axes: HeadAxes, head: int, picture_m: NDArray[np.float32], scale_m: float
 ) -> None:
-    """The colours of a picture within the drum's edge; its outer points lie on the edge."""
+    """Paint the colours of a picture within the drum's edge; its outer points lie on the edge."""
     area, (rows, columns) = axes.rect(head), picture_m.shape
     aside, above = area.width() / (columns - 1) / 2, area.height() / (rows - 1) / 2
     painter.save()
@@ -83,12 +83,12 @@ def paint_motion(
 
 
 def paint_rest(painter: QPainter, axes: HeadAxes, head: int) -> None:
-    """The drum at rest."""
+    """Paint the drum at rest."""
     painter.fillPath(axes.outline(head), QColor(theme.PANEL))
 
 
 def paint_edge(painter: QPainter, axes: HeadAxes, head: int, source: ShownSource | None) -> None:
-    """The edge in the colour of its source; a bar is held at its ends alone."""
+    """Paint the edge in the colour of its source; a bar is held at its ends alone."""
     colour = theme.FAINT if source is None else theme.SOURCE_COLOURS[theme.source_kind(source.source)]
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(QColor(colour), 2.5))
@@ -129,7 +129,7 @@ def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
 
 
 def paint_listening(painter: QPainter, axes: HeadAxes, points: Mapping[str, float], grabbed: str | None) -> None:
-    """The directions that the drum is heard from, as feet below the first picture, with their angles."""
+    """Paint the directions that the drum is heard from, as feet below the first picture, with their angles."""
     for side, point in points.items():
         x, y = axes.x(0, point), axes.bottom
         painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if side == grabbed else 120), 1))
@@ -149,7 +149,7 @@ def angle_words(point: float) -> str:
 
 
 def paint_caption(painter: QPainter, axes: HeadAxes, text: str) -> None:
-    """The time that is shown, in the lower right corner."""
+    """Paint the time that is shown, in the lower right corner."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.TEXT))
     area = QRectF(MARGIN_X, axes.height - 22, axes.width - 2 * MARGIN_X, 18)

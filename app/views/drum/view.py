@@ -39,7 +39,9 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
     "right": MARK_TIP.replace("Shift", "Ctrl, Shift"),
 }
 
-_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+_Key = Qt.Key
+_Shift = Qt.KeyboardModifier.ShiftModifier
+_Control = Qt.KeyboardModifier.ControlModifier
 
 
 class DrumView(StageView):
@@ -62,9 +64,11 @@ class DrumView(StageView):
     # What is shown
 
     def set_drum(self, name: str, shape: Shape, sides: tuple[float, float]) -> None:
-        """The drum that a click strikes; `sides`: its length and width in m."""
+        """Set the drum that a click strikes; `sides`: its length and width in m."""
         if (name, shape, sides) != (self._name, self._shape, self._sides):
-            self._name, self._shape, self._sides = name, shape, sides
+            self._name = name
+            self._shape = shape
+            self._sides = sides
             self._frame = None
             self._describe()
             self.update()
@@ -76,22 +80,22 @@ class DrumView(StageView):
         self.update()
 
     def _describe(self) -> None:
-        heard = " and ".join(angle_words(point) for point in self._listening.values())
-        where = f", heard from {heard}" if heard else ""
+        angles = " and ".join(angle_words(point) for point in self._listening.values())
+        where = f", heard from {angles}" if angles else ""
         self.setAccessibleDescription(f"{self._name}, struck at {place_words(self._place)}{where}")
 
     def set_listening_points(self, left: float, right: float | None = None) -> None:
-        """The directions the drum is heard from; `right` is None in mono."""
+        """Set the directions the drum is heard from; `right` is None in mono."""
         self._listening = {"left": left} if right is None else {"left": left, "right": right}
         self._describe()
         self.update()
 
     def set_motion(self, shown: bool) -> None:
-        """The state of the button; the frames given to `show_frame` should agree with it."""
+        """Set the state of the button; the frames given to `show_frame` should agree with it."""
         self._toggles[0].setChecked(shown)
 
     def show_frame(self, frame: HeadFrame | None) -> None:
-        """A moment of the motion; None: at rest."""
+        """Show a moment of the motion; None: at rest."""
         before, self._frame = self._frame, frame
         if frame is None:
             self._scales_m = {}
@@ -147,17 +151,17 @@ class DrumView(StageView):
             self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key, 0)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key, 0)
-        if sideways and held & _Shift:
-            self._step_mark(held, sideways)
-        elif (sideways or upwards) and not held & _Control:
-            step = FINE_STEP if held & _Shift else STEP
+        if sideways and modifiers & _Shift:
+            self._step_mark(modifiers, sideways)
+        elif (sideways or upwards) and not modifiers & _Control:
+            step = FINE_STEP if modifiers & _Shift else STEP
             place = self._place[0] + step * sideways, self._place[1] + step * upwards
             if self.axes.holds(place):
                 self.place_moved.emit(*place)
-        elif key == _Key.Key_Delete and held & _Shift:
+        elif key == _Key.Key_Delete and modifiers & _Shift:
             self._reset_marks()
         elif key == _Key.Key_Delete:
             self.place_reset.emit()

@@ -1,8 +1,8 @@
 """The strings of a patch: a neck with frets, or a fan of many strings. What sounds is lit where it is stopped.
 
 A few strings are rows, the highest on top, with fret n at 1 - 2^(-n/12) of the length from the nut. Many strings, or
-one that is shortened for every key, stand side by side, each as long as its key leaves it (drawn as the square root,
-or the highest would be too short to see).
+one that is shortened for every key, stand side by side, each as long as its key leaves it. The square root of the
+length is drawn, or the highest would be too short to see.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Neck(Playable):
     A click plays the string that was clicked. Keys of others play the highest string at or below them, as patches do.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
-    those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.
+    those without a finger sound open, wherever they are clicked. So chords can be strummed with one mouse.
     """
 
     fingered = Signal(bool)  # whether there are fingers
@@ -71,7 +71,7 @@ class Neck(Playable):
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
         """Show strings of a neck where they are stopped, which lies between two frets while they slide."""
-        shown: dict[tuple[int, float], int] = {}
+        strings: dict[tuple[int, float], int] = {}
         for note in notes if self.in_rows else ():
             string = len(self._strings) - 1 - note.string
             if not 0 <= note.string < len(self._strings):
@@ -80,10 +80,10 @@ class Neck(Playable):
             fret = min(max(fret, 0.0), float(self.frets))
             step = round(min(max(note.level, 0.0), 1.0) * LEVEL_STEPS)
             if step > 0:
-                shown[string, fret] = max(step, shown.get((string, fret), 0))
-        for string, _ in {at for at in self._stops.keys() | shown.keys() if self._stops.get(at) != shown.get(at)}:
+                strings[string, fret] = max(step, strings.get((string, fret), 0))
+        for string, _ in {at for at in self._stops.keys() | strings.keys() if self._stops.get(at) != strings.get(at)}:
             self.update(self.cell(string, 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
-        self._stops = shown
+        self._stops = strings
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
         """Name and open key of each; none or one that is fretted for every key is shown as a fan."""
@@ -190,8 +190,8 @@ class Neck(Playable):
         if not self.in_rows:
             return super().typed(all_strings)
         rows = range(len(self._strings)) if all_strings else [self._row_of(self.chosen)]
-        found = [self._stopped(row, self._strings[row][1] + self._fret_of(self.chosen)) for row in rows]
-        return [spot for spot in found if self.sounds(spot.key)]
+        spots = [self._stopped(row, self._strings[row][1] + self._fret_of(self.chosen)) for row in rows]
+        return [spot for spot in spots if self.sounds(spot.key)]
 
     def _row_at(self, at: QPointF) -> int:
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)
@@ -233,7 +233,7 @@ class Neck(Playable):
             self._put_finger(string, key - self._strings[string][1])
 
     def _put_finger(self, string: int, fret: int) -> None:
-        """Lift it where it is already, or at the nut."""
+        """Put a finger on a string; lift it where it is already, or at the nut."""
         if fret <= 0 or self._fingers.get(string) == fret:
             self._fingers.pop(string, None)
         else:
@@ -376,7 +376,7 @@ class Neck(Playable):
         painter.drawEllipse(middle, *(2 * [self._dot / 2]))
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
-        """A dot where a string is stopped, and what swings of it."""
+        """Paint a dot where a string is stopped, and what swings of it."""
         size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
@@ -403,7 +403,7 @@ class Neck(Playable):
         painter.drawPath(swing)
 
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
-        """A key's string in the fan; gives its end."""
+        """Paint a key's string in the fan; return its end."""
         length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - theme.px(_FOOT) - 8)
         x = self._column(key).center().x()
         thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)

@@ -1,6 +1,6 @@
 """The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play.
 
-In a low window the string's knobs take the place of the keys and the switches of techniques, so that the strip is no
+In a low window the string's knobs take the place of the keys and the switches of techniques. So the strip is no
 higher with them.
 """
 
@@ -99,9 +99,9 @@ class InstrumentPanel(QFrame):
         self.keys = PianoKeys()
         self.neck = Neck()
         self.knobs = StringKnobs()
-        for played in (self.keys, self.neck):
-            played.pressed.connect(self._press)
-            played.released.connect(self.released)
+        for surface in (self.keys, self.neck):
+            surface.pressed.connect(self._press)
+            surface.released.connect(self.released)
         self._drums = False
         self.touch = Segments("Key while another is held", _TOUCHES)
         self.touch.chosen.connect(self._choose_touch)
@@ -180,14 +180,14 @@ class InstrumentPanel(QFrame):
 
     @property
     def surface(self) -> str:
-        """ "keys" or "neck"."""
+        """The shown surface, "keys" or "neck"."""
         return self._choice.key
 
     def show_surface(self, surface: str) -> None:
         self._choice.show_key(surface)
-        shown = "keys" if self._drums else surface
-        self._stack.setCurrentWidget(self.keys if shown == "keys" else self.neck)
-        self._hint.setText(HINTS[shown])
+        shown_surface = "keys" if self._drums else surface
+        self._stack.setCurrentWidget(self.keys if shown_surface == "keys" else self.neck)
+        self._hint.setText(HINTS[shown_surface])
         self._place_hint()
         self._show_lift()
 
@@ -253,12 +253,12 @@ class InstrumentPanel(QFrame):
         self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
-        """The lowest and the highest key that have a string."""
+        """Set the lowest and the highest key that have a string."""
         self.keys.set_range(low, high)
         self.neck.set_range(low, high)
 
     def set_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """The octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
+        """Set the octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
         self.bar.show_octave(octave, lowest, highest)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
@@ -289,7 +289,7 @@ class InstrumentPanel(QFrame):
         self.neck.show_notes(notes)
 
     def show_source(self, source: str) -> None:
-        """The source that is heard, in whose colour keys are lit."""
+        """Show the source that is heard, in whose colour keys are lit."""
         self.keys.show_source(source)
         self.neck.show_source(source)
 

@@ -95,11 +95,11 @@ class PatchBar(QFrame):
         self._before_macros = vertical_rule()
         self._before_macros.hide()
         row.addWidget(self._before_macros)
-        turned = QHBoxLayout()
-        turned.setSpacing(0)
+        knob_row = QHBoxLayout()
+        knob_row.setSpacing(0)
         for knob in self.macros:
-            turned.addWidget(knob)
-        row.addLayout(turned)
+            knob_row.addWidget(knob)
+        row.addLayout(knob_row)
         row.addWidget(vertical_rule())
         row.addLayout(self._build_sound())
 
@@ -253,21 +253,21 @@ class PatchBar(QFrame):
             knob.set_narrow(close)
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
-        """The name and the title of each; "No body", of the name "", is always listed."""
-        chosen = self.body.currentData()
+        """Set the name and the title of each; "No body", of the name "", is always listed."""
+        chosen_body = self.body.currentData()
         with QSignalBlocker(self.body):
             self.body.clear()
             for name, title in (("", "No body"), *(body for body in bodies if body[0])):
                 self.body.addItem(title, name)
-            self._show_body(chosen or "")
+            self._show_body(chosen_body or "")
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
-        """`own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
+        """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")
-        reported = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
-        self.name.setToolTip(plain_tip(f"{reported}\nClick to browse the instruments"))
+        tip = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
+        self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))
         self.category.setText(patch.category)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)
@@ -334,12 +334,12 @@ class PatchBar(QFrame):
         self.body.setCurrentIndex(row)
 
     def show_voices(self, voices: int, most: int | None = None) -> None:
-        """The number of voices that ring, and the most that may."""
+        """Show the number of voices that ring, and the most that may."""
         of = f" of {most}" if most is not None else ""
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """The octave of the lowest of the computer's keys, of those at which a key sounds."""
+        """Show the octave of the lowest of the computer's keys, of those at which a key sounds."""
         self.octave.setText(f"octave C{octave}")
         self._lower.setEnabled(octave > lowest)
         self._higher.setEnabled(octave < highest)
@@ -383,7 +383,9 @@ class PatchBar(QFrame):
             text, name = "●  Unsaved  ▾", "Recording that is not saved"
             tip = "What was played is not saved yet: save it, or discard it to record again"
         else:
-            text, name, tip = "●  Record", "Record what is played", "Record what is played"
+            text = "●  Record"
+            name = "Record what is played"
+            tip = "Record what is played"
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)

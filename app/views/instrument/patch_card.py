@@ -51,8 +51,8 @@ def patch_card(entry: PatchEntry) -> str:
     low, high = patch.range
     strings = "one string, shortened for every key"
     if patch.strings.kind == "drums":
-        each = "a key each" if patch.strings.keys == "pads" else "tuned to every key"
-        strings = f"{len(patch.strings.drums)} drums, {each}" if len(patch.strings.drums) > 1 else f"one drum, {each}"
+        keys = "a key each" if patch.strings.keys == "pads" else "tuned to every key"
+        strings = f"{len(patch.strings.drums)} drums, {keys}" if len(patch.strings.drums) > 1 else f"one drum, {keys}"
     elif patch.strings.kind == "set":
         strings = f"{len(patch.strings.strings)} strings"
     lines = [strings, f"{note_name(low)} to {note_name(high)}"]

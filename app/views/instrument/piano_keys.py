@@ -40,7 +40,7 @@ def shown_range(low: int, high: int) -> tuple[int, int]:
 
 
 class PianoKeys(Playable):
-    """Shows whole octaves; keys without a string are grey."""
+    """Piano keys in whole octaves; those without a string are grey."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("On-screen keyboard", TIP, parent)
@@ -59,14 +59,14 @@ class PianoKeys(Playable):
 
     # Where keys are
 
-    def _white(self, key: int) -> int:
+    def _white_keys_before(self, key: int) -> int:
         """The number of white keys left of a key."""
         return 7 * ((key - self._first) // 12) + _WHITE_BEFORE[key % 12]
 
     @property
     def _pitch(self) -> float:
         """The distance of white keys, in pixels."""
-        return self.width() / (self._white(self._last) + 1)
+        return self.width() / (self._white_keys_before(self._last) + 1)
 
     @property
     def _letter_size(self) -> int:
@@ -76,7 +76,7 @@ class PianoKeys(Playable):
     def key_rect(self, key: int) -> QRectF:
         if not self._first <= key <= self._last:
             return QRectF()
-        left = self._white(key) * self._pitch
+        left = self._white_keys_before(key) * self._pitch
         if not is_black(key):
             return QRectF(left, 0, self._pitch, self.height())
         width = BLACK_WIDTH * self._pitch
@@ -101,36 +101,36 @@ class PianoKeys(Playable):
     def paint_rest(self, painter: QPainter) -> None:
         painter.fillRect(self.rect(), QColor(theme.LINE))  # between the keys
         for key in sorted(range(self._first, self._last + 1), key=is_black):  # black ones lie above
-            self._paint_key(painter, key, QColor(_own(key)) if self.sounds(key) else _mute(key))
+            self._paint_key(painter, key, QColor(_own(key)) if self.sounds(key) else _silent_colour(key))
 
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
         marked = self.marked
         covering = {black for key in marked for black in (key - 1, key + 1) if is_black(black) and not is_black(key)}
         for key in sorted(marked | covering, key=is_black):
             if self.key_rect(key).intersects(dirty):
-                self._paint_key(painter, key, self._filling(key))
+                self._paint_key(painter, key, self._fill_colour(key))
                 if key in self.held:
                     self._paint_pin(painter, key)
         if self.shows_cursor:
             key = self.chosen.key
-            painter.setPen(QPen(QColor(_ink(self._filling(key))), 1.5))
+            painter.setPen(QPen(QColor(_ink(self._fill_colour(key))), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
 
     def _paint_pin(self, painter: QPainter, key: int) -> None:
-        """A dot on a key that stays down by itself."""
+        """Paint a dot on a key that stays down by itself."""
         rect = self.key_rect(key)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(_ink(self._filling(key))))
+        painter.setBrush(QColor(_ink(self._fill_colour(key))))
         painter.drawEllipse(QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38)), 2.5, 2.5)
 
-    def _filling(self, key: int) -> QColor:
+    def _fill_colour(self, key: int) -> QColor:
         if not self.sounds(key):
-            return _mute(key)
-        level, own = self.level(key), _own(key)
+            return _silent_colour(key)
+        level, key_colour = self.level(key), _own(key)
         if level > 0:
-            return theme.blended(self.colour.name(), own, 0.35 + 0.65 * level)
-        return theme.blended(theme.FAINT, own, 0.45) if self.is_down(key) else QColor(own)
+            return theme.blended(self.colour.name(), key_colour, 0.35 + 0.65 * level)
+        return theme.blended(theme.FAINT, key_colour, 0.45) if self.is_down(key) else QColor(key_colour)
 
     def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
         rect = self.key_rect(key)
@@ -150,7 +150,7 @@ class PianoKeys(Playable):
             self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
 
     def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
-        """A word on a key, `above` pixels above its lower edge."""
+        """Paint a word on a key, `above` pixels above its lower edge."""
         painter.setFont(theme.small_font(size, bold=above > 16, grows=False))
         place = QRectF(key.left() - 4, key.bottom() - theme.px(above), key.width() + 8, theme.px(13))
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
@@ -162,7 +162,7 @@ def _own(key: int) -> str:
     return pick(theme.TEXT, theme.RAISED, theme.BACKGROUND, key=lambda colour: QColor(colour).lightness())
 
 
-def _mute(key: int) -> QColor:
+def _silent_colour(key: int) -> QColor:
     """The colour of a key without a string."""
     return theme.blended(_own(key), theme.LINE, 0.3)
 

@@ -99,7 +99,7 @@ class Playable(QWidget):
         return None if key is None else Spot(key)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
-        """The spots that the mouse meets on its way, without the first, and with where it is."""
+        """The spots on the mouse's way from one point to another, without the first and with the last."""
         spot = self.spot_at(at)
         return [] if spot is None else [spot]
 
@@ -134,7 +134,7 @@ class Playable(QWidget):
     # What is shown
 
     def set_range(self, low: int, high: int) -> None:
-        """The lowest and the highest key that have a string."""
+        """Set the lowest and the highest key that have a string."""
         if (low, high) != (self._low, self._high):
             self.release_all()
             self._low, self._high = low, high
@@ -162,7 +162,7 @@ class Playable(QWidget):
         self._levels = steps
 
     def show_source(self, source: str) -> None:
-        """The source that is heard, in whose colour keys are lit."""
+        """Show the source that is heard, in whose colour keys are lit."""
         if source != self._source:
             self._source = source
             self.update()
@@ -273,7 +273,9 @@ class Playable(QWidget):
                 self._held.add(spot)
                 self._press(spot, velocity)
         elif event.button() == Qt.MouseButton.LeftButton:
-            self._down, self._at, self._clicked = spot, event.position(), velocity
+            self._down = spot
+            self._at = event.position()
+            self._clicked = velocity
             self._press(spot, velocity)
         self._show_velocity(event.position(), velocity)
 
@@ -297,7 +299,7 @@ class Playable(QWidget):
         """Play what the mouse has met next."""
         before, self._down = self._down, spot
         assert before is not None
-        for left in [each for each in self._strummed if each.string == spot.string]:
+        for left in [other for other in self._strummed if other.string == spot.string]:
             self._strummed.remove(left)
             self._release_left(left)
         if not self.legato and before.string != spot.string:

@@ -17,7 +17,9 @@ from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, SHAPE_TIP, shape_box
 from engine.pluck import SHAPES
 
-HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
+HEAD_HEIGHT = 13
+FACTS_HEIGHT = 16
+SPACING = 4
 WIDTHS = {  # in pixels, by the longest name or value
     "tuning.transpose": 58,
     "knobs.gauge": 56,
@@ -116,15 +118,15 @@ class StringKnobs(QWidget):
         row.setSpacing(0)
         if group == PLUCK:
             row.addLayout(self._shape_column())
-        for each in in_group(group):
-            knob = Knob(each)
+        for parameter in in_group(group):
+            knob = Knob(parameter)
             knob.set_low(True)
-            knob.set_width(WIDTHS.get(each.id, NARROW_WIDTH))
-            knob.figure_asked.connect(lambda value, field=each.id: self.figure_asked.emit(field, value))
-            knob.value_asked.connect(lambda value, field=each.id: self._ask(field, value))
+            knob.set_width(WIDTHS.get(parameter.id, NARROW_WIDTH))
+            knob.figure_asked.connect(lambda value, field=parameter.id: self.figure_asked.emit(field, value))
+            knob.value_asked.connect(lambda value, field=parameter.id: self._ask(field, value))
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
-            self.knobs[each.id] = knob
+            self.knobs[parameter.id] = knob
             row.addWidget(knob)
         column = QVBoxLayout()
         column.setSpacing(0)
@@ -148,7 +150,7 @@ class StringKnobs(QWidget):
         self.changed.emit(field, round(value) if OF_PATCHES[field].whole else value)
 
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
-        """`saved`: the values that a double-click resets to."""
+        """Show the values of a patch; `saved`: those that a double-click resets to."""
         for field, knob in self.knobs.items():
             value = patch.value(field)
             knob.set_barred(_why_barred(patch, field))
@@ -162,7 +164,7 @@ class StringKnobs(QWidget):
         self.shape.setToolTip(barred or SHAPE_TIP)
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
-        """The resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
+        """Show the resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
         self.facts.show_facts(facts)
 
     def show_figures(self, figures: Mapping[str, str]) -> None:

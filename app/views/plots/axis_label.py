@@ -80,11 +80,11 @@ class UprightTicks:
 
 def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float, str]]:
     """Select the `ticks` that are at least `room` apart, the first and the last before the others."""
-    kept: list[tuple[float, str]] = []
+    sparse_ticks: list[tuple[float, str]] = []
     for tick in (*ticks[:1], *ticks[:0:-1][:1], *ticks[1:-1]):
-        if all(abs(tick[0] - other) >= room for other, _ in kept):
-            kept.append(tick)
-    return sorted(kept)
+        if all(abs(tick[0] - other) >= room for other, _ in sparse_ticks):
+            sparse_ticks.append(tick)
+    return sorted(sparse_ticks)
 
 
 def frequency_ticks() -> list[tuple[float, str]]:

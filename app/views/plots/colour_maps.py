@@ -18,12 +18,12 @@ _COLOURS = 511  # odd: one of them is zero
 
 def displacement_map() -> pg.ColorMap:
     """The colours of displacement: below 0 blue, above 0 red, at 0 the background."""
-    return _grounded("CET-D4", 0.5, theme.PANEL)
+    return _shift_to_ground("CET-D4", 0.5, theme.PANEL)
 
 
 def error_map() -> pg.ColorMap:
     """Amber where the model lies above the truth, blue where the truth lies above the model."""
-    return _grounded("CET-D6", 0.5, theme.PANEL)
+    return _shift_to_ground("CET-D6", 0.5, theme.PANEL)
 
 
 def magnitudes_of(signed: pg.ColorMap) -> pg.ColorMap:
@@ -37,7 +37,7 @@ def level_map() -> pg.ColorMap:
 
     In the light theme they go by amber and red to dark blue.
     """
-    return _grounded("inferno" if theme.is_dark() else "CET-L17", 0.0, theme.PANEL)
+    return _shift_to_ground("inferno" if theme.is_dark() else "CET-L17", 0.0, theme.PANEL)
 
 
 def share_map() -> pg.ColorMap:
@@ -51,13 +51,13 @@ def share_map() -> pg.ColorMap:
 
 
 @lru_cache
-def _grounded(name: str, ground_at: float, panel: str) -> pg.ColorMap:
-    """pyqtgraph's map `name`, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
+def _shift_to_ground(name: str, ground_at: float, panel: str) -> pg.ColorMap:
+    """The pyqtgraph map, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
     places = np.linspace(0, 1, _COLOURS)
     source = pg.colormap.get(name)
     colours = np.asarray(source.map(places, mode="float"))[:, :3]
     ground = np.array(QColor(panel).getRgbF()[:3])  # type: ignore[index]
     dark = np.asarray(source.map(ground_at, mode="float"))[:3]
     nearness = 1 - np.abs(places - ground_at) / max(ground_at, 1 - ground_at)
-    moved = np.clip(colours + (ground - dark) * nearness[:, None], 0, 1)
-    return pg.ColorMap(places, (255 * moved).round().astype(np.uint8))
+    shifted_colours = np.clip(colours + (ground - dark) * nearness[:, None], 0, 1)
+    return pg.ColorMap(places, (255 * shifted_colours).round().astype(np.uint8))

@@ -96,9 +96,9 @@ class FiguresTable(QTableWidget):
 
     def show_rows(self, rows: Sequence[TableRow]) -> None:
         """Replace all rows; the chosen one stays chosen where it is still there."""
-        chosen = self.chosen_key
+        key = self.chosen_key
         self._fill(rows)
-        self.choose(chosen)
+        self.choose(key)
 
     def _fill(self, rows: Sequence[TableRow]) -> None:
         self.setSortingEnabled(False)
@@ -181,8 +181,8 @@ class _Cell(QTableWidgetItem):
         self.setToolTip(plain_tip(row.tip))
         if row.bold:
             self.setFont(theme.small_font(12, bold=True))
-        own = theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
-        self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else own))
+        column_colour = theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
+        self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else column_colour))
 
     def __lt__(self, other: QTableWidgetItem) -> bool:
         one, another = self._value, cast("_Cell", other)._value
@@ -193,7 +193,7 @@ class _Cell(QTableWidgetItem):
 
 
 class _OwnColours(QStyledItemDelegate):
-    """Keeps the colours of the columns in the selected row."""
+    """A delegate that keeps the colours of the columns in the selected row."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)

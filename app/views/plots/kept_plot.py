@@ -13,10 +13,10 @@ STRIP = 2  # pixels to either side of the line that are painted with it
 
 
 class KeptPlot(pg.PlotWidget):
-    """`move_line` puts a vertical line at a place on the horizontal axis. All else is a plot as any other.
+    """A plot with a vertical line, which `move_line` puts at a place on the horizontal axis.
 
-    Where only the line has moved, its old and new strips are painted from a picture of the plot, which is made when
-    it is first wanted after the plot has changed.
+    Where only the line has moved, its old and new strips are painted from a picture of the plot. The picture is made
+    when it is first needed after the plot has changed.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -42,8 +42,8 @@ class KeptPlot(pg.PlotWidget):
             self.viewport().update(changed)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        moved, self._moved = self._moved, QRegion()
-        if not event.region().subtracted(moved).isEmpty():
+        strips, self._moved = self._moved, QRegion()
+        if not event.region().subtracted(strips).isEmpty():
             self._picture = None
             self._next_strip = self._line_strip()
             super().paintEvent(event)

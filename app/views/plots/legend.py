@@ -53,7 +53,7 @@ class Legend(QWidget):
         return "   ".join([*([self._part] if self._part else []), *map(_caption, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """`part`: which part of the sound they are of, written before them; "" for all of it."""
+        """Show the sources; `part`: the part of the sound, written before them; "" for all of it."""
         self._sources, self._part = sources, part
         self.setAccessibleName(f"Drawn: {self.text}")
         self._place()
@@ -90,18 +90,18 @@ def _caption(source: ShownSource) -> str:
 
 def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
     """The text of each: whole; where too wide without “heard”, which the colour shows; then with cut titles."""
-    for reported in (sources, [replace(source, heard=False) for source in sources]):
-        if _width(texts := [_caption(source) for source in reported], metrics) <= room:
+    for wording in (sources, [replace(source, heard=False) for source in sources]):
+        if _width(texts := [_caption(source) for source in wording], metrics) <= room:
             return texts
-    titles = room - _width([_caption(replace(source, title="")) for source in reported], metrics)
-    needed = [metrics.horizontalAdvance(source.title) for source in reported]
+    titles = room - _width([_caption(replace(source, title="")) for source in wording], metrics)
+    needed = [metrics.horizontalAdvance(source.title) for source in wording]
     for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
         needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
         titles -= needed[place]
     elide = Qt.TextElideMode.ElideMiddle
     return [
         _caption(replace(source, title=metrics.elidedText(source.title, elide, room)))
-        for source, room in zip(reported, needed, strict=True)
+        for source, room in zip(wording, needed, strict=True)
     ]
 
 
@@ -114,8 +114,8 @@ def set_curves(
     plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
 ) -> None:
     """Add curves that `curves` lacks, remove those of other sources, and set the pen and the order of all."""
-    shown = {source.source for source in sources}
-    for gone in [name for name in curves if name not in shown]:
+    names = {source.source for source in sources}
+    for gone in [name for name in curves if name not in names]:
         plot.removeItem(curves.pop(gone))
     for source in sources:
         if source.source not in curves:

@@ -1,7 +1,7 @@
 """The parts that all plots share: the colours of background and axes, and their change with the theme.
 
-A plot keeps the pens and brushes that it was made with. When the theme changes, every colour of the old one is
-exchanged for that of the same role in the new one, and keeps its alpha. So no view needs to follow the theme.
+A plot keeps the pens and brushes that it was made with. When the theme changes, the colour of the same role in
+the new one replaces each old one, which leaves its alpha. So no view needs to follow the theme.
 """
 
 from __future__ import annotations
@@ -45,20 +45,20 @@ class _Swap:
         pairs = zip(astuple(old), astuple(new), strict=True)
         self._colours = {QColor(a).rgb(): QColor(b) for a, b in pairs if isinstance(a, str)}
 
-    def colour(self, given: QColor) -> QColor:
-        opaque = QColor(given)
+    def colour(self, colour: QColor) -> QColor:
+        opaque = QColor(colour)
         opaque.setAlpha(255)
-        swapped = QColor(self._colours.get(opaque.rgb(), given))
-        swapped.setAlpha(given.alpha())
+        swapped = QColor(self._colours.get(opaque.rgb(), colour))
+        swapped.setAlpha(colour.alpha())
         return swapped
 
-    def pen(self, given: Any) -> QPen:
-        pen = QPen(pg.mkPen(given))
+    def pen(self, colour: Any) -> QPen:
+        pen = QPen(pg.mkPen(colour))
         pen.setColor(self.colour(pen.color()))
         return pen
 
-    def brush(self, given: Any) -> QBrush:
-        brush = QBrush(pg.mkBrush(given))
+    def brush(self, colour: Any) -> QBrush:
+        brush = QBrush(pg.mkBrush(colour))
         brush.setColor(self.colour(brush.color()))
         return brush
 

@@ -30,7 +30,7 @@ class TimePlot(KeptPlot):
     hovered = Signal(float, float)  # the same, of the mouse; NaN where it has left
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
-        """`shaded`: whether the time past training is shaded; not under an image, which would hide the shade."""
+        """Make a plot; `shaded`: the time past training is shaded; not under an image, which would hide the shade."""
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setToolTip(tip)
@@ -67,7 +67,7 @@ class TimePlot(KeptPlot):
         item.setXRange(0, self._seconds, padding=0)
 
     def set_times(self, seconds: float, horizon_s: float) -> None:
-        """The length of the take, and for how long its model was trained.
+        """Set the length of the take, and for how long its model was trained.
 
         The view is kept where the take before was as long.
         """
@@ -144,10 +144,10 @@ class TimePlot(KeptPlot):
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._follow(event)
         elif event.buttons() & _PAN_BUTTONS and self._pan_from is not None:
-            here = event.position()
-            moved = self._point_at(QPointF(self._pan_from, here.y())).x() - self._point_at(here).x()
-            self._pan_from = here.x()
-            self.pan(moved)
+            at = event.position()
+            shift_s = self._point_at(QPointF(self._pan_from, at.y())).x() - self._point_at(at).x()
+            self._pan_from = at.x()
+            self.pan(shift_s)
         if self._plot_rect_has(event.position()):
             point = self._point_at(event.position())
             self.hovered.emit(point.x(), point.y())

@@ -35,16 +35,16 @@ class ShownPluck:
 GLOW = ((4.0, 0.25), (2.4, 0.5), (1.2, 0.8))  # pixels from the string on both sides, share of its colour
 
 
-def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str, glows: bool = False) -> None:
-    """The sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
+def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front: str, glows: bool = False) -> None:
+    """Paint the sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
 
     Opaque fills and thin pens only: this is drawn sixty times a second.
     """
-    order = sorted(frame.shapes, key=lambda name: name == heard)
+    order = sorted(frame.shapes, key=lambda name: name == front)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
         band = frame.lowest[name], frame.highest[name]
-        _paint_band(painter, axes, band, name, 0.24 if name == heard else 0.18)
+        _paint_band(painter, axes, band, name, 0.24 if name == front else 0.18)
     if not glows:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         paint_grid(painter, axes)  # the opaque bands have covered it
@@ -56,7 +56,7 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
                 painter.drawPolyline(axes.curve(frame.shapes[name]).translated(0, shift))
         painter.setPen(QPen(QColor(_hue(name)), 1))
         curve = axes.curve(frame.shapes[name])
-        for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
+        for shift in (-0.8, 0.0, 0.8) if name == front else (-0.4, 0.4):  # wider pens are ten times slower
             painter.drawPolyline(curve.translated(0, shift))
     for name in order[:-1]:
         pieces = _hidden_pieces(axes, frame.shapes[name], frame.shapes[order[-1]])
@@ -89,15 +89,15 @@ def _heights(axes: StringAxes, shape_mm: NDArray[np.float32], at: NDArray[np.flo
     return axes.middle - np.interp(at, points, shape_mm) * (axes.half_height / axes.span_mm)
 
 
-def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], heard: str) -> None:
-    """The envelopes, which lie behind the motion and change less often."""
+def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], front: str) -> None:
+    """Paint the envelopes, which lie behind the motion and change less often."""
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
-    for name in sorted(envelopes, key=lambda name: name == heard):
+    for name in sorted(envelopes, key=lambda name: name == front):
         _paint_band(painter, axes, envelopes[name], name, 0.07)
 
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
-    """An opaque area with thin edges, which show its extent where another band covers it in part."""
+    """Paint an opaque area with thin edges, which show its extent where another band covers it in part."""
     colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(Qt.PenStyle.NoPen)
@@ -112,7 +112,7 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
 
 
 def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
-    """The string as it is pulled, before its release."""
+    """Paint the string as it is pulled, before its release."""
     curve = axes.curve(pluck.shape_mm)
     area = QPolygonF(curve)
     area.append(axes.at(1, 0))
@@ -131,7 +131,7 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """The handle: `full` on a string at rest, a ring while it moves.
+    """Paint the handle: `full` on a string at rest, a ring while it moves.
 
     It has its values where it is full or grabbed.
     """
@@ -178,7 +178,7 @@ def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, g
 
 
 def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
-    """The time that is shown, in the corner of the picture."""
+    """Paint the time that is shown, in the corner of the picture."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.TEXT))
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)

@@ -51,7 +51,9 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
     "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
 }
 
-_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+_Key = Qt.Key
+_Shift = Qt.KeyboardModifier.ShiftModifier
+_Control = Qt.KeyboardModifier.ControlModifier
 
 
 class StringView(StageView):
@@ -88,7 +90,7 @@ class StringView(StageView):
     # What is shown
 
     def set_pluck(self, pluck: ShownPluck) -> None:
-        """The pluck as chosen; it is drawn while no motion is shown."""
+        """Set the pluck as chosen; it is drawn while no motion is shown."""
         self._pluck = pluck
         self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
         self.update()
@@ -103,19 +105,21 @@ class StringView(StageView):
         self.update()
 
     def set_trained(self, trained: TrainedPlucks) -> None:
-        """The training range, outside of which the picture is hatched."""
+        """Set the training range, outside of which the picture is hatched."""
         self._trained = trained
         self.update()
 
     def set_shown(self, motion: bool, envelope: bool) -> None:
-        """The state of both buttons; the frames given to `show_frame` should agree with it."""
+        """Set the state of both buttons; the frames given to `show_frame` should agree with it."""
         for button, on in zip(self._toggles, (motion, envelope), strict=True):
             button.setChecked(on)
         self._toggles[1].setEnabled(motion)
 
     def show_frame(self, frame: StringFrame | None) -> None:
-        """A moment of the motion; None goes back to the pluck."""
-        before, self._frame, span_mm = self._frame, frame, self._span_mm
+        """Show a moment of the motion; None goes back to the pluck."""
+        before = self._frame
+        self._frame = frame
+        span_mm = self._span_mm
         self._fit_span()
         if frame is None or before is None or self._span_mm != span_mm:
             if frame is not before:
@@ -132,14 +136,14 @@ class StringView(StageView):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton:
             return
-        on = self._under(event.position())
+        on = self._part_at(event.position())
         follows = event.timestamp() - self._last_press_ms < QApplication.doubleClickInterval()
         self._on_handle_first = on == "pluck" and not follows
         self._last_press_ms = event.timestamp()
         self._start_drag(on, event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        on = self._under(event.position())
+        on = self._part_at(event.position())
         if event.button() != Qt.MouseButton.LeftButton:
             return
         if on in self._listening:
@@ -151,13 +155,16 @@ class StringView(StageView):
             self._start_drag(on, event.position())
 
     def _start_drag(self, on: str | None, at: QPointF) -> None:
+        """Begin a drag of the pluck or of a mark, by its name, or a pluck on the bare string (None)."""
         if on is None or on == "pluck":  # at the scale of the pluck, not of the decayed motion
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         axes = self._axes()
         self.drag_started.emit()
         self._drag = on or "pluck"
         self._dragged_at = self._pressed_at = at
-        self._far, self._on_bare_string, self._amplitude_mm = False, on is None, self._pluck.amplitude_mm
+        self._far = False
+        self._on_bare_string = on is None
+        self._amplitude_mm = self._pluck.amplitude_mm
         if on == "pluck":
             self._dragged = (self._pluck.position, self._pluck.amplitude_mm)
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
@@ -171,7 +178,7 @@ class StringView(StageView):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         at = event.position()
         if self._drag is None:
-            self._hover(self._under(at))
+            self._hover(self._part_at(at))
             self.setToolTip(
                 plain_tip(self._warning) if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered]
             )
@@ -205,11 +212,11 @@ class StringView(StageView):
         if drag == "pluck":
             self.pluck_released.emit()
         self._hovered = None
-        self._hover(self._under(event.position()))
+        self._hover(self._part_at(event.position()))
         self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        if self._under(event.position()) != "pluck":
+        if self._part_at(event.position()) != "pluck":
             event.ignore()
             return
         notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
@@ -223,21 +230,21 @@ class StringView(StageView):
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
-        if sideways is not None and held & _Shift:
-            self._step_mark(held, sideways)
-        elif sideways is not None and held & _Control:
+        if sideways is not None and modifiers & _Shift:
+            self._step_mark(modifiers, sideways)
+        elif sideways is not None and modifiers & _Control:
             self.shape_stepped.emit(sideways)
-        elif upwards is not None and held & _Control:
+        elif upwards is not None and modifiers & _Control:
             self.width_stepped.emit(float(upwards))
         elif sideways is not None:
             self.pluck_drawn.emit(self._pluck.position + 0.01 * sideways, self._pluck.amplitude_mm)
         elif upwards is not None:
-            step_mm = 0.5 * (FINE if held & _Shift else 1.0)
+            step_mm = 0.5 * (FINE if modifiers & _Shift else 1.0)
             self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
-        elif key == _Key.Key_Delete and held & _Shift:
+        elif key == _Key.Key_Delete and modifiers & _Shift:
             self._reset_marks()
         elif key == _Key.Key_Delete:
             self.pluck_reset.emit()
@@ -255,7 +262,7 @@ class StringView(StageView):
             self._hovered = on
             self.update()
 
-    def _under(self, at: QPointF) -> str | None:
+    def _part_at(self, at: QPointF) -> str | None:
         """The part that can be grabbed there: "pluck", a side, or None for the bare string."""
         axes = self._axes()
         if at.y() > axes.bottom - 6:
@@ -291,7 +298,7 @@ class StringView(StageView):
         self._fit_span()
         axes = self._axes()
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._behind(axes))
+        painter.drawPixmap(0, 0, self._backdrop_picture(axes))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is None or self._drag == "pluck":
             paint_pluck(painter, axes, self._pluck)
@@ -317,7 +324,7 @@ class StringView(StageView):
     def _heard(self) -> str:
         return next((source.source for source in self._sources if source.heard), "")
 
-    def _behind(self, axes: StringAxes) -> QPixmap:
+    def _backdrop_picture(self, axes: StringAxes) -> QPixmap:
         """The ground, and the envelopes of a motion, painted again only when one of them changes."""
         ground = self._ground(axes)
         if self._frame is None or self._shows_pluck or not self._frame.envelopes:

@@ -1,9 +1,9 @@
-"""A panel: a view and what decides what it shows.
+"""A panel: a view and its presenter, which decides what it shows.
 
-It is called when choices change, when another motion is rendered, and for each frame; it computes what is to be
-drawn, and turns gestures into changes of the session or into the signals here. Everything runs in the window's
-thread; what takes longer than a few milliseconds is a job of its `background`. Jobs give way to playing and drawing:
-they compute on one core at a low priority, and rest while a pluck is rendered and while the panel is hidden.
+It is called when choices change, when another motion is rendered, and for each frame. It computes the drawn figures,
+and turns gestures into changes of the session or into the signals here. Everything runs in the window's thread; work
+longer than a few milliseconds is a job of its `background`. Jobs give way to playing and drawing: they compute on one
+core at a low priority. They rest while a pluck is rendered and while the panel is hidden.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Moment:
 
     def in_motion(self, choices: Choices) -> bool:
         """Return True if a picture shows the motion, not rest: in Play as long as its note rings."""
-        shown = self.audible or choices.face != "play"
-        return choices.motion and (self.playing or (self.position_s > 0 and shown))
+        in_lab_or_audible = self.audible or choices.face != "play"
+        return choices.motion and (self.playing or (self.position_s > 0 and in_lab_or_audible))
 
 
 class Panel(QWidget):

@@ -97,7 +97,7 @@ class ComparePanel(Panel):
         self.table.row_entered.connect(lambda name: session.update(preset=name))
         self.table.row_deleted.connect(lambda name: self._toggle(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
-        self.background.progressed.connect(self._progressed)
+        self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(lambda: self._set_computing(None))
         self.background.failed.connect(lambda: self._set_computing(None))
         library.changed.connect(self._library_changed)
@@ -108,7 +108,7 @@ class ComparePanel(Panel):
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & {"preset", "seconds", "listen", *PluckedString.model_fields}:
             self._unchanged_s = 0.0
-            if self._tried != self._wanted():
+            if self._tried != self._wanted_key():
                 self._abandon()
             self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
 
@@ -117,7 +117,7 @@ class ComparePanel(Panel):
         self._unchanged_s += moment.elapsed_s
         if self._stale:
             self._show()
-        if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted():
+        if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted_key():
             return
         self._compute()
 
@@ -155,11 +155,12 @@ class ComparePanel(Panel):
             return [present] if present is not None else []
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
-    def _wanted(self) -> tuple[object, ...]:
+    def _wanted_key(self) -> tuple[object, ...]:
+        """The values that the table depends on."""
         return (self._basis, *(entry.name for entry in self._entries))
 
     def _compute(self) -> None:
-        self._tried, basis = self._wanted(), self._basis
+        self._tried, basis = self._wanted_key(), self._basis
         missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != basis]
         missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
@@ -169,17 +170,17 @@ class ComparePanel(Panel):
 
     def _urgency(self, name: str) -> int:
         choices = self.session.choices
-        heard = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
-        return heard.index(name) if name in heard else len(heard)
+        presets_in_use = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
+        return presets_in_use.index(name) if name in presets_in_use else len(presets_in_use)
 
-    def _progressed(self, share: float, _: str, row: ComparedRow | None) -> None:
+    def _show_progress(self, share: float, _: str, row: ComparedRow | None) -> None:
         self._set_computing(share)
         if row is not None:
             self._rows[row.name] = (self._basis, row)
             self._show()
 
     def _set_computing(self, share: float | None) -> None:
-        """The share of the table that is done, 0 … 1; None: nothing is being computed."""
+        """Set the share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
         stops = share is not None
         self._stop.setText("Stop" if stops else "Compute again")
@@ -206,7 +207,7 @@ class ComparePanel(Panel):
 
     def _choose(self, names: list[str] | None) -> None:
         self._names = names
-        if self._tried != self._wanted():
+        if self._tried != self._wanted_key():
             self._abandon()
         self._show()
 
@@ -218,19 +219,21 @@ class ComparePanel(Panel):
 
     def _show(self) -> None:
         self._stale = False
-        entries, basis, present = self._entries, self._basis, self.session.choices.preset
-        chosen = {entry.name for entry in entries}
+        entries = self._entries
+        basis = self._basis
+        present = self.session.choices.preset
+        names = {entry.name for entry in entries}
         for name, action in self._actions.items():
             with QSignalBlocker(action):
-                action.setChecked(name in chosen)
-        shown = []
+                action.setChecked(name in names)
+        rows = []
         for entry in entries:
             computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
-            shown.append((row, computed == basis))
-        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in shown])
-        count, fresh = len(entries), sum(of_this for _, of_this in shown)
+            rows.append((row, computed == basis))
+        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in rows])
+        count, fresh = len(entries), sum(of_this for _, of_this in rows)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
-        former = any(row.mae is not None and not of_this for row, of_this in shown)
+        former = any(row.mae is not None and not of_this for row, of_this in rows)
         self._words.setText(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {basis.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
@@ -238,6 +241,6 @@ class ComparePanel(Panel):
 
 
 def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
-    """`fresh`: of the present pluck; `present`: of the chosen preset."""
+    """The row of the table; `fresh`: of the present pluck; `present`: of the chosen preset."""
     tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
     return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

@@ -67,8 +67,8 @@ class DrumPanel(StagePanel):
     def _sources(self) -> tuple[ShownSource, ...]:
         """The drawn sources: both slots, or in Play the audible one; of another preset the model plays drums."""
         choices = self.session.choices
-        sources = tuple(each for each in shown_sources(choices, self.library) if each.source in DRAWN)
-        return tuple(each for each in sources if each.heard) if choices.face == "play" else sources
+        sources = tuple(source for source in shown_sources(choices, self.library) if source.source in DRAWN)
+        return tuple(source for source in sources if source.heard) if choices.face == "play" else sources
 
     @property
     def _drum(self) -> PlayedDrum | None:
@@ -76,7 +76,7 @@ class DrumPanel(StagePanel):
         return None if drums is None or self._key is None else drums.of_key(self._key)
 
     def show_key(self, key: int, place: Place | None = None) -> None:
-        """The drum of a key is shown, struck at a place; None: at its own where it is another drum."""
+        """Show the drum of a key, struck at a place; None: at its own where it is another drum."""
         self._key = key
         drum = self._drum
         if drum is None:
@@ -109,11 +109,11 @@ class DrumPanel(StagePanel):
 
     def _looks_like(self, blow: BlowTake) -> bool:
         """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""
-        if (played := self._drum) is None:
+        if (shown_drum := self._drum) is None:
             return False
-        own, shown = blow.request.modes.drum, played.drum
-        alike = math.isclose(own.width_m * shown.length_m, shown.width_m * own.length_m, rel_tol=1e-6)
-        return alike and own.shape == shown.shape
+        drum, view_drum = blow.request.modes.drum, shown_drum.drum
+        alike = math.isclose(drum.width_m * view_drum.length_m, view_drum.width_m * drum.length_m, rel_tol=1e-6)
+        return alike and drum.shape == view_drum.shape
 
     # Gestures
 

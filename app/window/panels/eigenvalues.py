@@ -1,7 +1,7 @@
 """The eigenvalues that the chosen preset learned, with the string's own: frequency and decay time, or complex plane.
 
 Amber rings are learned, blue dots the string's: a dot within its ring is a mode well learned. The values of the point
-under the mouse are written above; a click, or Enter on the point chosen by the arrow keys, solos its mode.
+under the mouse are written above. A click, or Enter on the point chosen by the arrow keys, solos its mode.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class EigenvaluesPanel(Panel):
         self._layer.hide()
         self._words = words_label()
         self.plane = _Plane()
-        self.plane.pointed.connect(self._tell)
+        self.plane.pointed.connect(self._show_values)
         self.plane.taken.connect(lambda point: self.solo(int(self._modes[point])))
         self.plane.escaped.connect(lambda: self.solo(0))
         theme.changes.theme_changed.connect(self._take_theme)
@@ -90,7 +90,7 @@ class EigenvaluesPanel(Panel):
             self.compute(lambda job: pole_figure(load_subject(subject)))
 
     def show_figure(self, figure: PoleFigure | None, words: str = "") -> None:
-        """The eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
+        """Show the eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
             for layer in range(figure.layers):
@@ -117,8 +117,8 @@ class EigenvaluesPanel(Panel):
             self.plane.clear_points()
             return
         layer = self._layer.currentData() if figure.layers > 1 else None
-        shown = np.ones(len(figure.learned), bool) if layer is None else figure.learned.layer == layer
-        self._shown = np.nonzero(shown)[0]
+        of_layer = np.ones(len(figure.learned), bool) if layer is None else figure.learned.layer == layer
+        self._shown = np.nonzero(of_layer)[0]
         musical = self._axes.currentData() == "musical"
         place = _musical_places if musical else _complex_places
         learned, string = place(figure.learned)[self._shown], place(figure.string)
@@ -126,9 +126,9 @@ class EigenvaluesPanel(Panel):
         self.plane.show_points(learned, first_layer, string, self._modes == solo if solo else None)
         if not keep_view:
             self.plane.set_axes(musical, figure.rate_hz)
-        self._tell(-1)
+        self._show_values(-1)
 
-    def _tell(self, point: int) -> None:
+    def _show_values(self, point: int) -> None:
         """Write the values of a point above the plane; -1: the note of the figure."""
         figure, solo = self._figure, self.session.choices.solo
         if figure is None:
@@ -148,8 +148,8 @@ class EigenvaluesPanel(Panel):
         mode = int(poles.mode[place])
         name, short = ("Learned, nearest to", "Learned,") if learned else ("The string’s", "String’s")
         pitch = f"{poles.mode_hz[place]:.1f} Hz"
-        heard = poles.folded_hz[place]
-        folded = f" (heard at {heard:.0f} Hz)" if heard < poles.mode_hz[place] - 0.1 else ""
+        folded_hz = poles.folded_hz[place]
+        folded = f" (heard at {folded_hz:.0f} Hz)" if folded_hz < poles.mode_hz[place] - 0.1 else ""
         decay = f"T60 {_t60_text(poles.t60_s[place])}"
         if not learned:
             return [f"{name} mode {mode}:  {pitch}{folded},  {decay}", f"{short} mode {mode}:  {pitch},  {decay}"]
@@ -164,7 +164,7 @@ class EigenvaluesPanel(Panel):
 
 
 def _musical_places(poles: Poles) -> Array:
-    """(points, 2): frequency in Hz, and log₁₀ of T60 in s, limited to the axis."""
+    """The places (points, 2): frequency in Hz, and log₁₀ of T60 in s, limited to the axis."""
     return np.stack([poles.folded_hz, np.log10(np.clip(poles.t60_s, SHORTEST_S, LONGEST_S))], axis=1)
 
 
@@ -216,14 +216,14 @@ class _Plane(PointedPlot):
         self._places, self._at = np.concatenate([learned, string]), -1
         self._learned_count = len(learned)
         self._ring.setData([], [])
-        heard = np.ones(len(self._places), bool) if alone is None else alone
+        bright = np.ones(len(self._places), bool) if alone is None else alone
         pens = [
             pg.mkPen(
                 theme.translucent(theme.MODEL if first else theme.FAINT, 230 if loud else 60), width=2 if first else 1
             )
-            for first, loud in zip(first_layer, heard, strict=False)
+            for first, loud in zip(first_layer, bright, strict=False)
         ]
-        brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in heard[len(learned) :]]
+        brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in bright[len(learned) :]]
         self._learned.setData(x=learned[:, 0], y=learned[:, 1], pen=pens)
         self._string.setData(x=string[:, 0], y=string[:, 1], brush=brushes)
 

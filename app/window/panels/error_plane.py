@@ -61,7 +61,7 @@ class ErrorPlanePanel(Panel):
         self._words = words_label()
         self.progress = ProgressStrip("Progress of the error map")
         self.map = _Map()
-        self.map.pointed.connect(self._tell)
+        self.map.pointed.connect(self._show_values)
         self.map.taken.connect(self._audition)
         self._picture: PlanePicture | None = None
         self._resting = ""
@@ -69,8 +69,8 @@ class ErrorPlanePanel(Panel):
         self._unchanged_s = 0.0
         self._moved = False  # the pluck's mark is of choices that have changed since
         self._planes = _Planes()
-        self.background.progressed.connect(self._progressed)
-        self.background.finished.connect(self._finished)
+        self.background.progressed.connect(self._show_progress)
+        self.background.finished.connect(self._show_finished)
         self.background.failed.connect(lambda: self._say("The error map of this preset could not be computed"))
         lay_out_view(self, (), self._words, (), self.progress, self.map, top=4)
 
@@ -86,7 +86,7 @@ class ErrorPlanePanel(Panel):
             self.map.set_trained(
                 info.trained_range.position, lambda place: info.trained_amplitudes_mm(pluck.moved(position=place))
             )
-        if names & FORM_FIELDS and self._wanted() != self._asked:
+        if names & FORM_FIELDS and self._wanted_key() != self._asked:
             self.background.cancel()
             self._asked = ()
             self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
@@ -101,22 +101,23 @@ class ErrorPlanePanel(Panel):
             self.map.set_pluck(choices.position, choices.amplitude_mm)
             self._moved = False
         entry = self.library.find(choices.preset)
-        if entry is None or self._asked == self._wanted() or self._unchanged_s < SETTLED_S:
+        if entry is None or self._asked == self._wanted_key() or self._unchanged_s < SETTLED_S:
             return
-        self._asked = self._wanted()
+        self._asked = self._wanted_key()
         subject, pluck = subject_of(choices, entry.path), choices.pluck
         self._say("Computing the model's error for plucks of this shape …", 0.0)
         self.compute(lambda job: self._planes.compute(subject, pluck, job))
 
-    def _wanted(self) -> tuple[object, ...]:
-        return (self.session.choices.preset, self.session.choices.string, *_form(self.session.choices.pluck))
+    def _wanted_key(self) -> tuple[object, ...]:
+        """The values that the plane depends on."""
+        return (self.session.choices.preset, self.session.choices.string, *_pluck_form(self.session.choices.pluck))
 
-    def _progressed(self, share: float, _: str, picture: PlanePicture | None) -> None:
+    def _show_progress(self, share: float, _: str, picture: PlanePicture | None) -> None:
         self.progress.show_share(share)
         if picture is not None:
             self._show(picture)
 
-    def _finished(self, picture: PlanePicture) -> None:
+    def _show_finished(self, picture: PlanePicture) -> None:
         self._show(picture)
         self._say("Error as trained, for plucks of this shape; a click plucks there")
 
@@ -125,18 +126,18 @@ class ErrorPlanePanel(Panel):
         self.pluck_asked.emit()
 
     def _show(self, picture: PlanePicture | None) -> None:
-        """The errors computed so far; None: none."""
+        """Show the errors computed so far; None: none."""
         self._picture = picture
         self.map.show_picture(picture)
-        self._tell(*(self.map.cursor or (math.nan, math.nan)))
+        self._show_values(*(self.map.cursor or (math.nan, math.nan)))
 
     def _say(self, words: str, share: float | None = None) -> None:
-        """The line above the map while nothing is pointed at, and the share that is computed."""
+        """Write the line above the map while nothing is pointed at, and show the share that is computed."""
         self._resting = words
         self.progress.show_share(share)
-        self._tell(*(self.map.cursor or (math.nan, math.nan)))
+        self._show_values(*(self.map.cursor or (math.nan, math.nan)))
 
-    def _tell(self, position: float, amplitude_mm: float) -> None:
+    def _show_values(self, position: float, amplitude_mm: float) -> None:
         if self._picture is None or math.isnan(position):
             self._words.setText(self._resting)
             return
@@ -156,7 +157,7 @@ class _Planes:
 
     def compute(self, subject: Subject, pluck: Pluck, job: Job) -> PlanePicture:
         preset = load_subject(subject)
-        key = (preset_digest(preset.path), string_of(subject), *_form(pluck))
+        key = (preset_digest(preset.path), string_of(subject), *_pluck_form(pluck))
         plane = self._known.pop(key, None) or ErrorPlane()
         self._known[key] = plane  # the latest last
         for oldest in list(self._known)[:-MOST_KEPT]:
@@ -164,7 +165,7 @@ class _Planes:
         return plane.compute(preset, pluck, job)
 
 
-def _form(pluck: Pluck) -> tuple[object, ...]:
+def _pluck_form(pluck: Pluck) -> tuple[object, ...]:
     """The properties that a plane belongs to beside its preset: shape and width, where there is one."""
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
 
@@ -233,7 +234,7 @@ class _Map(PointedPlot):
         self._pluck.setData([position], [math.log10(held_mm)])
 
     def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
-        """The training range: positions, None for a model trained on noise, and the amplitudes at each of them."""
+        """Set the training range: positions, None for a model trained on noise, and the amplitudes at each."""
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
         self._trained = ((left, right), amplitudes_mm)
         places = np.linspace(left, right, OUTLINE)
@@ -246,7 +247,7 @@ class _Map(PointedPlot):
         if self._trained is None:
             return True
         places, amplitudes_mm = self._trained
-        return _within(position, places) and _within(amplitude_mm, amplitudes_mm(position))
+        return _is_within(position, places) and _is_within(amplitude_mm, amplitudes_mm(position))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         at = self._at(event.position())
@@ -303,5 +304,5 @@ class _Map(PointedPlot):
             self.pointed.emit(*at)
 
 
-def _within(value: float, bounds: Range) -> bool:
+def _is_within(value: float, bounds: Range) -> bool:
     return bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9

@@ -83,8 +83,8 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._stored_errors = {}  # the model was validated on no drum
         if isinstance(take, Take):
             rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
-            stored = {"rmse": rmse, "mae": take.info.rel_mae}
-            self._stored_errors = {name: error for name, error in stored.items() if error is not None}
+            errors = {"rmse": rmse, "mae": take.info.rel_mae}
+            self._stored_errors = {name: error for name, error in errors.items() if error is not None}
         for curve in self._curves.values():
             curve.setData([], [])
         for name, line in self._stored.items():
@@ -101,33 +101,35 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         assert isinstance(take, Take)
         return ErrorCourse(take)
 
-    def _draw(self, made: ErrorWindows) -> None:
-        ready = made.ready
-        shown = (made, ready, self.quantities.key)
-        if ready and shown != self._shown:
-            self._shown = shown
-            self.show_curves(made.middle_s[:ready], {name: values[:ready] for name, values in made.curves.items()})
+    def _draw(self, figures: ErrorWindows) -> None:
+        ready = figures.ready
+        drawn_state = (figures, ready, self.quantities.key)
+        if ready and drawn_state != self._shown:
+            self._shown = drawn_state
+            self.show_curves(
+                figures.middle_s[:ready], {name: values[:ready] for name, values in figures.curves.items()}
+            )
 
     def show_curves(self, time_s: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> None:
         """Relative errors "rmse" and perhaps "mae", and "level_db", (windows,) each at `time_s`."""
         if self._level:
-            drawn = {"level_db": curves["level_db"]}
+            levels = {"level_db": curves["level_db"]}
         else:
             with np.errstate(divide="ignore"):  # no error at all lies below the axis
-                drawn = {name: np.log10(curves[name]) for name in ("rmse", "mae") if name in curves}
-        for name, values in drawn.items():
+                levels = {name: np.log10(curves[name]) for name in ("rmse", "mae") if name in curves}
+        for name, values in levels.items():
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
-        self._fit(list(drawn.values()))
+        self._fit(list(levels.values()))
 
-    def _words(self, made: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
-        window = int(time_s / made.window_s)
-        if not 0 <= window < made.ready:
+    def _words(self, figures: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
+        window = int(time_s / figures.window_s)
+        if not 0 <= window < figures.ready:
             return []
-        here = {name: values[window] for name, values in made.curves.items()}
-        what = "   ".join(f"{name.upper()} {percent(here[name])}" for name in ("rmse", "mae") if name in here)
+        point = {name: values[window] for name, values in figures.curves.items()}
+        what = "   ".join(f"{name.upper()} {percent(point[name])}" for name in ("rmse", "mae") if name in point)
         if self._level:
-            what = f"{here['level_db']:+.2f} dB" if math.isfinite(here["level_db"]) else "silent"
-        return [f"{made.middle_s[window]:.3f} s   {what}"]
+            what = f"{point['level_db']:+.2f} dB" if math.isfinite(point["level_db"]) else "silent"
+        return [f"{figures.middle_s[window]:.3f} s   {what}"]
 
     @property
     def _level(self) -> bool:
@@ -143,29 +145,29 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._fit([])
         self._show_legend()
 
-    def _fit(self, shown: list[NDArray[np.float64]]) -> None:
+    def _fit(self, curves: list[NDArray[np.float64]]) -> None:
         """Widen the axis to whole decades, or a span in dB, around what is shown."""
-        finite = [values[np.isfinite(values)] for values in shown]
+        finite = [values[np.isfinite(values)] for values in curves]
         values = np.concatenate([*finite, self._always_in_view()])
         if self._level:
             largest_db = 1.1 * float(np.abs(values).max())
             span = next((span for span in LEVEL_SPANS_DB if span >= largest_db), LEVEL_SPANS_DB[-1])
-            wanted = (-span, span)
+            limits = (-span, span)
         else:
             low = float(np.floor(values.min()).clip(LOWEST_DECADE, -1))
-            wanted = (low, float(np.ceil(values.max() - 0.25).clip(0, HIGHEST_DECADE)) + 0.25)
+            limits = (low, float(np.ceil(values.max() - 0.25).clip(0, HIGHEST_DECADE)) + 0.25)
         if self._range is not None:
-            wanted = min(wanted[0], self._range[0]), max(wanted[1], self._range[1])
-        if wanted != self._range:
-            self._range = wanted
-            self.plot.getPlotItem().setYRange(*wanted, padding=0)
-            self._ticks.set(None if self._level else _decades(*wanted), _between_decades(*wanted))
+            limits = min(limits[0], self._range[0]), max(limits[1], self._range[1])
+        if limits != self._range:
+            self._range = limits
+            self.plot.getPlotItem().setYRange(*limits, padding=0)
+            self._ticks.set(None if self._level else _decades(*limits), _between_decades(*limits))
 
     def _always_in_view(self) -> NDArray[np.float64]:
         if self._level:
             return np.zeros(1)
-        stored = [math.log10(value) for value in self._stored_errors.values() if value > 0]
-        return np.array([-2.0, 0.0, *stored])
+        levels = [math.log10(value) for value in self._stored_errors.values() if value > 0]
+        return np.array([-2.0, 0.0, *levels])
 
     def _show_legend(self) -> None:
         measured = () if self._level else self._measured
@@ -173,8 +175,8 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._legend.setLabelTextColor(theme.FAINT)
         for name in measured:
             self._legend.addItem(self._curves[name], name.upper())
-        stored = [percent(self._stored_errors[name]) for name in measured if name in self._stored_errors]
-        self.readout.rest(f"⋯ validation {', '.join(stored)}" if stored else "")
+        texts = [percent(self._stored_errors[name]) for name in measured if name in self._stored_errors]
+        self.readout.rest(f"⋯ validation {', '.join(texts)}" if texts else "")
 
 
 def percent(error: float) -> str:

@@ -78,7 +78,7 @@ class PartialsPanel(Panel):
         self._waiting: Take | None = None  # complete, and not yet measured
         self._rows: dict[str, list[PartialRow]] | None = None
         self.background.progressed.connect(self.progress.show_share)
-        self.background.finished.connect(self._measured)
+        self.background.finished.connect(self._show_measured)
         self.background.failed.connect(lambda: self._say("The partials of this pluck could not be measured"))
         lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
 
@@ -106,7 +106,7 @@ class PartialsPanel(Panel):
         self.solo(mode)
         self._show_solo()
 
-    def _measured(self, rows: dict[str, list[PartialRow]]) -> None:
+    def _show_measured(self, rows: dict[str, list[PartialRow]]) -> None:
         self.progress.show_share(None)
         self._rows = rows
         self._show()

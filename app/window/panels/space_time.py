@@ -109,18 +109,20 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         assert isinstance(take, Take)  # it draws no drums
         return Envelopes(take)
 
-    def _draw(self, made: Envelopes) -> None:
-        quantity, times_s, columns = self.quantities.key, self.plot.times_s, self.plot.columns
-        shown = (made, made.take.ready_frames, made.ready, quantity, times_s, columns)
-        if shown == self._shown:
+    def _draw(self, figures: Envelopes) -> None:
+        quantity = self.quantities.key
+        times_s = self.plot.times_s
+        columns = self.plot.columns
+        drawn_state = (figures, figures.take.ready_frames, figures.ready, quantity, times_s, columns)
+        if drawn_state == self._shown:
             return
-        self._shown = shown
-        self._picture = seen = picture(made, quantity, times_s, columns)
+        self._shown = drawn_state
+        self._picture = seen = picture(figures, quantity, times_s, columns)
         if seen is None:  # nothing is computed yet of the times in view
             self._image.clear()
             return
         names = ("error",) if quantity == "error" else SOURCES  # the same scale for model and truth
-        self._typical_mm = max(made.typical_m(name, times_s) for name in names) * MM
+        self._typical_mm = max(figures.typical_m(name, times_s) for name in names) * MM
         self._signed = seen.signed
         self._show_scale()
         half = 0.5 / (len(seen.displacement_m) - 1)  # the grid's points are the middles of their rows
@@ -128,15 +130,15 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._image.setRect(QRectF(seen.start_s, -half, seen.stop_s - seen.start_s, 1 + 2 * half))
         self.readout.rest(*_captions(seen))
 
-    def _words(self, made: Envelopes, time_s: float, place: float) -> Iterable[str]:
+    def _words(self, figures: Envelopes, time_s: float, place: float) -> Iterable[str]:
         here_m = self._picture.at(time_s, place) if self._picture is not None else None
         return [] if here_m is None else self._wordings(time_s, place, here_m)
 
     def _wordings(self, time_s: float, place: float, here_m: float) -> list[str]:
         """The displacement that is drawn there, in the unit of the colour bar."""
         factor, unit = readable_unit(self.scale_mm / MM, "displacement")
-        what = f"{factor * here_m:+.4g} {unit}" if self._signed else f"peak {factor * here_m:.4g} {unit}"
-        return [f"{time_s:.4f} s   position {place:.2f}   {what}", what]
+        value_words = f"{factor * here_m:+.4g} {unit}" if self._signed else f"peak {factor * here_m:.4g} {unit}"
+        return [f"{time_s:.4f} s   position {place:.2f}   {value_words}", value_words]
 
     @property
     def _fitting_gain(self) -> int:
@@ -175,13 +177,13 @@ def _times(gain: int) -> str:
 
 
 def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
-    made = error_map() if kind == "error" else displacement_map()
-    return made if signed else magnitudes_of(made)
+    colours = error_map() if kind == "error" else displacement_map()
+    return colours if signed else magnitudes_of(colours)
 
 
-def _captions(made: Picture) -> list[str]:
+def _captions(image: Picture) -> list[str]:
     """The caption of a column's content, in words and in fewer."""
-    column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
+    column_ms = 1000 * (image.stop_s - image.start_s) / image.displacement_m.shape[1]
     return {
         "frames": ["every frame"],
         "extremes": [f"extremes of {column_ms:.2g} ms", f"{column_ms:.2g} ms"],
@@ -189,4 +191,4 @@ def _captions(made: Picture) -> list[str]:
             f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
             f"peaks of {column_ms:.2g} ms",
         ],
-    }[made.detail]
+    }[image.detail]

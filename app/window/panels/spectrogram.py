@@ -34,7 +34,7 @@ SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Parti
 
 
 class SpectrogramPanel(TimePanel[Spectrogram]):
-    """0 dB is a sine of full scale; levels below the chosen range have the colour of the background."""
+    """The spectrogram, 0 dB being a sine of full scale; levels below the range have the colour of the background."""
 
     of_strings = False
     key = "spectrogram"
@@ -96,8 +96,8 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._bar_label.set(f"dB re {own}", "dB")
+        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._bar_label.set(f"dB re {scale}", "dB")
         if take.rate_hz / 2 != self._highest_hz:
             self._highest_hz = take.rate_hz / 2
             self._label_frequencies()
@@ -105,23 +105,23 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
     def _begin(self, take: Sounding) -> Spectrogram:
         return Spectrogram(take, take.listened)
 
-    def _is_of(self, made: Spectrogram, take: Sounding) -> bool:
-        return made.listened is take.listened
+    def _is_of(self, figures: Spectrogram, take: Sounding) -> bool:
+        return figures.listened is take.listened
 
-    def _draw(self, made: Spectrogram) -> None:
-        shown = (made, self.quantities.key, self.logarithmic)
-        if shown != self._shown:
-            if made.ready == 0:
+    def _draw(self, figures: Spectrogram) -> None:
+        drawn_state = (figures, self.quantities.key, self.logarithmic)
+        if drawn_state != self._shown:
+            if figures.ready == 0:
                 return  # the picture before stays until there is something new
-            self._shown = shown
-            bins = made.window_frames // 2 + 1
+            self._shown = drawn_state
+            bins = figures.window_frames // 2 + 1
             lowest_hz = LOWEST_HZ if self.logarithmic else 0.0
-            self._rows = FrequencyRows(bins, made.bin_hz, ROWS, lowest_hz, self.logarithmic)
-            self.begin_picture(made.columns, ROWS, made.hop_s)
-        last = min(made.ready, self._drawn + MOST_COLUMNS)
+            self._rows = FrequencyRows(bins, figures.bin_hz, ROWS, lowest_hz, self.logarithmic)
+            self.begin_picture(figures.columns, ROWS, figures.hop_s)
+        last = min(figures.ready, self._drawn + MOST_COLUMNS)
         if last > self._drawn:
             assert self._rows is not None
-            self.show_columns(self._rows.of(made.levels_db[self.quantities.key][self._drawn : last]))
+            self.show_columns(self._rows.of(figures.levels_db[self.quantities.key][self._drawn : last]))
 
     def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
         """Clear the picture; the columns to come are `rows` high, the k-th at the time k·hop_s."""
@@ -150,10 +150,10 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
             half = self._hop_s / 2
             self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
 
-    def _words(self, made: Spectrogram, time_s: float, place: float) -> Iterable[str]:
+    def _words(self, figures: Spectrogram, time_s: float, place: float) -> Iterable[str]:
         frequency_hz = self.frequency_hz(place)
-        column, row = round(time_s / made.hop_s), round(frequency_hz / made.bin_hz)
-        levels_db = made.levels_db[self.quantities.key][: made.ready]
+        column, row = round(time_s / figures.hop_s), round(frequency_hz / figures.bin_hz)
+        levels_db = figures.levels_db[self.quantities.key][: figures.ready]
         if not (0 <= column < len(levels_db) and 0 <= row < levels_db.shape[1]):
             return []
         level, frequency = f"{levels_db[column, row]:.1f} dB", f"{frequency_hz:.0f} Hz"

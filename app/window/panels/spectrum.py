@@ -53,7 +53,7 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """(COLUMNS,), from LOWEST_HZ to half the rate."""
+        """The frequencies (COLUMNS,), from LOWEST_HZ to half the rate."""
         return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
 
     @cached_property
@@ -72,7 +72,7 @@ class Analyser:
         return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
 
     @cached_property
-    def _wide(self) -> NDArray[np.bool_]:
+    def _wide_columns(self) -> NDArray[np.bool_]:
         last = PADDING * self.window_frames // 2 + 1
         return np.diff(self._first_bins, append=last) > 1
 
@@ -85,7 +85,7 @@ class Analyser:
         columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
         # the loudest bin of a wide column, so that no partial falls between two
         loudest = np.maximum.reduceat(magnitude, self._first_bins)
-        columns = np.maximum(columns, np.where(self._wide, loudest, 0))
+        columns = np.maximum(columns, np.where(self._wide_columns, loudest, 0))
         return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
 
 
@@ -163,8 +163,8 @@ class SpectrumPanel(Panel):
     def take_started(self, take: Take | BlowTake) -> None:
         self._shown = self._standing = ()  # which would hold the last take
         self._partials_hz = take.partials_hz
-        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._label.set(f"dB re {own}", "dB")
+        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._label.set(f"dB re {scale}", "dB")
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1
@@ -176,26 +176,26 @@ class SpectrumPanel(Panel):
             return
         self._standing = standing
         signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
-        there = [signal for signal in signals if signal.there]
-        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in there)
-        shown = (take.listened, ready, moment.position_s)
-        if shown == self._shown:
+        rendered = [signal for signal in signals if signal.there]
+        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in rendered)
+        drawn_state = (take.listened, ready, moment.position_s)
+        if drawn_state == self._shown:
             return
-        self._shown = shown
-        self.set_rate(max((signal.rate_hz for signal in there), default=take.rate_hz))
+        self._shown = drawn_state
+        self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
         for signal in signals:
-            if signal in there:
+            if signal in rendered:
                 self._draw(signal, moment.position_s, take.full_scale)
             else:
                 self._clear(signal.source)
         self._show_readout()
 
-    def _draw(self, heard: HeardSignal, position_s: float, full_scale: float) -> None:
-        analyser = analyser_at(heard.rate_hz)
-        last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
+    def _draw(self, signal: HeardSignal, position_s: float, full_scale: float) -> None:
+        analyser = analyser_at(signal.rate_hz)
+        last_window = signal.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / full_scale
-        self.show_signal(heard.source, signal, analyser)
+        samples = signal.read(first, first + analyser.window_frames) / full_scale
+        self.show_signal(signal.source, samples, analyser)
 
     def set_rate(self, rate_hz: int) -> None:
         """Fit the frequency axis to a rate."""

@@ -83,7 +83,7 @@ class StringPanel(StagePanel):
     def _sources(self) -> tuple[ShownSource, ...]:
         """The drawn sources: both slots, or in Play the audible one."""
         sources = shown_sources(self.session.choices, self.library)
-        return tuple(each for each in sources if each.heard) if self._plain else sources
+        return tuple(source for source in sources if source.heard) if self._plain else sources
 
     def take_started(self, take: Take | BlowTake) -> None:
         self._envelope = Envelope()
@@ -94,7 +94,9 @@ class StringPanel(StagePanel):
         self.view.set_warning(*self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
-        take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        take = moment.take
+        position_s = moment.position_s
+        choices = self.session.choices
         self._judge()
         standing = moment.standing(choices)
         if not moment.playing and standing == self._standing:
@@ -105,14 +107,14 @@ class StringPanel(StagePanel):
             self._shown = ()
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
-        there = [motion for motion in motions if motion.there]
+        rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
-        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
-        strobes = [motion.strobes(position_s) for motion in there]
-        shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
-        if not moment.playing and shown == self._shown:
+        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
+        strobes = [motion.strobes(position_s) for motion in rendered]
+        drawn_state = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
+        if not moment.playing and drawn_state == self._shown:
             return
-        self._shown = shown
+        self._shown = drawn_state
         envelope = self._envelope if choices.envelope else None
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
@@ -127,12 +129,14 @@ class StringPanel(StagePanel):
             self.view.set_warning(*self._pluck_warning())
 
     def _show_pluck(self) -> None:
-        choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
+        choices = self.session.choices
+        entry = self.library.find(self.session.choices.preset)
+        view = self.view
         shape_mm = choices.pluck.displacement(SHAPE_POINTS) * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         left, right = choices.listen, choices.listen_right if choices.stereo else None
         view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))
-        view.set_trained(_trained(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
+        view.set_trained(_trained_plucks(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
         view.set_warning(*self._pluck_warning())
 
     def _pluck_warning(self) -> tuple[str, bool]:
@@ -147,8 +151,8 @@ class StringPanel(StagePanel):
         patch, string = choices.patch, choices.string
         if patch is None or string is None or not choices.plays_patch:
             return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
-        heard = by_two_numbers(patch, string)  # as the head of the Lab reports it
-        return judged("; ".join(outside_of_string(entry.info, heard, choices.pluck)), error)
+        drawn_string = by_two_numbers(patch, string)  # as the head of the Lab reports it
+        return judged("; ".join(outside_of_string(entry.info, drawn_string, choices.pluck)), error)
 
     # Gestures
 
@@ -164,8 +168,8 @@ class StringPanel(StagePanel):
             self.session.update(width=min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]))
 
     def _step_shape(self, steps: int) -> None:
-        here = SHAPES.index(self.session.choices.shape)
-        self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
+        index = SHAPES.index(self.session.choices.shape)
+        self.session.update(shape=SHAPES[(index + steps) % len(SHAPES)])
 
 
 def _label(choices: Choices) -> str:
@@ -173,5 +177,5 @@ def _label(choices: Choices) -> str:
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
 
 
-def _trained(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
+def _trained_plucks(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
     return TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(pluck))

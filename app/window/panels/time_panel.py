@@ -44,14 +44,14 @@ class TimePanel(Panel, Generic[G]):
         """Begin what is to be computed from a take, or from a blow where the panel draws drums."""
 
     @abstractmethod
-    def _draw(self, made: G) -> None:
-        """Show it as far as it is ready."""
+    def _draw(self, figures: G) -> None:
+        """Show the figures as far as it is ready."""
 
     @abstractmethod
-    def _words(self, made: G, time_s: float, place: float) -> Iterable[str]:
+    def _words(self, figures: G, time_s: float, place: float) -> Iterable[str]:
         """The words for a point, in one or more wordings, the longest first; none where nothing is."""
 
-    def _is_of(self, made: G, take: Sounding) -> bool:
+    def _is_of(self, figures: G, take: Sounding) -> bool:
         """Return True if it shows the take as it is heard now."""
         return True
 
@@ -67,13 +67,13 @@ class TimePanel(Panel, Generic[G]):
         take = moment.take if self.of_strings else moment.sounding
         if take is None or self._moments % self.EVERY:
             return
-        made = self._made
-        if made is None or not self._is_of(made, take):
-            self._made = made = self._begin(take)
-            self.background.start(partial(keep_up, made))
-        self._draw(made)
+        figures = self._made
+        if figures is None or not self._is_of(figures, take):
+            self._made = figures = self._begin(take)
+            self.background.start(partial(keep_up, figures))
+        self._draw(figures)
 
     def _hover(self, time_s: float, place: float) -> None:
-        made = self._made
-        wordings = [] if made is None or not math.isfinite(time_s) else [*self._words(made, time_s, place)]
+        figures = self._made
+        wordings = [] if figures is None or not math.isfinite(time_s) else [*self._words(figures, time_s, place)]
         self.readout.report(*(wordings or ("",)))

@@ -38,17 +38,17 @@ FEW_PIXELS = 4
 class _Drawn:
     """A signal as far as it has been read."""
 
-    heard: HeardSignal
+    origin: HeardSignal
     signal: NDArray[np.float32] = field(init=False)
     ready: int = 0
     peak: float = 0.0
 
     def __post_init__(self) -> None:
-        self.signal = np.empty(self.heard.frames, np.float32)
+        self.signal = np.empty(self.origin.frames, np.float32)
 
     def catch_up(self) -> bool:
         """Read on, MOST_FRAMES at most; whether there was something to read."""
-        new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
+        new = self.origin.read(self.ready, self.ready + MOST_FRAMES)
         self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
         self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
@@ -100,7 +100,9 @@ class WaveformPanel(Panel):
             self._shown = ()
 
     def take_started(self, take: Take | BlowTake) -> None:
-        self._take, self._drawn, self._full = take, {}, 0.0
+        self._take = take
+        self._drawn = {}
+        self._full = 0.0
         self._shown = self._caught_up = ()  # which would hold the last take
         self._period_s = 1 / take.fundamental_hz
         self.plot.set_times(take.seconds, take.horizon_s)
@@ -114,9 +116,9 @@ class WaveformPanel(Panel):
         if take is None or self._moments % EVERY:
             return
         choices = self.session.choices
-        there = take.progress, choices
-        if there != self._caught_up:
-            self._caught_up = () if self._follow(take) else there
+        progress = take.progress, choices
+        if progress != self._caught_up:
+            self._caught_up = () if self._follow(take) else progress
         ready = {name: drawn.ready for name, drawn in self._drawn.items()}
         shown = (take.listened, ready, self.plot.times_s, self.plot.columns)
         if shown != self._shown:
@@ -128,18 +130,18 @@ class WaveformPanel(Panel):
 
         Whether there was anything to read: there may be more.
         """
-        choices, moved = self.session.choices, False
+        choices, has_grown = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            heard, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
-            if not heard.there:
+            origin, earlier = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
+            if not origin.there:
                 continue  # another preset's model, not yet rendered
-            drawn = known if known is not None and known.heard == heard else _Drawn(heard)
-            moved |= drawn.catch_up()
+            drawn = earlier if earlier is not None and earlier.origin == origin else _Drawn(origin)
+            has_grown |= drawn.catch_up()
             self._drawn[source.source] = drawn
         if any(self._drawn.get(name) is not drawn for name, drawn in before.items()):
             self._full = 0.0  # something else is drawn: its own scale
-        return moved
+        return has_grown
 
     def _draw(self, take: Sounding) -> None:
         pickup = "pressure" if isinstance(take, BlowTake) else take.listened.ear.pickup
@@ -151,12 +153,12 @@ class WaveformPanel(Panel):
         for source, curve in self._curves.items():
             if source in self._drawn:
                 drawn = self._drawn[source]
-                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.rate_hz)
+                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.origin.rate_hz)
             else:
                 curve.setData([], [])
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
-        """The vertical axis, from −full to full in `unit`."""
+        """Set the vertical axis, from −full to full in `unit`."""
         self.plot.getPlotItem().setYRange(-full, full, padding=0.02)
         self._label.set(f"{quantity} ({unit})", unit)
 
@@ -169,19 +171,19 @@ class WaveformPanel(Panel):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
-        """The samples so far, (frames,) from time 0, in the unit of the axis. Draws those in view, none left out."""
+        """Show the samples so far, (frames,) from time 0, in the unit of the axis; draw all of those in view."""
         (low_s, high_s), columns = self.plot.times_s, self.plot.columns
         # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
         # that is played waits for the painting.
         if (high_s - low_s) * rate_hz > columns:
             borders_s = np.linspace(low_s, high_s, columns + 1)
             edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
-            there = np.flatnonzero(edges[1:] > edges[:-1])
-            middles_s = (borders_s[there] + borders_s[there + 1]) / 2
+            joints = np.flatnonzero(edges[1:] > edges[:-1])
+            middles_s = (borders_s[joints] + borders_s[joints + 1]) / 2
             # Where a period is a few pixels wide, each stroke has the extremes of a whole one, or they would beat.
             pixels = self._period_s * columns / (high_s - low_s)
             around = math.ceil(pixels) if 0 < pixels < FEW_PIXELS else 1
-            values = extremes(signal, edges[there[0] : there[-1] + 2], around) if len(there) else signal[:0]
+            values = extremes(signal, edges[joints[0] : joints[-1] + 2], around) if len(joints) else signal[:0]
             self._curves[source].setData(np.repeat(middles_s, 2), values, connect="pairs", antialias=False)
         else:
             first = min(max(int(low_s * rate_hz), 0), len(signal))
@@ -211,7 +213,7 @@ def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int 
 
 
 def _neighbours(values: NDArray[np.float32], around: int) -> NDArray[np.float32]:
-    """(values, around): each value with its neighbours."""
+    """The neighbours (values, around): each value with its neighbours."""
     before = (around - 1) // 2
     padded = np.pad(values, (before, around - 1 - before), mode="edge")
     return np.lib.stride_tricks.sliding_window_view(padded, around)
