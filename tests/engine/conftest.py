@@ -109,3 +109,9 @@ def rung() -> Callable[..., NDArray[np.float64]]:
         return mixer.render(frames).astype(np.float64)
 
     return rendered
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """The laws of motion hold for every variant of a model's sizes."""
+    if "motion" in metafunc.fixturenames and metafunc.cls is not None:
+        metafunc.parametrize("motion", metafunc.cls.variants, indirect=True, scope="class", ids=str)
