@@ -66,7 +66,9 @@ CASES = [
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.name} {case.kind} {case.ear.points} {case.ear.solo}")
-def test_at_its_own_rate_a_voice_is_its_definition(case: Case, shipped: Shipped, initial_m: Initial, rung: Rung) -> None:
+def test_at_its_own_rate_a_voice_is_its_definition(
+    case: Case, shipped: Shipped, initial_m: Initial, rung: Rung
+) -> None:
     preset = shipped(case.name)
     info = preset.info
     if case.kind == "model":
@@ -99,7 +101,9 @@ def test_at_any_rate_it_is_the_model_at_those_times(
 
 def heard(info: PresetInfo, amplitudes: torch.Tensor, ear: Ear) -> Signal:
     """What is heard of modal amplitudes in m (frames, modes)."""
-    return np.asarray(to_grid(amplitudes.numpy(), info.grid_points) @ weights_of(ear, info.grid_points) / FULL_SCALE_M)
+    return np.asarray(
+        to_grid(amplitudes.numpy(), info.grid_points) @ weights_of(ear, info.grid_points) / FULL_SCALE_M
+    )
 
 
 @pytest.mark.parametrize(("kind", "rate_hz"), [("dmd", 4_000), ("dmd", 48_000), ("truth", 4_000), ("truth", 44_100)])
