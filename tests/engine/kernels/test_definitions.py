@@ -32,6 +32,7 @@ from tests.engine.tensors import solve_linear
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 NYLON, STEEL = "studio_nylon_b3", "studio_steel_e4"
 EAR, STEREO, SOLO = Ear((0.37,)), Ear((0.3, 0.62)), Ear((0.37,), solo=2)
+PLUCK = Pluck()
 STUDIO = sorted(path.stem for path in preset_files(SHIPPED) if path.stem.startswith("studio_"))
 
 
@@ -40,7 +41,7 @@ class Case:
     name: str
     kind: str = "model"
     ear: Ear = EAR
-    pluck: Pluck = Pluck()
+    pluck: Pluck = PLUCK
     seconds: float = 0.05
     allowed: float = 1e-4
 
