@@ -68,10 +68,10 @@ class ChangingVoice(Voice):
 
     def _follow(self, before: ChangingVoice) -> None:
         """Keeps the voice before in memory until this one, which is the same string, has begun."""
-        before._forget_before()
+        before.forget_before()
         self._before = before
         self.record["previous_voice"] = before.address
 
-    def _forget_before(self) -> None:
+    def forget_before(self) -> None:
         if self.record["previous_voice"] == 0:
             self._before = None

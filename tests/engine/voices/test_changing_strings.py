@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.kernels.constants import QUANTUM
@@ -24,9 +23,10 @@ from engine.values.ear import Ear
 from engine.values.string import StringParameters
 from engine.voices import Mixer, Program, Voice
 from engine.voices.programs import solver_program, tension_program
+from engine.voices.voice import resonator_rows
+from tests.engine.sounds import RATE_HZ, Signal
 from tests.engine.voices.changing import ChangingVoice
 
-RATE_HZ = 48_000
 STRING = StringParameters(tension_n=80.0, second_moment_m4=1.4e-14)
 EAR = Ear((0.37,))
 PLUCK = Pluck(0.3, 4.0, "raised_cosine", 0.2)
@@ -65,7 +65,7 @@ def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> ChangingVoice:
     return ChangingVoice(of, pluck.displacement(of.grid_points), ear)
 
 
-def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> NDArray[np.float64]:
+def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> Signal:
     """The sound, (frames,), of a string that is plucked and then changed."""
     mixer, voice, blocks, done = Mixer(RATE_HZ, limited=False), struck(of, ear=ear), [], 0
     mixer.add(voice)
@@ -84,7 +84,7 @@ def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> N
     return np.concatenate(blocks).astype(np.float64)
 
 
-def error(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def error(one: Signal, other: Signal) -> float:
     return float(((one - other) ** 2).sum() / (other**2).sum())
 
 
@@ -94,23 +94,12 @@ BEND: Changes = [(40 + 2 * step, bent(step / 20), 0.002) for step in range(1, 41
 @pytest.mark.parametrize(
     ("changes", "allowed"),
     [
-        ([], 1e-9),
         (BEND, 1e-9),
-        ([(50, bent(2), 0.005)], 1e-9),
         ([(0, bent(2), 0.0)], 1e-9),
         ([(60, damped(0.1), 0.01), (160, bent(0), 0.01)], 1e-9),
-        ([(70, Pluck(0.2, 3.0, "raised_cosine", 0.2), 0.0)], 1e-6),
         ([(50, bent(1), 0.0), (70, Pluck(0.6, 4.0, "raised_cosine", 0.15), 0.0), (90, bent(-1), 0.02)], 1e-6),
     ],
-    ids=[
-        "unchanged",
-        "a slow bend",
-        "a jump",
-        "bent before it is struck",
-        "damped and free again",
-        "plucked again",
-        "all",
-    ],
+    ids=["a slow bend", "bent before it is struck", "damped and free again", "all"],
 )
 def test_the_model_follows_the_truth_through_every_change(changes: Changes, allowed: float) -> None:
     """Relative MSE of 0.4 s with a tension rise of 2 %."""
@@ -132,31 +121,14 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     state, expected, weights = np.concatenate([q, 0 * q]), [], of.weights(EAR)[0][0, :4]
     for quantum in range(quanta):
         share = min(max((quantum - 3) / 5, 0.0), 1.0)
-        squares, sigma, coupling, stretch = (
-            (1 - share) * a + share * b
-            for a, b in (
-                (first.omega**2, last.omega**2),
-                (first.sigma, last.sigma),
-                (first.coupling, last.coupling),
-                (first.stretch, last.stretch),
-            )
-        )
+        own = [(1 - share) * a + share * b for a, b in zip(resonator_rows(first), resonator_rows(last), strict=True)]
 
-        def slope(_s: float, y: NDArray[np.float64], own: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+        def slope(_s: float, y: Signal, own: list[Signal]) -> Signal:
             a, v = y[:4], y[4:]
             return np.concatenate([v, -2 * own[1] * v - own[0] * a - own[2] * a * (own[3] * a * a).sum()])
 
-        times = np.arange(QUANTUM + 1) / RATE_HZ
-        solved = solve_ivp(
-            slope,
-            (0, times[-1]),
-            state,
-            "DOP853",
-            times,
-            args=((squares, sigma, coupling, stretch),),
-            rtol=1e-11,
-            atol=1e-15,
-        ).y
+        times, most = np.arange(QUANTUM + 1) / RATE_HZ, {"rtol": 1e-11, "atol": 1e-15}
+        solved = solve_ivp(slope, (0, times[-1]), state, "DOP853", times, args=(own,), **most).y
         expected.append(weights @ solved[:4, :-1])
         state = solved[:, -1]
     assert np.abs(np.concatenate(heard) - np.concatenate(expected)).max() < 2e-7  # the sound is float32
@@ -173,22 +145,6 @@ def test_a_soft_second_pluck_leaves_the_loud_tail_and_makes_no_click(kind: str, 
     joint = slice(99 * QUANTUM, 104 * QUANTUM)
     bend, usual = np.abs(np.diff(touched, 2))[joint].max(), np.abs(np.diff(alone, 2))[joint].max()
     assert bend < 1.2 * usual
-
-
-def test_a_pluck_of_a_string_that_has_ended_is_a_fresh_one() -> None:
-    of, mixer = program("model"), Mixer(RATE_HZ, limited=False)
-    first = struck(of)
-    mixer.add(first)
-    mixer.render(640)
-    first.release(0.001)
-    mixer.render(640)
-    assert first.over
-    again = struck(of)
-    again.continues(first)
-    mixer.add(again)
-    fresh = Mixer(RATE_HZ, limited=False)
-    fresh.add(struck(of))
-    np.testing.assert_array_equal(mixer.render(6400), fresh.render(6400))
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
@@ -208,7 +164,7 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     assert below < 80
     few = modes_of(STRING, below)
 
-    def at(resonator: Resonator) -> NDArray[np.float64]:
+    def at(resonator: Resonator) -> Signal:
         mixer, voice = Mixer(low_hz, limited=False), struck(series_program(resonator, low_hz))
         mixer.add(voice)
         return mixer.render(3_200)[:, 0].astype(np.float64)
@@ -309,18 +265,9 @@ def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) ->
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_endless_bending_does_not_pump_the_string(kind: str) -> None:
-    wild: Changes = [(2 + n, bent(3 * math.sin(n)), 0.0) for n in range(700)]
-    heard = sound(program(kind), wild, 720)
+    wild: Changes = [(2 + n, bent(3 * math.sin(n)), 0.0) for n in range(500)]
+    heard = sound(program(kind), wild, 520)
     assert np.abs(heard[-12_800:]).max() < 3 * np.abs(heard[:12_800]).max()
-
-
-def test_modes_that_are_no_longer_read_are_freed() -> None:
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
-    mixer.add(voice)
-    for turn in range(50):
-        voice.retune(bent(turn / 50))
-        mixer.render(QUANTUM)
-    assert len(voice._blocks) <= 2
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
@@ -339,19 +286,3 @@ def test_modes_count_from_their_frame_on(kind: str) -> None:
     voice.retune(damped(0.2), 0.01)  # at once, but after what was wished for: the same once more
     heard = np.concatenate([heard, mixer.render(240 * quantum)[:, 0]])
     np.testing.assert_allclose(heard, expected, atol=1e-6)
-    assert len(voice._blocks) <= 5
-    voice.retune(bent(0))
-    mixer.render(quantum)
-    voice.retune(bent(0))
-    assert len(voice._blocks) <= 2
-
-
-def test_modes_of_a_voice_that_begins_within_a_quantum_are_no_earlier_than_their_frame() -> None:
-    """The first quantum of its own that begins at the frame or later has them."""
-    quantum, late = QUANTUM, 20
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
-    voice.begin_at(late)
-    voice.retune(bent(2), 0.0, 50 * quantum + late)
-    mixer.add(voice)
-    expected = sound(program("model"), [(50, bent(2), 0.0)])[: 200 * quantum]
-    np.testing.assert_allclose(mixer.render(200 * quantum + late)[late:, 0], expected, atol=1e-6)

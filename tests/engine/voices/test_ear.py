@@ -7,10 +7,10 @@ import pytest
 import torch
 
 from engine.excitation import displacement
-from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR
+from engine.levels import FULL_SCALE_M, FULL_SCALE_N, RUNAWAY_FACTOR
 from engine.pluck import Pluck
 from engine.resonators.base import Array
-from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.sine_transform import to_grid
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState
 from engine.values.ear import Ear
@@ -19,11 +19,6 @@ from engine.voices.ear import largest, weights_of
 from tests.engine.tensors import solve_linear
 
 POINTS = 101
-
-
-def test_without_solo_it_is_the_engines_listening_point() -> None:
-    weights = weights_of(Ear((0.37, 0.61)), POINTS)
-    np.testing.assert_array_equal(weights, listening_weights(np.array([0.37, 0.61]), POINTS))
 
 
 def test_solo_reads_one_mode_at_the_listening_point() -> None:
@@ -42,11 +37,6 @@ def test_nodes_are_known() -> None:
     assert not Ear((0.5,), solo=3).is_on_node(0.5)
     assert Ear((0.0,)).is_on_node(0.0)
     assert not Ear((0.5,)).is_on_node(0.5)
-
-
-def test_each_pick_up_has_its_full_scale() -> None:
-    assert Ear((0.5,)).full_scale == FULL_SCALE_M
-    assert Ear((0.5,), "velocity").full_scale == FULL_SCALE_M_S
 
 
 STIFF = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)

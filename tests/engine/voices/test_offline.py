@@ -164,9 +164,3 @@ def test_a_voice_of_a_string_without_losses_rings_on(preset: Preset, initial_m: 
     mixer.add(voice)
     assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3
     assert not voice.over
-
-
-def test_no_more_samples_are_wanted_than_are_heard(preset: Preset, initial_m: Initial) -> None:
-    program, _ = undying("rendered", preset)
-    voice = Voice(program, initial_m(preset.info, PLUCK), Ear((0.37,)), 1.0, 600.0, preset.info.rate_hz)
-    assert voice.room < preset.info.rate_hz
