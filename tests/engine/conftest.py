@@ -42,8 +42,7 @@ def _shipped(name: str) -> Preset:
 
 @cache
 def _bank(name: str, rate_hz: int) -> Program:
-    preset = _shipped(name)
-    return model_program(preset, rate_hz)
+    return model_program(_shipped(name), rate_hz)
 
 
 def _initial_m(info: PresetInfo, pluck: Pluck) -> Array:

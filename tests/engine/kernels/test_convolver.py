@@ -109,20 +109,6 @@ def test_effects_come_and_go_by_a_fade_and_leave_every_sample_as_it_was() -> Non
     np.testing.assert_array_equal(found[begin + 31 * WINDOW :], samples[begin + 31 * WINDOW :])
 
 
-def test_nothing_clicks_while_effects_are_turned_through() -> None:
-    """A soft tone through ever other rooms and mixes: no step is much steeper than its own, and none has a corner."""
-    tone = np.repeat(0.1 * np.sin(2 * np.pi * 220 * np.arange(60_000) / RATE_HZ)[:, None], 2, 1).astype(np.float32)
-    mixer = mixer_with(Effects(room=Room(0.2, 0.3)), tone)
-    mixer.render(20_000)
-    found = []
-    for number in range(20):
-        mixer.set_effects(Effects(Body(number / 20), Room(0.2 + 0.01 * number, 0.3)) if number % 7 else None)
-        found.append(mixer.render(1777))
-    whole = np.concatenate(found).astype(np.float64)
-    assert np.abs(np.diff(whole, axis=0)).max() < 2 * np.abs(whole).max() * 2 * np.pi * 220 / RATE_HZ
-    assert np.abs(np.diff(whole, 3, axis=0)).max() < 1e-4  # a click is a corner
-
-
 @pytest.mark.parametrize("sounding", [True, False])
 def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding: bool) -> None:
     samples = noise(60_000)

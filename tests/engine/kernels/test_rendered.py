@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,10 @@ import pytest
 import soxr
 
 from engine.kernels.constants import QUANTUM
-from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.levels import FULL_SCALE_M
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, plain_program, rendered_program
-from tests.engine.sounds import RATE_HZ, Info, Rung, Samples, Signal, noise
+from tests.engine.sounds import RATE_HZ, Info, Rung, Samples, noise
 
 MIDDLE = Ear((0.5,))
 
@@ -101,11 +100,3 @@ def test_a_loop_goes_round_without_a_seam(rung: Rung) -> None:
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
     voice.loop()
     np.testing.assert_array_equal(rung(3500, voice, attack=False), np.tile(samples, (4, 1))[:3500])
-
-
-def test_velocity_is_that_of_the_samples(rung: Rung, derivative: Callable[..., Signal]) -> None:
-    voice = waiting(plain_program(RATE_HZ), 0.2, RATE_HZ, Ear((0.5,), "velocity"))
-    voice.append(band_limited(RATE_HZ, 0.2))
-    found = rung(4096, voice, attack=False)[:, :1]
-    fed = derivative(band_limited(RATE_HZ, 0.2) * FULL_SCALE_M, RATE_HZ)
-    np.testing.assert_allclose(found, fed[:4096] / FULL_SCALE_M_S, rtol=1e-5, atol=1e-6)

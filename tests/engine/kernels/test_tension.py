@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from engine.kernels import tension
-from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import record_of
 from engine.kernels.voice_records import TENSION_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_N
@@ -20,8 +19,7 @@ from engine.values.ear import Ear
 from engine.voices import Program, Voice, model_program
 from engine.voices.ear import weights_of
 from engine.voices.programs import truth_program
-from tests.engine.sounds import Initial, Rung, Shipped, Signal, mixer_of, relative
-from tests.engine.voices.changing import ChangingVoice
+from tests.engine.sounds import Initial, Rung, Shipped, Signal, relative
 
 STEREO = Ear((0.37, 0.8))
 
@@ -110,21 +108,6 @@ def test_what_is_set_out_comes_back(preset: Preset, program: Program) -> None:
         tension.physical(voice.record, back_q, back_v)
         assert relative(back_q, q) < 1e-14
         assert relative(back_v, v) < 1e-14
-
-
-def test_a_string_retuned_to_its_own_modes_does_not_change(preset: Preset, program: Program) -> None:
-    resonator, (q, v) = preset.info.resonator, ringing(preset.info, 301)
-    heard, latents = [], []
-    for retuned in (False, True):
-        voice = ChangingVoice(program, resonator.to_grid(q), STEREO, (q, v))
-        mixer = mixer_of(voice)
-        for _ in range(100):
-            if retuned:
-                voice.retune(resonator, 0.0)
-            heard.append(mixer.render(QUANTUM))
-        latents.append(voice.rows[:2].ravel())
-    np.testing.assert_allclose(np.concatenate(heard[100:]), np.concatenate(heard[:100]), rtol=0, atol=1e-7)
-    assert relative(latents[1], latents[0]) < 1e-12
 
 
 def test_it_falls_silent_and_ends(preset: Preset, program: Program, initial_m: Initial, rung: Rung) -> None:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.models.koopman_tension import SERIES, KoopmanTension
+from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
@@ -220,11 +220,6 @@ def test_the_precision_is_the_models_own() -> None:
             torch.set_default_dtype(torch.float32)
     assert found[0].dtype == found[1].dtype == model.shapes.dtype
     assert torch.equal(*found)
-
-
-def test_the_series_are_twelfths_at_small_steps() -> None:
-    model = made(NYLON, 25)
-    assert model.r.tolist() == model.p.tolist() == [SERIES, 0, 0, 0]
 
 
 @torch.no_grad()

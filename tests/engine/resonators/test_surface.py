@@ -51,11 +51,6 @@ def test_density_holds_all_of_a_mode(surface: Surface) -> None:
     assert np.allclose(found, 1, atol=2e-3)
 
 
-def test_frequencies_of_the_circle_are_zeros_of_bessel_functions() -> None:
-    assert np.allclose(CIRCLE.wavenumber[:6] * 0.2, [2.404826, 3.831706, 3.831706, 5.135622, 5.135622, 5.520078])
-    assert list(CIRCLE.m[:6]) == [0, 1, 1, 2, 2, 0]
-
-
 def test_the_mean_over_a_disc() -> None:
     place, radius = np.array([0.3, -0.2]), 0.02
     disc = GRID[np.hypot(*GRID.T) <= 1] * (radius / metres(CIRCLE)) + place
@@ -63,11 +58,6 @@ def test_the_mean_over_a_disc() -> None:
     spread = [kernel.spread(each * radius, tools()) for each in CIRCLE.wavenumber]
     found = CIRCLE.shapes(place[None])[:, 0] * spread
     assert np.allclose(found, expected, atol=2e-3)
-
-
-def test_the_edge_rests() -> None:
-    angle = np.linspace(0, 6, 20)
-    assert np.abs(CIRCLE.shapes(np.stack([np.cos(angle), np.sin(angle)], axis=1))).max() < 1e-9
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-5, 2e-4, 0.3, 5.0, 77.7, 280.0])

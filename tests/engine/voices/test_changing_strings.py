@@ -21,7 +21,7 @@ from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices import Mixer, Program, Voice
+from engine.voices import Mixer, Program
 from engine.voices.programs import solver_program, tension_program
 from engine.voices.voice import resonator_rows
 from tests.engine.sounds import RATE_HZ, Signal
@@ -172,22 +172,6 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     np.testing.assert_allclose(at(own), at(few), atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
-    of, mixer = program(kind), Mixer(RATE_HZ, limited=False)
-    both = Voice(of, 2 * PLUCK.displacement(101), EAR)
-    both.never_ends()
-    alone = Mixer(RATE_HZ, limited=False)
-    alone.add(both)
-    first, second = struck(of), struck(of)
-    second.continues(first)
-    mixer.add(first)
-    mixer.add(second)
-    np.testing.assert_allclose(mixer.render(9_600), alone.render(9_600), atol=1e-6)
-    assert first.over
-    assert not second.over
-
-
 def stopping(before: ChangingVoice, of: Program, seconds: float = 0.006) -> ChangingVoice:
     voice = struck(of)
     voice.stops(before, seconds)
@@ -228,29 +212,6 @@ def test_of_plucks_that_wait_the_last_alone_sounds_and_the_ringing_one_is_stoppe
     heard = mixer.render(32_000)[:, 0]
     np.testing.assert_allclose(heard[320:], fresh.render(32_000)[320:, 0], atol=1e-6)
     assert [each.over for each in (ringing, waits, later, last)] == [True, True, True, False]
-
-
-def test_a_pluck_that_is_added_does_not_wait_for_one_of_a_later_frame() -> None:
-    """It is added to the string that rings, and the later one never sounds."""
-    of, mixer, alone = program("model"), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    ringing, again = struck(of), struck(of)
-    alone.add(ringing)
-    alone.render(6_400)
-    again.continues(ringing)
-    alone.add(again)
-    expected = alone.render(12_800)
-    ringing = struck(of)
-    mixer.add(ringing)
-    mixer.render(6_400)
-    later = stopping(ringing, of)
-    later.begin_at(8_000)
-    added = struck(of)
-    added.continues(later)
-    mixer.add(later)
-    mixer.add(added)
-    np.testing.assert_array_equal(mixer.render(12_800), expected)
-    assert ringing.over
-    assert later.over
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
