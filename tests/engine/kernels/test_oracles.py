@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,9 @@ from scipy.signal import freqz
 from engine.kernels import compiled, fourier, javari, loudness, pulses, responses, strings, velocities
 from engine.kernels import constants as of
 from engine.kernels.rotation import rotation
+from engine.resonators.losses import loss_rates
 from engine.resonators.string import resonator_of
-from engine.values.string import StringParameters
+from engine.values.string import Losses, StringParameters
 from tests.engine.sounds import Signal
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
@@ -68,6 +70,20 @@ def modes_of_the_equation() -> Signal:
     squares = (bending * eta**4 + STEEL.tension_n * eta**2) / mass
     sigma = (STEEL.damping_d1_kg_m_s + STEEL.damping_d3_kg_m_s * eta**2) / (2 * mass)
     return np.concatenate([squares, sigma, stiffness * eta**2 / (4 * mass), eta**2])
+
+
+def polarised_rows(kernel: Any) -> Signal:
+    """Two partials of two modes and one of one, with a bridge that moves and losses by mode."""
+    found = np.empty(4 * 5)
+    kernel(np.array(astuple(STEEL)), 5, 2, 1.01, 0.01, 0.002, 1.2, 1e-4, 0.02, found)
+    return found
+
+
+def polarised_modes() -> Signal:
+    squares, sigma, coupling, stretch = modes_of_the_equation().reshape(4, -1)[:, [0, 0, 1, 1, 2]]
+    losses = loss_rates(Losses(1.2, 1e-4, 0.02), STEEL, 3)[[0, 0, 1, 1, 2]]
+    lost = STEEL.tension_n / STEEL.length_m * np.array([0.01, 0.002, 0.01, 0.002, 0.01])
+    return np.concatenate([squares * [1, 1.01, 1, 1.01, 1], sigma + losses + lost, coupling, stretch])
 
 
 def fretted(kernel: Any) -> Signal:
@@ -154,6 +170,7 @@ KERNELS = {
         1e-9,
     ),
     "the modes of a string": Kernel(strings.rows, rows, modes_of_the_equation, 1e-13),
+    "both directions of its modes": Kernel(strings.rows, polarised_rows, polarised_modes, 1e-13),
     "a string that is stopped": Kernel(strings.stop, fretted, lambda: [300.0, 1, 1], 1e-9),
     "modes below a frequency": Kernel(
         strings.modes_below,
@@ -199,13 +216,18 @@ KERNELS = {
 }
 
 
+@cache
+def both(function: Any) -> tuple[Any, Any]:
+    """A kernel compiled and in plain Python."""
+    if isinstance(function, Dispatcher):
+        return function, function.py_func
+    return njit(error_model="numpy")(function), function
+
+
 @pytest.mark.parametrize("name", KERNELS)
 def test_compiled_it_is_plain_python_and_the_oracle(name: str) -> None:
     kernel = KERNELS[name]
-    if isinstance(kernel.function, Dispatcher):
-        fast, plain = kernel.function, kernel.function.py_func
-    else:
-        fast, plain = njit(error_model="numpy")(kernel.function), kernel.function
+    fast, plain = both(kernel.function)
     found = np.asarray(kernel.use(fast), float)
     np.testing.assert_allclose(np.asarray(kernel.use(plain), float), found, rtol=1e-12, atol=kernel.atol)
     np.testing.assert_allclose(found, np.asarray(kernel.oracle(), float), rtol=kernel.rtol, atol=kernel.atol)

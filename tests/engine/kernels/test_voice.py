@@ -35,6 +35,7 @@ from tests.engine.sounds import (
 
 FADE = round(FADE_S * RATE_HZ)
 KNOWING, STEEL = "nylon_nonlinear_gaussian_4k_koopman_integrated", "studio_steel_e4"
+HINTED = "nylon_nonlinear_gaussian_4k_koopman_integrated_hinted"
 EAR = Ear((0.37,))
 
 
@@ -125,8 +126,8 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
 @pytest.mark.parametrize("solo", [0, 2])
 def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
-    moved, mixer = struck(kind, here), Mixer(RATE_HZ, limited=False)
-    mixer.add(moved)
+    moved = struck(kind, here)
+    mixer = mixer_of(moved)
     mixer.render(1920)
     assert moved.listen(there)
     assert not moved.listen(here), "a fade is under way"
@@ -143,8 +144,8 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int
 @pytest.mark.parametrize("gain", [0.0, 1.0])
 @KINDS
 def test_what_has_become_silent_ends_by_itself(kind: str, gain: float, struck: Strike, small_info: Info) -> None:
-    voice, mixer = struck(kind, gain=gain), Mixer(RATE_HZ, limited=False)
-    mixer.add(voice)
+    voice = struck(kind, gain=gain)
+    mixer = mixer_of(voice)
     level, found = np.inf, np.zeros((1, 2), np.float32)
     while not voice.over and voice.seconds < 40:
         level, found = float(np.abs(found).max()), mixer.render(9600)
@@ -252,7 +253,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
             info = small_info(True)
             voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
         else:
-            name = {"knowing": KNOWING, "hinted": f"{KNOWING}_hinted", "steel": STEEL}[str(kind)]
+            name = {"knowing": KNOWING, "hinted": HINTED, "steel": STEEL}[str(kind)]
             voice = strike(name, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:
@@ -291,7 +292,7 @@ def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_with
     voice.set_gain(0.25)
     found = mixer.render(2000)[:, 0]
     first = int(np.argmax(found != 0.5))
-    assert first < QUANTUM
+    assert first < QUANTUM and voice.sounding
     np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * faded(FADE)), atol=1e-7)
     np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
     assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05

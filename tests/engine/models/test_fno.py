@@ -38,7 +38,7 @@ class FourierLaws(ModelLaws):
 
     sizes: ClassVar = {"width": 6}
     variants = ({}, {"width": 3})  # by the kernel, and by the roll-out, which takes an odd width
-    blocks = (1, 64, 65, 513, 57, 1200)
+    blocks = (1, 64, 65, 313, 57)
     reference = 1e-6
     reference_sizes: ClassVar = {"grid_points": 11, "width": 6}
     convolutions: dict[str, str]

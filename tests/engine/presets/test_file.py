@@ -40,16 +40,19 @@ class Fault:
     Attributes:
         facts: changes its metadata; `text` and `raw` change them and the whole file as they are written.
         many: of the preset of many strings, whose tensors hold its string.
-        described: whether a description alone shows it.
     """
 
     words: str
     facts: Callable[[dict[str, Any]], Any] = lambda facts: None
     text: Callable[[str], str] = str
-    tensors: Callable[[dict[str, torch.Tensor]], Any] = lambda tensors: None
-    raw: Callable[[bytes], bytes] = bytes
+    tensors: Callable[[dict[str, torch.Tensor]], Any] | None = None
+    raw: Callable[[bytes], bytes] | None = None
     many: bool = False
-    described: bool = True
+
+    @property
+    def described(self) -> bool:
+        """Return True if the description alone shows it."""
+        return self.tensors is None and self.raw is None
 
     def write(self, path: Path) -> None:
         data = path.read_bytes()
@@ -57,8 +60,10 @@ class Fault:
         facts = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][METADATA_KEY])
         tensors = load(data)
         self.facts(facts)
-        self.tensors(tensors)
-        path.write_bytes(self.raw(save(tensors, {METADATA_KEY: self.text(json.dumps(facts))})))
+        if self.tensors is not None:
+            self.tensors(tensors)
+        written = save(tensors, {METADATA_KEY: self.text(json.dumps(facts))})
+        path.write_bytes(self.raw(written) if self.raw is not None else written)
 
 
 def sets(**values: Any) -> Callable[[dict[str, Any]], None]:
@@ -90,7 +95,7 @@ FAULTS = {
     "bad string": Fault("length_m must lie in", sets(length_m=-1)),
     "too many modes": Fault("cannot hold 100 modes", sets(modes=100)),
     "other grid": Fault("grid_points is 51, the model's grid has 101", lambda facts: facts.update(grid_points=51)),
-    "other size": Fault("has shape .* expected", sets(state_size=17), described=False),
+    "other size": Fault("has shape .* expected", sets(state_size=17), tensors=dict),
     "unknown size": Fault("unknown field 'depth'", lambda facts: facts["model_configuration"].update(depth=3)),
     "no bounds": Fault(r"metadata\.trained_range.*peak_m or tension_rise must be given", sets(peak_m=None)),
     "a shape": Fault("width is of 'square', not of one of gaussian", sets(width={"square": [0.1, 0.2]})),
@@ -124,37 +129,27 @@ FAULTS = {
     "an escape in a field": Fault("unknown field", sets(**{"\x1b]0;owned\x07\nfield": 1})),
     "metadata of 2 MB": Fault("header|longer", text=lambda text: text[:-1] + " " * 2_000_000 + "}"),
     # weights
-    "missing": Fault("tensor 'nu_log' is missing", tensors=lambda t: t.pop("nu_log"), described=False),
-    "unknown": Fault("tensor 'extra' is unknown", tensors=lambda t: t.update(extra=torch.zeros(1)), described=False),
+    "missing": Fault("tensor 'nu_log' is missing", tensors=lambda t: t.pop("nu_log")),
+    "unknown": Fault("tensor 'extra' is unknown", tensors=lambda t: t.update(extra=torch.zeros(1))),
     "re-shaped": Fault(
-        r"'nu_log' has shape \(15,\), expected \(16,\)",
-        tensors=lambda t: t.update(nu_log=torch.zeros(15)),
-        described=False,
+        r"'nu_log' has shape \(15,\), expected \(16,\)", tensors=lambda t: t.update(nu_log=torch.zeros(15))
     ),
     "re-typed": Fault(
-        "of type F64, expected F32",
-        tensors=lambda t: t.update(nu_log=torch.zeros(16, dtype=torch.float64)),
-        described=False,
+        "of type F64, expected F32", tensors=lambda t: t.update(nu_log=torch.zeros(16, dtype=torch.float64))
     ),
     "NaN": Fault(
-        "'encoder.weight' .* not finite",
-        tensors=lambda t: t["encoder.weight"].view(-1)[5].fill_(float("nan")),
-        described=False,
+        "'encoder.weight' .* not finite", tensors=lambda t: t["encoder.weight"].view(-1)[5].fill_(float("nan"))
     ),
-    "infinite": Fault(
-        "'theta_log' .* not finite", tensors=lambda t: t["theta_log"][0].fill_(float("inf")), described=False
-    ),
+    "infinite": Fault("'theta_log' .* not finite", tensors=lambda t: t["theta_log"][0].fill_(float("inf"))),
     **{
         f"cut to {size} bytes": Fault(
-            "not a whole safetensors file .* get the preset again",
-            raw=lambda data, size=size: data[:size],
-            described=False,
+            "not a whole safetensors file .* get the preset again", raw=lambda data, size=size: data[:size]
         )
         for size in (0, 7, 200, 2000)
     },
     # a voice takes its string from the metadata, a picture from the tensors
     **{
-        name: Fault(OTHER_STRING % tensor, facts=facts, tensors=tensors, many=True, described=False)
+        name: Fault(OTHER_STRING % tensor, facts=facts, tensors=tensors, many=True)
         for name, tensor, facts, tensors in (
             ("another string", "nu_log|theta_log", sets(tension_n=61.0), lambda t: None),
             ("another rate", "nu_log", sets(rate_hz=44_100), lambda t: None),

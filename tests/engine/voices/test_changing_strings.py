@@ -24,7 +24,7 @@ from engine.values.string import StringParameters
 from engine.voices import Mixer, Program
 from engine.voices.programs import solver_program, tension_program
 from engine.voices.voice import resonator_rows
-from tests.engine.sounds import RATE_HZ, Signal
+from tests.engine.sounds import RATE_HZ, Signal, mixer_of
 from tests.engine.voices.changing import ChangingVoice
 
 STRING = StringParameters(tension_n=80.0, second_moment_m4=1.4e-14)
@@ -110,9 +110,9 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     """Against DOP853, quantum by quantum, with the modes that the voice had then."""
     first, last, quanta = modes_of(STRING, 4), modes_of(replace(STRING, tension_n=95.0, length_m=0.6), 4), 12
     of = program("truth", first, coarser=1)
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(of)
+    voice = struck(of)
     voice.begin_at_once()
-    mixer.add(voice)
+    mixer = mixer_of(voice)
     heard = [mixer.render(4 * QUANTUM)[:, 0]]
     voice.retune(last, 5 * QUANTUM / RATE_HZ)
     heard.append(mixer.render((quanta - 4) * QUANTUM)[:, 0])
@@ -136,24 +136,16 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_soft_second_pluck_leaves_the_loud_tail_and_makes_no_click(kind: str, pickup: str) -> None:
-    of, ear = program(kind), Ear((0.37,), pickup)  # type: ignore[arg-type]
-    alone = sound(of, [], ear=ear)
-    touched = sound(of, [(100, Pluck(0.3, 0.02, "raised_cosine", 0.2), 0.0)], ear=ear)
-    after = slice(101 * QUANTUM, 200 * QUANTUM)
+def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind: str, pickup: str) -> None:
+    """Of next to nothing, sample by sample: the motion continues in its own time, however far ahead it was made."""
+    of, ear = program(kind), Ear((0.37, 0.6), pickup)
+    soft, faint = (Pluck(0.3, amplitude_mm, "raised_cosine", 0.2) for amplitude_mm in (0.02, 1e-4))
+    alone, touched = sound(of, [], ear=ear), sound(of, [(100, soft, 0.0)], ear=ear)
+    after, joint = slice(101 * QUANTUM, 200 * QUANTUM), slice(99 * QUANTUM, 104 * QUANTUM)
     assert np.std(touched[after]) == pytest.approx(np.std(alone[after]), rel=0.05)
-    joint = slice(99 * QUANTUM, 104 * QUANTUM)
     bend, usual = np.abs(np.diff(touched, 2))[joint].max(), np.abs(np.diff(alone, 2))[joint].max()
     assert bend < 1.2 * usual
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_second_pluck_of_next_to_nothing_changes_nothing(kind: str, pickup: str) -> None:
-    """Sample by sample: the motion continues in its own time, however far ahead a voice was generated."""
-    of, ear = program(kind), Ear((0.37, 0.6), pickup)  # type: ignore[arg-type]
-    faint = Pluck(0.3, 1e-4, "raised_cosine", 0.2)
-    touched, alone = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear), sound(of, [], ear=ear)
+    touched = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear)
     np.testing.assert_allclose(touched, alone, atol=2e-4 * np.abs(alone).max())
 
 
@@ -165,53 +157,37 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     few = modes_of(STRING, below)
 
     def at(resonator: Resonator) -> Signal:
-        mixer, voice = Mixer(low_hz, limited=False), struck(series_program(resonator, low_hz))
-        mixer.add(voice)
-        return mixer.render(3_200)[:, 0].astype(np.float64)
+        return mixer_of(struck(series_program(resonator, low_hz)), rate_hz=low_hz).render(3_200)[:, 0]
 
     np.testing.assert_allclose(at(own), at(few), atol=1e-4)
 
 
-def stopping(before: ChangingVoice, of: Program, seconds: float = 0.006) -> ChangingVoice:
+def stopping(before: ChangingVoice, of: Program) -> ChangingVoice:
     voice = struck(of)
-    voice.stops(before, seconds)
+    voice.stops(before, 0.006)
     return voice
 
 
+@pytest.mark.parametrize("waiting", [False, True])
 @pytest.mark.parametrize("kind", ["model", "truth"])
-def test_a_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(kind: str) -> None:
-    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    first = struck(of)
-    mixer.add(first)
+def test_the_last_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(
+    kind: str, waiting: bool
+) -> None:
+    """Also where others wait, the one that is stopped last until a later frame: they never sound."""
+    of, ringing = program(kind), struck(program(kind))
+    mixer, plucks = mixer_of(ringing), [ringing]
     mixer.render(6_400)
-    mixer.add(stopping(first, of))
-    fresh.add(struck(of))
-    heard = mixer.render(6_400)[:, 0]
-    left = heard - fresh.render(6_400)[:, 0]
-    done = np.minimum(np.arange(1, 6_401) / 288, 1)
-    expected = (1 - done**2 * (3 - 2 * done)) * sound(of, [], 200)[6_400:]
+    for begins in (0, 20_000, 0) if waiting else (0,):
+        plucks.append(stopping(plucks[-1], of))
+        if begins:
+            plucks[-1].begin_at(begins)
+    for pluck in plucks[1:]:
+        mixer.add(pluck)
+    left = mixer.render(16_000)[:, 0] - mixer_of(struck(of)).render(16_000)[:, 0]
+    done = np.minimum(np.arange(1, 16_001) / 288, 1)
+    expected = (1 - done**2 * (3 - 2 * done)) * sound(of, [], 350)[6_400:]
     np.testing.assert_allclose(left, expected, atol=1e-6)
-    assert first.over
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_of_plucks_that_wait_the_last_alone_sounds_and_the_ringing_one_is_stopped(kind: str) -> None:
-    """Also where the one that is stopped was to begin later."""
-    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    ringing = struck(of)
-    mixer.add(ringing)
-    mixer.render(6_400)
-    waits = stopping(ringing, of)
-    later = stopping(waits, of)
-    later.begin_at(20_000)
-    last = stopping(later, of)
-    mixer.add(waits)
-    mixer.add(later)
-    mixer.add(last)
-    fresh.add(struck(of))
-    heard = mixer.render(32_000)[:, 0]
-    np.testing.assert_allclose(heard[320:], fresh.render(32_000)[320:, 0], atol=1e-6)
-    assert [each.over for each in (ringing, waits, later, last)] == [True, True, True, False]
+    assert [each.over for each in plucks] == [True] * (len(plucks) - 1) + [False]
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
