@@ -109,6 +109,11 @@ def test_effects_come_and_go_by_a_fade_and_leave_every_sample_as_it_was() -> Non
     np.testing.assert_array_equal(found[begin + 31 * WINDOW :], samples[begin + 31 * WINDOW :])
 
 
+def kept(mixer: Mixer) -> int:
+    """The responses in memory: the one that is heard, faded to, or wanted."""
+    return len(mixer._impulses)
+
+
 @pytest.mark.parametrize("sounding", [True, False])
 def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding: bool) -> None:
     samples = noise(60_000)
@@ -117,9 +122,10 @@ def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding: bool) -> None
     impulses = [response(500, 1, seed).impulse(RATE_HZ) for seed in range(9)]
     for seed in range(1, 9):
         mixer.set_effects(response(500, 1, seed))
+    assert kept(mixer) <= 3
     found = np.concatenate([mixer.render(WINDOW) for _ in range(10)])
     mixer.forget_ended()
-    assert mixer.effects is not None
+    assert mixer.effects is not None and kept(mixer) == 1
     np.testing.assert_array_equal(mixer.effects.impulse(RATE_HZ), impulses[-1])
     if sounding:
         expected = apply(mixer.effects, samples, RATE_HZ)[640 : 640 + len(found)]
@@ -145,6 +151,8 @@ def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_again() -> N
         mixer.render(64)
         mixer.add(wet(noise(640)))
         np.testing.assert_allclose(mixer.render(1024), expected, atol=1e-6)
+    mixer.forget_ended()
+    assert kept(mixer) == 0
 
 
 @pytest.mark.parametrize("gain", [1e-25, 1e-310])
