@@ -94,15 +94,6 @@ class StateSpaceLaws(ModelLaws):
         model(released(), 40)
         assert all(block.normalization.running_mean.any() for block in model.layers)
 
-    def test_what_is_no_number_stays_none(self) -> None:
-        with torch.no_grad():
-            assert torch.isnan(self.made()(torch.full((1, 21), torch.nan), 3)).all()
-
-    def test_it_carries_its_state_in_double_precision(self) -> None:
-        model = self.made()
-        _, state = model.advance(model.encode(released()), 70)
-        assert {latent.dtype for latent in state.latents} == {torch.complex128}
-
     @pytest.mark.parametrize("how", ["in place", "memory", "parameter", "loaded", "optimiser", "statistics"])
     def test_what_was_folded_for_rendering_follows_the_weights(self, how: str) -> None:
         model = self.stirred()

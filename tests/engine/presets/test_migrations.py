@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from collections.abc import Callable
 from contextlib import suppress
@@ -63,58 +64,48 @@ def test_the_chain_is_whole() -> None:
     assert sorted(MIGRATIONS) == list(range(1, FORMAT_VERSION))
 
 
-@pytest.mark.parametrize(
-    ("model", "initialisation", "knows"),
-    [
-        ("koopman_integrated", "averaging", "the modes of the string at rest, and how tension couples them"),
-        (
-            "koopman_integrated",
-            "phases of the displacement",
-            "that a string may be mirrored and its sign turned, and how many modes it has",
-        ),
-        ("fgru", "phases of the displacement", "that a string may be mirrored and its sign turned"),
-        ("koopman", "blind matching pursuit", "that a string may be mirrored and its sign turned"),
-        ("koopman", "paper", ""),
-    ],
-)
-def test_version_1_is_reported_what_its_start_knew(model: str, initialisation: str, knows: str) -> None:
-    old = {"format_version": 1, "model": model, "initialisation": initialisation, "title": "as it was"}
-    assert migrated(old) == {**old, "format_version": FORMAT_VERSION, "knows": knows}
-    assert old["format_version"] == 1  # the input stays as it is
+MIRRORED = "that a string may be mirrored and its sign turned"
+AVERAGED = "the modes of the string at rest, and how tension couples them"
 
 
-def test_the_input_of_version_3_is_what_every_model_sets_out_from() -> None:
-    old = {"format_version": 3, "model_configuration": {"state_size": 3, "input": "displacement"}}
-    assert migrated(old) == {"format_version": FORMAT_VERSION, "model_configuration": {"state_size": 3}}
-    with pytest.raises(UnknownVersion, match="input 'two_frames' is no longer read; train the model again"):
-        migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
+def started(model: str, how: str, knows: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Of version 1: what its start knew of the resonator."""
+    old = {"format_version": 1, "model": model, "initialisation": how, "title": "as it was"}
+    return old, {**old, "knows": knows}
+
+
+def ranged(initial: str, half_width: Any, width: Any, widths: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Of version 4: widths by shape, and no peak of a family."""
+    family = half_width and {"half_width": half_width}
+    plucks = {"position": None, "width": width, "peak_m": [1e-3, 1e-2], "tension_rise": 0.5}
+    old = {"format_version": 4, "initial": initial, "family": family, "trained_range": plucks}
+    return old, {**old, "trained_range": {**plucks, "width": widths, "peak_m": None if family else plucks["peak_m"]}}
 
 
 @pytest.mark.parametrize(
-    ("initial", "family", "width", "peak_m", "expected"),
+    ("old", "new"),
     [
-        ("gaussian", None, [0.02, 0.1], [1e-3, 1e-2], {"gaussian": [0.02, 0.1]}),
-        ("noise", None, None, [1e-3, 1e-2], None),
-        ("pluck", None, [0.03, 0.3], [5e-4, 1e-2], {"gaussian": [0.03, 0.3], "raised_cosine": [0.03, 0.3]}),
+        started("koopman_integrated", "averaging", AVERAGED),
+        started("koopman_integrated", "phases of the displacement", f"{MIRRORED}, and how many modes it has"),
+        started("fgru", "phases of the displacement", MIRRORED),
+        started("koopman", "blind matching pursuit", MIRRORED),
+        started("koopman", "paper", ""),
         (
-            "pluck",
-            {"half_width": [0.04, 0.15]},
-            [0.04, 0.3],
-            [5e-4, 1e-2],
-            {"gaussian": [0.04, 0.15], "raised_cosine": [0.08, 0.3]},
+            {"format_version": 3, "model_configuration": {"state_size": 3, "input": "displacement"}},
+            {"model_configuration": {"state_size": 3}},
         ),
+        ranged("gaussian", None, [0.02, 0.1], {"gaussian": [0.02, 0.1]}),
+        ranged("noise", None, None, None),
+        ranged("pluck", None, [0.03, 0.3], {"gaussian": [0.03, 0.3], "raised_cosine": [0.03, 0.3]}),
+        ranged("pluck", [0.04, 0.15], [0.04, 0.3], {"gaussian": [0.04, 0.15], "raised_cosine": [0.08, 0.3]}),
     ],
 )
-def test_version_4_states_widths_by_shape_and_no_peak_of_a_family(
-    initial: str, family: Any, width: Any, peak_m: Any, expected: Any
+def test_an_older_version_becomes_the_present_one_and_stays_as_it_is(
+    old: dict[str, Any], new: dict[str, Any]
 ) -> None:
-    of_plucks = {"position": None, "width": width, "peak_m": peak_m, "tension_rise": 0.5}
-    old = {"format_version": 4, "initial": initial, "family": family, "trained_range": of_plucks}
-    found = migrated(old)
-    assert found["format_version"] == FORMAT_VERSION
-    assert found["trained_range"] == {**of_plucks, "width": expected, "peak_m": None if family else peak_m}
-    assert old["trained_range"] is of_plucks  # the input stays as it is
-    assert of_plucks["width"] == width
+    kept = copy.deepcopy(old)
+    assert migrated(old) == {**new, "format_version": FORMAT_VERSION}
+    assert old == kept
 
 
 @pytest.mark.parametrize("wrong", [None, 5, "wide", [1], {"half_width": "wide"}, {"half_width": [1]}, {}])
@@ -128,6 +119,8 @@ def test_other_versions_are_refused(version: Any) -> None:
     remedy = "update the program" if version == FORMAT_VERSION + 1 else "get the preset again"
     with pytest.raises(UnknownVersion, match=remedy):
         migrated({"format_version": version})
+    with pytest.raises(UnknownVersion, match="input 'two_frames' is no longer read; train the model again"):
+        migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
 
 
 def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset: Path, tmp_path: Path) -> None:
