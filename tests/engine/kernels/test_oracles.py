@@ -172,11 +172,6 @@ KERNELS = {
     "the modes of a string": Kernel(strings.rows, rows, modes_of_the_equation, 1e-13),
     "both directions of its modes": Kernel(strings.rows, polarised_rows, polarised_modes, 1e-13),
     "a string that is stopped": Kernel(strings.stop, fretted, lambda: [300.0, 1, 1], 1e-9),
-    "modes below a frequency": Kernel(
-        strings.modes_below,
-        lambda kernel: [kernel(STEEL.row, hz) for hz in (0.0, 1_000.0, 20_000.0)],
-        lambda: [int((resonator_of(STEEL, 99).omega < 2 * np.pi * hz).sum()) for hz in (0.0, 1_000.0, 20_000.0)],
-    ),
     "the time of a contact": Kernel(
         velocities.contact_s,
         at([4.0, 4.0, 4.0, 0.0, 4.0], [1.0, 1.0, 1.0, 1.0, 0.0], [0.0, 0.5, 1.0, 0.5, 0.5]),

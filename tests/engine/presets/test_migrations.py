@@ -100,7 +100,7 @@ def ranged(initial: str, half_width: Any, width: Any, widths: Any) -> tuple[dict
         ranged("pluck", [0.04, 0.15], [0.04, 0.3], {"gaussian": [0.04, 0.15], "raised_cosine": [0.08, 0.3]}),
     ],
 )
-def test_an_older_version_becomes_the_present_one_and_stays_as_it_is(
+def test_an_older_version_becomes_the_present_one_without_change_of_its_own(
     old: dict[str, Any], new: dict[str, Any]
 ) -> None:
     kept = copy.deepcopy(old)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import torch
 
 from engine.kernels import strings
@@ -68,22 +67,6 @@ def test_without_an_angle_it_moves_as_one_string() -> None:
     law = resonator_of(STRING, 30)
     alone = SplittingSolver(law, 48_000).solve(ModalState.at_rest(law.to_modes(PLUCK.displacement(101))[None]), 400)
     np.testing.assert_allclose(found, alone @ law.shapes, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("partials", [10, 60])
-def test_the_bridge_takes_from_both_and_detunes_the_second(partials: int) -> None:
-    resonator, law, pairs = (
-        polarised(MOVING, STRING, partials, decay=1.7),
-        resonator_of(STRING, partials),
-        min(24, partials),
-    )
-    pull = 1.7 * STRING.tension_n / STRING.length_m
-    for direction, cents, conductance in ((0, 0.0, 0.02), (1, 2.0, MOVING.second_conductance_s_kg)):
-        own = slice(direction, 2 * pairs, 2)
-        np.testing.assert_allclose(resonator.omega[own], law.omega[:pairs] * 2 ** (cents / 1200), rtol=1e-12)
-        np.testing.assert_allclose(resonator.sigma[own], law.sigma[:pairs] + pull * conductance, rtol=1e-12)
-    np.testing.assert_allclose(resonator.omega[2 * pairs :], law.omega[pairs:], rtol=1e-12)
-    np.testing.assert_allclose(resonator.coupling[: 2 * pairs], np.repeat(law.coupling[:pairs], 2), rtol=1e-12)
 
 
 def test_both_share_one_tension_in_the_truth_and_in_the_learned_curves() -> None:

@@ -162,34 +162,6 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     np.testing.assert_allclose(at(own), at(few), atol=1e-4)
 
 
-def stopping(before: ChangingVoice, of: Program) -> ChangingVoice:
-    voice = struck(of)
-    voice.stops(before, 0.006)
-    return voice
-
-
-@pytest.mark.parametrize("waiting", [False, True])
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_the_last_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(
-    kind: str, waiting: bool
-) -> None:
-    """Also where others wait, the one that is stopped last until a later frame: they never sound."""
-    of, ringing = program(kind), struck(program(kind))
-    mixer, plucks = mixer_of(ringing), [ringing]
-    mixer.render(6_400)
-    for begins in (0, 20_000, 0) if waiting else (0,):
-        plucks.append(stopping(plucks[-1], of))
-        if begins:
-            plucks[-1].begin_at(begins)
-    for pluck in plucks[1:]:
-        mixer.add(pluck)
-    left = mixer.render(16_000)[:, 0] - mixer_of(struck(of)).render(16_000)[:, 0]
-    done = np.minimum(np.arange(1, 16_001) / 288, 1)
-    expected = (1 - done**2 * (3 - 2 * done)) * sound(of, [], 350)[6_400:]
-    np.testing.assert_allclose(left, expected, atol=1e-6)
-    assert [each.over for each in plucks] == [True] * (len(plucks) - 1) + [False]
-
-
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) -> None:
     high = modes_of(STRING, 80)
