@@ -12,7 +12,7 @@ from engine.resonators.sine_transform import to_grid, to_modes
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_pluck_peaks_where_and_as_far_as_asked(shape: str) -> None:
-    displacement = Pluck(position=0.3, amplitude_mm=2.5, shape=shape, width=0.1).displacement(101)  # type: ignore[arg-type]
+    displacement = Pluck(position=0.3, amplitude_mm=2.5, shape=shape, width=0.1).displacement(101)
     assert abs(int(displacement.argmax()) - 30) <= (2 if shape == "rounded" else 0)  # it is round where it is pulled
     assert float(displacement.max()) == pytest.approx(2.5e-3)
     assert (displacement[[0, -1]] == 0).all()

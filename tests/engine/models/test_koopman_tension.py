@@ -98,7 +98,7 @@ def test_what_backward_error_analysis_knows_is_worth_two_orders(string: StringPa
 @torch.no_grad()
 def test_a_quiet_string_is_the_linear_one() -> None:
     displacement = (pluck_m(NYLON, 25, 1e-9) / 1e-3).float()
-    linear: ClassVar = build_model("koopman_tension", {"modes": 25})
+    linear = build_model("koopman_tension", {"modes": 25})
     physics = Physics(resonator_of(NYLON, 25, tension_modulated=False), 48_000, 1e-3)
     linear.initialise("series", physics, torch.Generator())
     found, expected = made(NYLON, 25)(displacement, 4_800).double(), linear(displacement, 4_800).double()
@@ -200,7 +200,7 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
     pulled = model.encode(to_grid(amplitudes, 101) / 1e-3)
     struck = model.encode(torch.zeros(1, 101).double(), to_grid(speeds, 101) / 1e-3)
     with torch.no_grad():
-        nodes = [model.advance(state, 1)[1].nodes.tolist() for state in (struck, pulled)]  # type: ignore[union-attr]
+        nodes = [model.advance(state, 1)[1].nodes.tolist() for state in (struck, pulled)]
     assert nodes == [[5], [5]]
     assert 0.5 < float(struck.largest_energy / pulled.largest_energy) <= 1
     truth, _ = SplittingSolver(resonator, 16_000).advance(ModalState(0 * amplitudes, speeds * 16_000), 1_600)

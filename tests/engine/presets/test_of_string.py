@@ -149,7 +149,7 @@ def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> No
 @pytest.mark.parametrize("name", NAMES)
 def test_a_shipped_string_sounds_the_note_of_its_name(name: str) -> None:
     """Its quiet first mode, by equal temperament from 440 Hz; those of two sources keep the tensions given there."""
-    step, sharp, octave = re.fullmatch(r"[a-z]+_([a-g])(s?)([1-6])", name).groups()  # type: ignore[union-attr]
+    step, sharp, octave = re.fullmatch(r"[a-z]+_([a-g])(s?)([1-6])", name).groups()
     key = 12 * (int(octave) + 1) + {"c": 0, "d": 2, "e": 4, "f": 5, "g": 7, "a": 9, "b": 11}[step] + len(sharp)
     string = read_string(find_string(name))
     pitch_hz = math.sqrt(string.undamped_frequency(1) ** 2 - string.decay_rate(1) ** 2) / (2 * math.pi)
