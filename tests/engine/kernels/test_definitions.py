@@ -102,7 +102,7 @@ def test_at_any_rate_it_is_the_model_at_those_times(
 
 
 def heard(info: PresetInfo, amplitudes: torch.Tensor, ear: Ear) -> Signal:
-    """What is heard of modal amplitudes in m (frames, modes)."""
+    """The sound of modal amplitudes in m (frames, modes)."""
     return np.asarray(
         to_grid(amplitudes.numpy(), info.grid_points) @ weights_of(ear, info.grid_points) / FULL_SCALE_M
     )

@@ -215,7 +215,7 @@ def test_a_model_that_is_not_finite_is_not_saved(tmp_path: Path, preset_file: Pa
     assert [p.name for p in tmp_path.iterdir()] == [preset_file.name]
 
 
-def test_a_preset_is_found_by_its_path_and_an_unknown_name_is_told(preset_file: Path) -> None:
+def test_a_preset_is_found_by_its_path_and_an_unknown_name_is_an_error(preset_file: Path) -> None:
     assert find_preset(str(preset_file)) == preset_file
     with pytest.raises(PresetError, match="no preset 'nonsense'; `learned-strings presets` lists all"):
         find_preset("nonsense")
@@ -263,7 +263,7 @@ ANY_SHAPE = {"width": {"gaussian": (0.02, 0.1), "raised_cosine": (0.1, 0.3)}}
         ("gaussian", {"tension_rise": 0.01}, Pluck(0.5, 5.0, "gaussian", 0.05), ("beyond the trained 1%",)),
     ],
 )
-def test_plucks_outside_training_are_told(
+def test_plucks_outside_training_are_reported(
     small_preset: Path, initial: Any, changed: dict[str, Any], pluck: Pluck, words: tuple[str, ...]
 ) -> None:
     info = read_info(small_preset)

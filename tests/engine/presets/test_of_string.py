@@ -106,7 +106,7 @@ def test_a_wrong_string_file_is_named(tmp_path: Path, text: str, words: str) -> 
     assert str(file) in str(caught.value)
 
 
-def test_a_string_beyond_the_family_is_told() -> None:
+def test_a_string_beyond_the_family_is_reported() -> None:
     family = load_preset(find_preset("studio_any_string")).info.family
     assert family is not None
     assert family.outside(StringParameters()) == []
