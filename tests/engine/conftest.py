@@ -42,8 +42,7 @@ def _shipped(name: str) -> Preset:
 
 @cache
 def _bank(name: str, rate_hz: int) -> Program:
-    preset = _shipped(name)
-    return model_program(preset, rate_hz)
+    return model_program(_shipped(name), rate_hz)
 
 
 def _initial_m(info: PresetInfo, pluck: Pluck) -> Array:
@@ -109,3 +108,9 @@ def rung() -> Callable[..., NDArray[np.float64]]:
         return mixer.render(frames).astype(np.float64)
 
     return rendered
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """The laws of motion hold for every variant of a model's sizes."""
+    if "motion" in metafunc.fixturenames and metafunc.cls is not None:
+        metafunc.parametrize("motion", metafunc.cls.variants, indirect=True, scope="class", ids=str)

@@ -18,18 +18,20 @@ from engine.compare.relative import (
 )
 
 
-def test_by_hand() -> None:
-    truth = torch.tensor([[[1.0, -1.0], [2.0, 0.0]]])
-    predicted = torch.tensor([[[1.0, -2.0], [2.0, 1.0]]])
-    error = relative_error(predicted, truth)
-    assert error.rel_mse == pytest.approx((1 + 1) / (1 + 1 + 4))
-    assert error.rel_mae == pytest.approx((1 + 1) / (1 + 1 + 2))
-
-
-def test_silence_predicted_is_an_error_of_one() -> None:
-    truth = torch.randn(2, 5, 3)
-    error = relative_error(torch.zeros_like(truth), truth)
-    assert (error.rel_mse, error.rel_mae) == pytest.approx((1, 1))
+@pytest.mark.parametrize(
+    ("predicted", "truth", "rel_mse", "rel_mae"),
+    [
+        ([[1.0, -2.0], [2.0, 1.0]], [[1.0, -1.0], [2.0, 0.0]], 2 / 6, 2 / 4),
+        ([[0.0, 0.0], [0.0, 0.0]], [[1.0, -1.0], [2.0, 0.5]], 1, 1),
+        ([[0.0, 0.0]], [[0.0, 0.0]], 0, 0),
+        ([[1.0, 1.0]], [[0.0, 0.0]], math.inf, math.inf),
+    ],
+)
+def test_errors_by_hand(predicted: list[Any], truth: list[Any], rel_mse: float, rel_mae: float) -> None:
+    error = relative_error(torch.tensor([predicted]), torch.tensor([truth]))
+    assert (error.rel_mse, error.rel_mae) == pytest.approx((rel_mse, rel_mae))
+    with pytest.raises(ValueError, match="differ in shape"):
+        relative_error(torch.zeros(1, 4, 2), torch.zeros(1, 4, 3))
 
 
 def test_batches_and_windows_add_up() -> None:
@@ -46,29 +48,27 @@ def test_batches_and_windows_add_up() -> None:
     assert (second.start_s, second.stop_s) == (0.25, 1.0)
 
 
-def test_silent_truth() -> None:
-    silence = torch.zeros(1, 4, 2)
-    assert relative_error(silence, silence).rel_mse == 0
-    assert relative_error(silence + 1, silence).rel_mae == float("inf")
-
-
-def test_shapes_must_agree() -> None:
-    with pytest.raises(ValueError, match="differ in shape"):
-        relative_error(torch.zeros(1, 4, 2), torch.zeros(1, 4, 3))
-
-
 def motions(*shape: int) -> tuple[torch.Tensor, torch.Tensor]:
     generator = torch.Generator().manual_seed(1)
     truth, predicted = (torch.randn(*shape, generator=generator, dtype=torch.float64) for _ in range(2))
     return predicted, truth
 
 
-def test_the_first_frames_alone() -> None:
-    predicted, truth = motions(4, 50, 3)
+def test_the_first_frames_some_trajectories_and_batches_have_their_own_errors() -> None:
+    predicted, truth = motions(5, 50, 3)
+    truth[0] *= 100
     sums = ErrorSums(50)
     sums.add(predicted, truth)
     assert sums.total(20).rel_mae == pytest.approx(relative_error(predicted[:, :20], truth[:, :20]).rel_mae)
-    assert sums.total(50) == sums.total()
+    assert sums.total(50).rel_mse == sums.total().rel_mse == pytest.approx(sums.of(range(5)).rel_mse)
+    assert sums.of([0, 2]).rel_mse == pytest.approx(relative_error(predicted[[0, 2]], truth[[0, 2]]).rel_mse)
+    wrong = (predicted - truth).square().sum((1, 2))
+    assert sums.shares() == pytest.approx((wrong / wrong.sum()).numpy())
+    own = [relative_error(predicted[rows], truth[rows]) for rows in (slice(0, 2), slice(2, 4), slice(4, 5))]
+    found = sums.mean_of_batches(2)
+    assert found.rel_mse == pytest.approx(np.mean([error.rel_mse for error in own]))
+    assert found.rel_mae == pytest.approx(np.mean([error.rel_mae for error in own]))
+    assert found.rel_mse != pytest.approx(sums.total().rel_mse, rel=0.01)
     for steps in (0, 51):
         with pytest.raises(ValueError, match=f"steps must lie in 1 … 50, not {steps}"):
             sums.total(steps)
@@ -92,31 +92,12 @@ def test_per_frame_and_per_trajectory() -> None:
     assert sums.spread().rel_mae == pytest.approx(np.std([error.rel_mae for error in alone]))
 
 
-def test_the_mean_of_batches_is_that_of_their_own_errors() -> None:
-    predicted, truth = motions(5, 6, 3)
-    truth[0] *= 100
-    sums = ErrorSums(6)
-    sums.add(predicted, truth)
-    own = [relative_error(predicted[rows], truth[rows]) for rows in (slice(0, 2), slice(2, 4), slice(4, 5))]
-    found = sums.mean_of_batches(2)
-    assert found.rel_mse == pytest.approx(np.mean([error.rel_mse for error in own]))
-    assert found.rel_mae == pytest.approx(np.mean([error.rel_mae for error in own]))
-    assert found.rel_mse != pytest.approx(sums.total().rel_mse, rel=0.01)
-
-
 def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSums:
     """Sums of trajectories of one frame that are wrong by these shares of their amplitude."""
     truth = torch.tensor(loudness or [1.0] * len(shares), dtype=torch.float64)[:, None, None]
     sums = ErrorSums(1)
     sums.add(truth * (1 + torch.tensor(shares, dtype=torch.float64)[:, None, None]), truth)
     return sums
-
-
-def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
-    """Half of 100 have an error of 0.1, half of 0.3: a draw with replacement is binomial; its deviation is known."""
-    found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
-    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)  # the population's deviation over √count
-    assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
 
 
 def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -> None:
@@ -130,19 +111,21 @@ def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -
     assert found.rel_mse < sums.spread().rel_mse / 20 / 5  # what the plain deviation of a mean would tell
 
 
-def test_the_standard_error_where_there_is_nothing_to_draw() -> None:
+def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
+    """Half of 100 have an error of 0.1, half of 0.3: a draw with replacement is binomial; its deviation is known."""
+    found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
+    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)  # the population's deviation over √count
+    assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
+
+
+def test_the_standard_error_where_there_is_nothing_to_draw_and_the_depth_of_a_null() -> None:
     assert spoilt([0.5]).standard_error() == RelativeError(0, 0)
     assert spoilt([0.5] * 7).standard_error().rel_mae == pytest.approx(0, abs=1e-12)
+    assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
+    for rel_mse, depth_db in ((1e-3, -30), (0, NULL_FLOOR_DB), (1e-30, NULL_FLOOR_DB), (math.inf, math.inf)):
+        assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
     assert spoilt([0.1, math.inf]).standard_error() == RelativeError(math.inf, math.inf)
     assert spoilt([0.1, 0.2, 0.4]).standard_error() == spoilt([0.1, 0.2, 0.4]).standard_error()
-
-
-def test_parts_of_the_trajectories_and_their_shares() -> None:
-    sums = spoilt([0.1, 0.2, 0.2], [1.0, 1.0, 2.0])
-    assert sums.shares() == pytest.approx(np.array([1, 4, 16]) / 21)
-    assert sums.of([0, 2]).rel_mse == pytest.approx((0.01 + 0.16) / 5)
-    assert sums.of([0, 1, 2]) == sums.total()
-    assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
 
 
 def test_trajectories_are_known_again_in_blocks() -> None:
@@ -173,12 +156,6 @@ def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> No
     assert np.isinf(sums.per_frame()[0]).tolist() == [False] * 5 + [True] * 5
     assert np.isinf(sums.per_trajectory()[0]).tolist() == [False, True, False]
     assert sums.spread().rel_mse == math.inf
-
-
-def test_null_depth() -> None:
-    assert RelativeError(1e-3, 0.1).null_depth_db == pytest.approx(-30)
-    assert RelativeError(0, 0).null_depth_db == RelativeError(1e-30, 0).null_depth_db == NULL_FLOOR_DB
-    assert RelativeError(math.inf, math.inf).null_depth_db == math.inf
 
 
 def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> None:

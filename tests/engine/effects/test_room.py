@@ -7,9 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from engine.effects.responses import resampled
 from engine.effects.room import room_response
-from engine.values.effects import Room
 
 
 def t60_s(response: NDArray[np.float64], band_hz: tuple[float, float], rate_hz: int) -> float:
@@ -34,25 +32,5 @@ def test_reflections_come_after_the_direct_sound_that_is_not_in_it() -> None:
     found = np.abs(room_response(0.8, 48_000))
     assert found[: round(0.002 * 48_000)].max() < 0.02 * found.max()
     assert found[: round(0.02 * 48_000)].max() > 0.5 * found.max()
-
-
-def test_it_is_wide() -> None:
     left, right = room_response(1.0, 48_000)[2_400:].T
-    assert abs(np.corrcoef(left, right)[0, 1]) < 0.1
-
-
-@pytest.mark.parametrize("rate_hz", [44_100, 96_000])
-def test_it_is_the_same_room_at_any_rate(rate_hz: int) -> None:
-    found = resampled(room_response(0.5, rate_hz), rate_hz, 48_000)
-    expected = room_response(0.5, 48_000)
-    at_either = [np.fft.rfft(each[:24_000], axis=0)[50:8_000] for each in (found, expected)]
-    gain = np.vdot(at_either[1], at_either[0]) / np.vdot(at_either[1], at_either[1])
-    assert np.linalg.norm(at_either[0] - gain * at_either[1]) < 0.02 * np.linalg.norm(at_either[0])
-
-
-@pytest.mark.parametrize(
-    ("values", "reported"), [({"mix": -0.1}, "mix"), ({"t60_s": 0.1}, "t60_s"), ({"t60_s": 9}, "s")]
-)
-def test_what_is_out_of_range_is_reported(values: dict[str, float], reported: str) -> None:
-    with pytest.raises(ValueError, match=reported):
-        Room(**values)
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.1  # it is wide

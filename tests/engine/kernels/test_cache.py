@@ -5,92 +5,93 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 from engine import warm
-from engine.kernels import cache
+
+# no folder but the temporary one can be written, as of a program in a read-only image without a home
+READ_ONLY = (
+    "import tempfile; from pathlib import Path; temporary = tempfile.TemporaryFile\n"
+    "def refused(*a, dir=None, **k):\n"
+    "    if str(dir).startswith(tempfile.gettempdir()): return temporary(*a, dir=dir, **k)\n"
+    "    raise OSError(dir)\n"
+    "tempfile.TemporaryFile = refused\n"
+    "from engine.kernels import cache; from engine.kernels.compiled import tanh\n"
+)
+REPORT = (
+    "place = cache.folder()\n"
+    "print(place, place and place.is_dir(), cache.is_whole(), cache.set_whole(), cache.is_whole(), round(tanh(9.5)),"
+    " place and len(list(place.rglob('*.nbc'))), flush=True)\n"
+)
 
 
-def reported(code: str, **environment: str) -> str:
+def reported(code: str, **environment: str) -> list[str]:
     paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, **paths, **environment}, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    return done.stdout.split()
 
 
-def test_it_is_reported_without_the_compiler() -> None:
-    code = "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)"
-    assert reported(code) == "False"
-
-
-def test_all_compiled_functions_are_kept_in_one_folder() -> None:
+def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_the_compiler() -> None:
     code = (
-        "from engine.models._ssm_kernel import stream; from engine.truth._splitting_kernel import advance;"
-        "from engine.kernels import cache;"
+        "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)\n"
+        "from engine.models._ssm_kernel import stream; from engine.truth._splitting_kernel import advance\n"
         "print(all(str(cache.folder()) in f._cache.cache_path for f in (stream, advance)))"
     )
-    assert reported(code) == "True"
+    assert reported(code) == ["False", "True"]
 
 
 def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> None:
-    code = (
-        "from engine.kernels import cache, compiled;"
-        "print(cache.folder(), compiled.config.CACHE_DIR, cache.is_whole(), cache.set_whole(), cache.is_whole())"
-    )
-    assert reported(code, NUMBA_CACHE_DIR=str(tmp_path)) == f"{tmp_path} {tmp_path} False None True"
+    code = "from engine.kernels import cache; from engine.kernels.compiled import config, tanh\n" + REPORT
+    found = reported(code + "print(config.CACHE_DIR)", NUMBA_CACHE_DIR=str(tmp_path))
+    assert found == [str(tmp_path), "True", "False", "None", "True", "1", "1", str(tmp_path)]
 
 
-def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody() -> None:
-    code = (
-        "from pathlib import Path; from engine.kernels import cache;"
-        "cache._places = lambda: [Path('/dev/null/there')];"
-        "from engine.kernels.compiled import tanh;"
-        "print(cache.folder(), cache.folder().is_dir(), round(tanh(9.5)), len(list(cache.folder().rglob('*.nbc'))))"
-    )
-    folder, there, value, kept = reported(code, NUMBA_CACHE_DIR="/dev/null/chosen").split()
-    assert (there, value, kept) == ("True", "1", "1")
-    assert not Path(folder).exists()  # once the process has ended
-
-
-def test_what_a_killed_run_left_in_the_temporary_folder_goes_at_the_next_start(tmp_path: Path) -> None:
-    code = (
-        "import os; from pathlib import Path; from engine.kernels import cache;"
-        "cache._places = lambda: [Path('/dev/null/there')];"
-        "print(cache.folder().name, flush=True);"
-    )
-    killed = code + "os._exit(0)"  # as after a kill, nothing is tidied
-    first = reported(killed, TMPDIR=str(tmp_path))
-    assert (tmp_path / first).is_dir()
-    second = reported(killed, TMPDIR=str(tmp_path))
-    assert [path.name for path in tmp_path.iterdir()] == [second]
-    reported(code, TMPDIR=str(tmp_path))
+def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody(tmp_path: Path) -> None:
+    """What a killed run left there goes at the next start."""
+    killed = reported(READ_ONLY + REPORT + "import os; os._exit(0)", TMPDIR=str(tmp_path))
+    assert killed[1:] == ["True", "False", "None", "True", "1", "1"]
+    assert Path(killed[0]).is_dir()
+    ended = reported(READ_ONLY + REPORT, TMPDIR=str(tmp_path))
+    assert ended[0] != killed[0] and ended[1:] == killed[1:]
     assert not list(tmp_path.iterdir())
 
 
 def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
-    code = (
-        "import tempfile; from pathlib import Path; from engine.kernels import cache;"
-        "cache._places = lambda: [Path('/dev/null/there')]; tempfile.tempdir = '/dev/null/nowhere';"
-        "from engine.kernels.compiled import tanh;"
-        "print(cache.folder(), cache.is_whole(), cache.set_whole(), cache.is_whole(), round(tanh(9.5)))"
-    )
-    assert reported(code) == "None False None False 1"
+    code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
+    assert reported(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_all_is_compiled_once(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_is_compiled_once_by_two_processes(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[str] = []
-    monkeypatch.setattr(cache, "is_whole", lambda: whole)
-    monkeypatch.setattr(warm, "_beside", lambda work: nullcontext(done.append(work)))
-    for place, name in ((warm, "models"), (warm, "unheard"), (warm, "voices"), (cache, "set_whole")):
-        monkeypatch.setattr(place, name, lambda name=name: done.append(name))
+    monkeypatch.setattr("engine.kernels.cache.is_whole", lambda: whole)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr("subprocess.Popen", Beside(done))
+    for name in ("engine.warm.models", "engine.warm.unheard", "engine.warm.voices", "engine.kernels.cache.set_whole"):
+        monkeypatch.setattr(name, lambda name=name: done.append(name.rpartition(".")[2]))
     warm.warm()
-    assert done == ([] if whole else ["playing", "models", "unheard", "voices", "set_whole"])
+    assert done == ([] if whole else ["playing", "models", "unheard", "waited", "voices", "set_whole"])
+
+
+class Beside:
+    """A process that notes the work that it is given, and that somebody waits for it."""
+
+    def __init__(self, done: list[str]) -> None:
+        self.done = done
+
+    def __call__(self, command: list[str], **_: object) -> Beside:
+        self.done.append(command[-1].rpartition(".")[2].removesuffix("()"))
+        return self
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None:
+        self.done.append("waited")
 
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:

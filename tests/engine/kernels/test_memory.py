@@ -53,35 +53,18 @@ def published(monkeypatch: pytest.MonkeyPatch) -> Published:
     return found
 
 
-def string_voice() -> Voice:
+def test_what_a_device_shall_see_is_published_when_it_is_there(published: Published) -> None:
+    """The numbers that show samples, voices, places and responses to its thread change in no other way."""
     program = solver_program(resonator_of(StringParameters(), 4), RATE_HZ)
-    return Voice(program, Pluck().displacement(program.grid_points), Ear((0.37,)))
-
-
-def test_samples_and_voices_are_published_when_they_are_there(published: Published) -> None:
-    """The numbers that show them to the device's thread change in no other way."""
-    samples = np.full((100, 1), 0.25, np.float32)
+    voice = Voice(program, Pluck().displacement(program.grid_points), Ear((0.37,)))
     rendered = Voice(plain_program(RATE_HZ), np.full(3, FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
-    rendered.append(samples)
-    assert published == [(slot(VOICE, "ready"), 100)]
-    assert rendered.record["ready"] == 0
-    assert rendered._samples is not None
-    np.testing.assert_array_equal(rendered._samples[:100], samples)
-    mixer, voices = Mixer(RATE_HZ), [string_voice(), string_voice()]
-    mixer.add(*voices)
-    assert published[1:] == [(slot(MIXER, "pushed"), 2)]
-    assert mixer.record["ring"][:2].tolist() == [each.address for each in voices]
-    assert mixer.record["pushed"] == 0
-
-
-def test_listening_points_are_published(published: Published) -> None:
-    voice = string_voice()
-    voice.listen(Ear((0.2,)))
-    assert [each for each, _ in published] == [slot(VOICE, "next_weights")]
-    assert voice.record["next_weights"] == 0
-
-
-def test_a_response_is_published_after_the_convolver(published: Published) -> None:
+    rendered.append(np.full((100, 1), 0.25, np.float32))
     mixer = Mixer(RATE_HZ)
+    mixer.add(voice, rendered)
+    voice.listen(Ear((0.2,)))
     mixer.set_effects(Effects(room=Room(mix=0.5)))
-    assert [place for place, _ in published] == [slot(MIXER, "convolver"), slot(MIXER, "effects")]
+    assert published[:2] == [(slot(VOICE, "ready"), 100), (slot(MIXER, "pushed"), 2)]
+    last = [slot(VOICE, "next_weights"), slot(MIXER, "convolver"), slot(MIXER, "effects")]
+    assert [place for place, _ in published[2:]] == last  # a response after the convolver
+    assert (rendered.record["ready"], voice.record["next_weights"], mixer.record["pushed"]) == (0, 0, 0)
+    assert mixer.record["ring"][:2].tolist() == [voice.address, rendered.address]

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import soxr
-from numpy.typing import NDArray
 
 from engine.kernels.constants import QUANTUM
-from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.presets import PresetInfo
+from engine.levels import FULL_SCALE_M
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, plain_program, rendered_program
+from tests.engine.sounds import RATE_HZ, Info, Rung, Samples, noise
 
-RATE_HZ = 48_000
 MIDDLE = Ear((0.5,))
-Info = Callable[[bool], PresetInfo]
-Rung = Callable[..., NDArray[np.float64]]
 
 
-def noise(frames: int, points: int = 1) -> NDArray[np.float32]:
-    return np.random.default_rng(0).uniform(-0.9, 0.9, (frames, points)).astype(np.float32)
-
-
-def band_limited(rate_hz: int, seconds: float) -> NDArray[np.float32]:
+def band_limited(rate_hz: int, seconds: float) -> Samples:
     """Cosines up to 0.7 of half the rate: even about the first sample, as a string at rest is."""
     time_s = np.arange(round(seconds * rate_hz)) / rate_hz
     rates_hz = np.linspace(0.01, 0.35, 12) * rate_hz
@@ -63,22 +54,9 @@ def test_other_rates_are_what_soxr_makes_of_them(
     assert 20 * np.log10(difference) < -90
 
 
-def test_before_the_pluck_lies_its_mirror(small_info: Info, rung: Rung) -> None:
-    """A string released from rest: so the converter needs no run-up, and is right from the first sample on."""
-    voice = waiting(rendered_program(small_info(True), RATE_HZ), 0.5, 4000)
-    voice.append(band_limited(4000, 0.5))
-    found = rung(RATE_HZ // 4, voice, attack=False)[:, 0]
-    np.testing.assert_allclose(found, band_limited_at(4000, np.arange(RATE_HZ // 4) / RATE_HZ), atol=2e-5)
-
-
-def band_limited_at(source_rate_hz: int, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    rates_hz = np.linspace(0.01, 0.35, 12) * source_rate_hz
-    return np.asarray(0.05 * np.cos(2 * np.pi * rates_hz * time_s[:, None]).sum(1))
-
-
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
 def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -> None:
-    ear = Ear((0.5,), "velocity" if pickup == "velocity" else "displacement")
+    ear = Ear((0.5,), pickup)
     samples = np.concatenate([band_limited(RATE_HZ, 0.1), np.zeros((100, 1), np.float32)])
     voice = waiting(plain_program(RATE_HZ), 0.1, RATE_HZ, ear)
     whole = waiting(plain_program(RATE_HZ), 0.1, RATE_HZ, ear)
@@ -106,7 +84,7 @@ def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -
 
 
 def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
-    voice, samples = waiting(plain_program(RATE_HZ), 0.1, RATE_HZ), noise(4801)
+    voice, samples = waiting(plain_program(RATE_HZ), 0.1, RATE_HZ), noise(4801, 1)
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.add(voice)
     assert not mixer.render(640).any()
@@ -117,25 +95,8 @@ def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
     np.testing.assert_array_equal(found[128:], samples[128:2048, 0])  # nothing was left out, and it has faded in
 
 
-def test_every_hole_is_reported() -> None:
-    voice, mixer = waiting(plain_program(RATE_HZ), 1.0, RATE_HZ), Mixer(RATE_HZ)
-    mixer.add(voice)
-    for _ in range(3):
-        voice.append(noise(1000))
-        mixer.render(2000)
-    assert [gap.cause for gap in mixer.new_gaps()] == ["rendering"] * 3
-
-
 def test_a_loop_goes_round_without_a_seam(rung: Rung) -> None:
     samples = noise(1000, 2)
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
     voice.loop()
     np.testing.assert_array_equal(rung(3500, voice, attack=False), np.tile(samples, (4, 1))[:3500])
-
-
-def test_velocity_is_that_of_the_samples(rung: Rung, derivative: Callable[..., NDArray[np.float64]]) -> None:
-    voice = waiting(plain_program(RATE_HZ), 0.2, RATE_HZ, Ear((0.5,), "velocity"))
-    voice.append(band_limited(RATE_HZ, 0.2))
-    found = rung(4096, voice, attack=False)[:, :1]
-    fed = derivative(band_limited(RATE_HZ, 0.2) * FULL_SCALE_M, RATE_HZ)
-    np.testing.assert_allclose(found, fed[:4096] / FULL_SCALE_M_S, rtol=1e-5, atol=1e-6)

@@ -15,7 +15,6 @@ from engine.effects.curves import curves_of
 from engine.effects.partitions import partitioned
 from engine.effects.room import room_noise, room_response
 from engine.kernels import prepared
-from engine.kernels import responses as kernel
 from engine.kernels.records import NEEDS, RESPONSES
 from engine.values.effects import Room
 
@@ -25,15 +24,6 @@ GUARD = 1234.5
 
 def noise(frames: int, channels: int = 2) -> Array:
     return np.random.default_rng(frames).standard_normal((frames, channels))
-
-
-def test_ratios_of_rates_are_those_of_pythons_fractions() -> None:
-    draw = np.random.default_rng(0)
-    for _ in range(2_000):
-        (from_hz, to_hz), size = draw.uniform(8_000, 384_000, 2).round(), draw.uniform(0.5, 2)
-        for ratio in (to_hz / from_hz, to_hz / (from_hz / size), to_hz / 48_000, 44_100 / from_hz):
-            expected = Fraction(ratio).limit_denominator(kernel.FINEST_RATIO)
-            assert kernel.fraction(ratio) == (expected.numerator, expected.denominator)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from engine.kernels.records import SYMPATHY
-from engine.kernels.sympathy import NOTHING, ring
-
-RATE_HZ = 48_000
+from engine.kernels.sympathy import ring
+from tests.engine.sounds import RATE_HZ
 
 
 def partials(omega: np.ndarray, sigma: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -50,12 +49,11 @@ def test_nothing_rings_up() -> None:
     draw = np.random.default_rng(1)
     sigma = draw.uniform(0.5, 4, 40)
     omega, lost = np.full(40, 2 * np.pi * 440.0), sigma * draw.uniform(0, 1, 40)
-    force = np.cos(omega[0] * np.arange(10 * RATE_HZ) / RATE_HZ)
+    force = np.cos(omega[0] * np.arange(5 * RATE_HZ) / RATE_HZ)
     found = rung(force, partials(omega, sigma, lost))
     assert np.abs(found).max() <= 1.001 * (lost / sigma).sum()
-    rest = rung(np.concatenate([force[:RATE_HZ], np.zeros(40 * RATE_HZ)]), partials(omega, sigma, lost))
+    rest = rung(np.concatenate([force[:RATE_HZ], np.zeros(30 * RATE_HZ)]), partials(omega, sigma, lost))
     assert np.abs(rest[-RATE_HZ:]).max() < 1e-6
-    assert NOTHING < 1e-6
 
 
 @pytest.mark.parametrize("count", [1, 7])

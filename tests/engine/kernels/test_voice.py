@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import record_of
@@ -14,28 +13,34 @@ from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetInfo
 from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices import Mixer, Voice, model_program, plain_program, truth_program
+from engine.voices import Mixer, Voice, model_program, truth_program
 from engine.voices.derivative import REACH_FRAMES
 from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
+from tests.engine.sounds import (
+    RATE_HZ,
+    Info,
+    Initial,
+    Rung,
+    Shipped,
+    Signal,
+    Strike,
+    faded,
+    mixer_of,
+    voice_of,
+)
 
-RATE_HZ = 48_000
 FADE = round(FADE_S * RATE_HZ)
 KNOWING, STEEL = "nylon_nonlinear_gaussian_4k_koopman_integrated", "studio_steel_e4"
+HINTED = "nylon_nonlinear_gaussian_4k_koopman_integrated_hinted"
 EAR = Ear((0.37,))
-
-Signal = NDArray[np.float64]
-Rung = Callable[..., Signal]
-Strike = Callable[..., Voice]
-Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 
 
 @pytest.fixture
-def struck(strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: Initial) -> Callable[..., Voice]:
+def struck(strike: Strike, small_info: Info, initial_m: Initial) -> Strike:
     """A voice of either kind at 48 kHz: struck(kind, ear, gain)."""
 
     def made(kind: str, ear: Ear = EAR, gain: float = 1.0) -> Voice:
@@ -49,9 +54,7 @@ def struck(strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: 
 
 def constant(frames: int = 48_000, level: float = 0.5) -> Voice:
     """It shows every change of gain."""
-    voice = Voice.of_samples(plain_program(RATE_HZ), np.full((frames, 1), level, np.float32))
-    voice.record["attack"] = 0
-    return voice
+    return voice_of(np.full((frames, 1), level, np.float32))
 
 
 KINDS = pytest.mark.parametrize("kind", ["bank", "truth"])
@@ -60,7 +63,7 @@ KINDS = pytest.mark.parametrize("kind", ["bank", "truth"])
 @KINDS
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
 def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str, struck: Strike) -> None:
-    ear = Ear((0.3, 0.6), "velocity" if pickup == "velocity" else "displacement")
+    ear = Ear((0.3, 0.6), pickup)
 
     def rendered(sizes: list[int]) -> Signal:
         voice, mixer, parts = struck(kind, ear), Mixer(RATE_HZ), []
@@ -90,7 +93,7 @@ def test_velocity_is_the_derivative_of_displacement(
 
 @pytest.mark.parametrize("amplitude_mm", [0.1, 20.0])
 def test_no_pluck_as_velocity_is_taken_for_a_runaway(
-    amplitude_mm: float, shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung
+    amplitude_mm: float, shipped: Shipped, initial_m: Initial, rung: Rung
 ) -> None:
     info, pluck = shipped(STEEL).info, Pluck(0.02, amplitude_mm, "triangular")
     voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), Ear((0.05,), "velocity"))
@@ -98,102 +101,39 @@ def test_no_pluck_as_velocity_is_taken_for_a_runaway(
     assert not voice.ran_away
 
 
-def eased(frames: int) -> NDArray[np.float64]:
-    share = np.arange(1, frames + 1) / frames
-    return np.asarray(share**2 * (3 - 2 * share))
-
-
-def test_a_change_of_gain_is_a_fade_without_corners() -> None:
-    """Where a loud string is stopped within 6 ms, a corner would be a click."""
-    mixer, voice = Mixer(RATE_HZ, limited=False), constant()
-    mixer.add(voice)
-    mixer.render(1000)
-    voice.set_gain(0.25)
-    found = mixer.render(2000)[:, 0]
-    first = int(np.argmax(found != 0.5))
-    assert first < QUANTUM
-    np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * eased(FADE)), atol=1e-7)
-    np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
-    assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
-
-
-def test_a_gain_that_changes_again_on_its_way_makes_no_step() -> None:
-    mixer, voice, parts = Mixer(RATE_HZ, limited=False), constant(), []
-    mixer.add(voice)
-    for gain in (0.0, 1.0, 0.3, 0.3, 2.0):
-        voice.set_gain(gain)
-        parts.append(mixer.render(300)[:, 0])
-    parts.append(mixer.render(2000)[:, 0])
-    steps = np.abs(np.diff(np.concatenate(parts)))
-    assert steps.max() < 0.5 * 2.0 * 1.5 / FADE * 1.01
-    assert parts[-1][-1] == 1.0
-
-
 @KINDS
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, rung: Rung) -> None:
-    """Switching to it fades to what it would have been, without anything of what sounded meanwhile."""
-    ear = Ear((0.37,), "velocity" if pickup == "velocity" else "displacement")
-    expected = rung(24_000, struck(kind, ear))[12_000:]
-    voice, mixer = struck(kind, ear, 0.0), Mixer(RATE_HZ, limited=False)
-    loud = Voice.of_samples(plain_program(RATE_HZ), np.full((11_000, 1), 9.0, np.float32))
-    mixer.add(loud, voice)
-    mixer.render(11_000)
-    assert not mixer.render(1000)[-30:].any()
-    voice.set_gain(1.0)
+@pytest.mark.parametrize("skipped", [False, True])
+def test_what_was_not_heard_is_where_it_would_have_been(
+    kind: str, pickup: str, skipped: bool, struck: Strike, rung: Rung
+) -> None:
+    """It fades in, without anything of what sounded meanwhile; what is skipped is not even waited for."""
+    ear, frames, arrived = Ear((0.37,), pickup), 150 * QUANTUM, FADE + 4 * QUANTUM
+    expected = rung(frames + 12_000, struck(kind, ear))[frames:]
+    voice, mixer = struck(kind, ear, 1.0 if skipped else 0.0), Mixer(RATE_HZ, limited=False)
+    if skipped:
+        voice.skip(frames / RATE_HZ, Mixer(RATE_HZ))
+        voice.begin_at(640)
+        mixer.add(voice)
+        assert not mixer.render(640).any()
+    else:
+        mixer.add(constant(frames - 1000, 9.0), voice)
+        mixer.render(frames - 1000)
+        assert not mixer.render(1000)[-30:].any()
+        voice.set_gain(1.0)
     found = mixer.render(12_000)
-    largest = np.abs(expected).max()
-    arrived = FADE + 4 * QUANTUM
+    assert voice.began_frame == (640 if skipped else 0)
     np.testing.assert_allclose(found[arrived:], expected[arrived:], atol=1e-5)
-    assert (np.abs(found[:arrived]) <= largest).all()
-    shares = (found[:arrived] * expected[:arrived]).sum(1) / (expected[:arrived] ** 2).sum(1).clip(1e-12)
-    loud_enough = np.abs(expected[:arrived, 0]) > 0.1 * largest
-    assert (np.diff(shares[loud_enough]) > -2e-3).all(), "the fade goes one way"
-
-
-RATES_HZ = pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000, 192_000])
-
-
-def slowest(rate_hz: int, ear: Ear) -> Voice:
-    """A string that all but stands still for the time of a test: by it every change of gain can be seen."""
-    slow = StringParameters(
-        length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
-    )
-    program = solver_program(resonator_of(slow, 1, tension_modulated=False), rate_hz)
-    voice = Voice(program, Pluck(0.5).displacement(program.grid_points), ear)
-    voice.begin_at_once()
-    return voice
-
-
-@RATES_HZ
-def test_the_way_to_another_listening_point_lasts_as_long_at_any_rate(rate_hz: int) -> None:
-    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
-    mixer.add(voice)
-    mixer.render(4 * QUANTUM)
-    assert voice.listen(Ear((0.0,)))
-    frames = round(0.02 * rate_hz)
-    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
-    np.testing.assert_allclose(found[:frames] / found[0], 1 - np.arange(frames) / frames, atol=2e-3)
-    assert np.abs(found[frames:]).max() < 1e-6
-
-
-@RATES_HZ
-def test_a_voice_that_is_silent_ends_in_as_long_at_any_rate(rate_hz: int) -> None:
-    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
-    voice.record["silent"] = 0.0  # louder than it is
-    mixer.add(voice)
-    frames = round(0.02 * rate_hz)
-    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
-    np.testing.assert_allclose(found[QUANTUM : QUANTUM + frames] / found[0], 1 - eased(frames), atol=2e-3)
-    assert voice.over
+    assert (np.abs(found[:arrived]) <= np.abs(expected).max()).all()
+    assert np.abs(found[: FADE // 4]).max() < 0.6 * np.abs(expected).max()
 
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 2])
 def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
-    moved, mixer = struck(kind, here), Mixer(RATE_HZ, limited=False)
-    mixer.add(moved)
+    moved = struck(kind, here)
+    mixer = mixer_of(moved)
     mixer.render(1920)
     assert moved.listen(there)
     assert not moved.listen(here), "a fade is under way"
@@ -207,66 +147,17 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int
     assert moved.listen(here)
 
 
-def test_another_pick_up_leaves_a_voice_as_it_is(strike: Strike) -> None:
-    voice = strike(KNOWING)
-    assert voice.listen(Ear((0.2,), "velocity"))
-    assert voice.listen(Ear((0.2, 0.3)))
-    assert voice.ear == EAR
-
-
-def test_release_fades_and_ends() -> None:
-    mixer, voice = Mixer(RATE_HZ, limited=False), constant()
-    mixer.add(voice)
-    mixer.render(640)
-    voice.release(0.01)
-    voice.release(1.0)  # the one under way continues
-    found = mixer.render(1280)[:, 0]
-    np.testing.assert_allclose(found[:480], 0.5 * (1 - eased(480)), atol=1e-7)
-    assert not found[480:].any()
-    assert voice.over
-    assert mixer.voices == []
-
-
-def test_an_unheard_voice_is_released_at_once(strike: Strike, rung: Rung) -> None:
-    voice = strike(KNOWING, gain=0.0)
-    voice.release(1.0)
-    rung(64, voice)
-    assert voice.over
-
-
 @pytest.mark.parametrize("gain", [0.0, 1.0])
 @KINDS
-def test_what_has_become_silent_ends_by_itself(
-    kind: str, gain: float, struck: Strike, small_info: Callable[[bool], PresetInfo]
-) -> None:
-    voice, mixer = struck(kind, gain=gain), Mixer(RATE_HZ, limited=False)
-    mixer.add(voice)
+def test_what_has_become_silent_ends_by_itself(kind: str, gain: float, struck: Strike, small_info: Info) -> None:
+    voice = struck(kind, gain=gain)
+    mixer = mixer_of(voice)
     level, found = np.inf, np.zeros((1, 2), np.float32)
     while not voice.over and voice.seconds < 40:
         level, found = float(np.abs(found).max()), mixer.render(9600)
     assert voice.over
     assert level < 1e-4
     assert voice.level_db < -100
-
-
-def test_one_that_never_ends_does_not(small_info: Callable[[bool], PresetInfo], initial_m: Initial) -> None:
-    info = small_info(True)
-    voice, mixer = Voice(truth_program(info, RATE_HZ), initial_m(info, Pluck(0.3, 1e-6)), EAR), Mixer(RATE_HZ)
-    voice.never_ends()
-    mixer.add(voice)
-    mixer.render(9600)
-    assert not voice.over
-
-
-@pytest.mark.parametrize("frame", [0, 1, 63, 64, 640, 641, 703])
-def test_it_begins_at_the_frame_that_it_is_reported(frame: int) -> None:
-    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
-    voice.begin_at(frame)
-    assert voice.waits
-    mixer.add(voice)
-    found = mixer.render(1000)[:, 0]
-    assert int(np.argmax(found != 0)) == frame == voice.began_frame
-    assert voice.sounding
 
 
 @KINDS
@@ -276,7 +167,7 @@ def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
     kind: str, pickup: str, frame: int, struck: Strike, rung: Rung
 ) -> None:
     """All of it, with a change of gain and the release, later by so many frames."""
-    ear = Ear((0.3, 0.6), "velocity" if pickup == "velocity" else "displacement")
+    ear = Ear((0.3, 0.6), pickup)
 
     def rendered(begins: int) -> Signal:
         voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
@@ -297,62 +188,6 @@ def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
     assert np.abs(later[frame + len(at_once) - 64 :]).max() == 0
 
 
-@pytest.mark.parametrize("frame", [100, 4_000])
-def test_one_whose_frame_is_past_begins_with_the_next_quantum(frame: int) -> None:
-    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
-    mixer.render(4_000)
-    voice.begin_at(frame)
-    mixer.add(voice)
-    mixer.render(100)
-    assert voice.began_frame == 4_032
-
-
-def test_it_is_released_at_the_quantum_that_it_is_reported() -> None:
-    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
-    voice.release_at(1000)
-    mixer.add(voice)
-    found = mixer.render(1024 + FADE)[:, 0]
-    assert (found[:1024] == 0.5).all()
-    np.testing.assert_allclose(found[1024:], 0.5 * (1 - eased(FADE)), atol=1e-7)
-    assert voice.over
-
-
-def test_what_is_released_before_it_begins_never_sounds() -> None:
-    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
-    voice.begin_at(10_000)
-    mixer.add(voice)
-    mixer.render(640)
-    voice.release(0.1)
-    assert not mixer.render(20_000).any()
-    assert voice.over
-
-
-@KINDS
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_skipping_is_where_it_would_have_been(kind: str, pickup: str, struck: Strike, rung: Rung) -> None:
-    ear = Ear((0.37,), "velocity" if pickup == "velocity" else "displacement")
-    skipped_frames = round(0.2 * RATE_HZ / QUANTUM) * QUANTUM
-    expected = rung(skipped_frames + 4800, struck(kind, ear))[skipped_frames:]
-    voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
-    voice.skip(0.2, Mixer(RATE_HZ))
-    voice.set_struck(1.0)
-    voice.begin_at(640)
-    assert voice.struck_to_began_s is None
-    mixer.add(voice)
-    assert not mixer.render(640).any()
-    found = mixer.render(4800)
-    assert voice.began_frame == 640
-    np.testing.assert_allclose(found[FADE + 192 :], expected[FADE + 192 :], atol=1e-5)
-    assert np.abs(found[: FADE // 2]).max() < 0.6 * np.abs(expected).max()
-
-
-def test_skipping_in_samples(rung: Rung) -> None:
-    samples = np.random.default_rng(0).uniform(-0.9, 0.9, (9600, 1)).astype(np.float32)
-    voice = Voice.of_samples(plain_program(RATE_HZ), samples)
-    voice.skip(0.04, Mixer(RATE_HZ))
-    np.testing.assert_array_equal(rung(4800, voice)[FADE:, 0], samples[1920 + FADE : 1920 + 4800, 0])
-
-
 def test_the_attack_is_short_and_smooth(struck: Strike, rung: Rung) -> None:
     whole, found = rung(960, struck("truth"), attack=False)[:, 0], rung(960, struck("truth"))[:, 0]
     np.testing.assert_array_equal(found[96:], whole[96:])
@@ -362,7 +197,7 @@ def test_the_attack_is_short_and_smooth(struck: Strike, rung: Rung) -> None:
 
 @pytest.mark.parametrize("value", [float("nan"), 1e30, 50.0])
 def test_a_runaway_never_reaches_the_mix(
-    value: float, shipped: Callable[[str], Preset], initial_m: Initial, strike: Strike, rung: Rung
+    value: float, shipped: Shipped, initial_m: Initial, strike: Strike, rung: Rung
 ) -> None:
     """A number of the model is spoilt: what nobody believes is found out before it is heard."""
     preset = shipped(KNOWING)
@@ -388,24 +223,24 @@ def test_a_runaway_never_reaches_the_mix(
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_whatever_is_asked_of_voices_each_minds_its_own_business(
-    seed: int, strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: Initial
+    seed: int, strike: Strike, small_info: Info, initial_m: Initial
 ) -> None:
     """The mix is the sum of what each voice is alone, when the same is asked of it at the same frames."""
 
-    def voice_of(number: int) -> Voice:
+    def chosen(number: int) -> Voice:
         choice = np.random.default_rng([seed, number])
         pickup = "velocity" if choice.random() < 0.4 else "displacement"
         ear = Ear((choice.uniform(0.1, 0.9),) * choice.integers(1, 3), pickup, int(choice.choice([0, 0, 5])))
         pluck, gain = Pluck(choice.uniform(0.1, 0.9), choice.uniform(1, 12)), float(choice.choice([0.0, 0.5, 1.0]))
         kind = choice.choice(["knowing", "hinted", "steel", "truth", "samples"])
         if kind == "samples":
-            voice = Voice.of_samples(plain_program(RATE_HZ), choice.uniform(-1, 1, (6000, 1)).astype(np.float32))
+            voice = voice_of(choice.uniform(-1, 1, (6000, 1)).astype(np.float32))
             voice.start_with_gain(gain)
         elif kind == "truth":
             info = small_info(True)
             voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
         else:
-            name = {"knowing": KNOWING, "hinted": f"{KNOWING}_hinted", "steel": STEEL}[str(kind)]
+            name = {"knowing": KNOWING, "hinted": HINTED, "steel": STEEL}[str(kind)]
             voice = strike(name, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:
@@ -413,7 +248,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
         return voice
 
     def rendered(numbers: list[int]) -> Signal:
-        mixer, voices = Mixer(RATE_HZ, limited=False), {number: voice_of(number) for number in numbers}
+        mixer, voices = Mixer(RATE_HZ, limited=False), {number: chosen(number) for number in numbers}
         mixer.add(*voices.values())
         parts = []
         for step in range(24):
@@ -434,3 +269,76 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
     everyone = list(range(8))
     alone = sum(rendered([number]) for number in everyone)
     np.testing.assert_allclose(rendered(everyone), alone, atol=2e-6)
+
+
+def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_without_steps() -> None:
+    """Where a loud string is stopped within 6 ms, a corner would be a click."""
+    voice = constant()
+    mixer = mixer_of(voice)
+    mixer.render(1000)
+    voice.set_gain(0.25)
+    found = mixer.render(2000)[:, 0]
+    first = int(np.argmax(found != 0.5))
+    assert first < QUANTUM and voice.sounding
+    np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * faded(FADE)), atol=1e-7)
+    np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
+    assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
+    parts = []
+    for gain in (0.0, 1.0, 0.3, 0.3, 2.0):
+        voice.set_gain(gain)
+        parts.append(mixer.render(300)[:, 0])
+    parts.append(mixer.render(2000)[:, 0])
+    assert np.abs(np.diff(np.concatenate(parts))).max() < 0.5 * 2.0 * 1.5 / FADE * 1.01
+    assert parts[-1][-1] == 1.0
+
+
+@pytest.mark.parametrize("frame", [0, 1, 63, 64, 641])
+def test_it_begins_at_its_frame_and_is_released_at_its_quantum(frame: int) -> None:
+    voice = constant()
+    voice.begin_at(frame)
+    voice.release_at(1000)
+    assert voice.waits
+    found = mixer_of(voice).render(2048 + FADE)[:, 0]
+    assert int(np.argmax(found != 0)) == frame == voice.began_frame
+    end = (1000 - frame + QUANTUM - 1) // QUANTUM * QUANTUM + frame
+    np.testing.assert_array_equal(found[frame : min(end, 1000)], 0.5)
+    assert voice.over and not found[1024 + QUANTUM + FADE :].any()
+
+
+def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(strike: Strike, rung: Rung) -> None:
+    voice, waiting, unheard = constant(), constant(), strike(KNOWING, gain=0.0)
+    waiting.begin_at(10_000)
+    mixer = mixer_of(voice, waiting)
+    mixer.render(640)
+    voice.release(0.01)
+    voice.release(1.0)  # the one under way continues
+    waiting.release(0.1)
+    unheard.release(1.0)
+    found = mixer.render(20_000)[:, 0]
+    np.testing.assert_allclose(found[:480], 0.5 * (1 - faded(480)), atol=1e-7)
+    assert not found[480:].any()
+    rung(64, unheard)
+    assert voice.over and waiting.over and unheard.over and mixer.voices == []
+
+
+@pytest.mark.parametrize("rate_hz", [44_100, 192_000])
+@pytest.mark.parametrize("what", ["another place", "silence"])
+def test_fades_last_as_long_at_any_rate(what: str, rate_hz: int) -> None:
+    """Of a string that all but stands still meanwhile, so that every change of gain can be seen."""
+    slow = StringParameters(
+        length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
+    )
+    program = solver_program(resonator_of(slow, 1, tension_modulated=False), rate_hz)
+    voice = Voice(program, Pluck(0.5).displacement(program.grid_points), Ear((0.5,)))
+    voice.begin_at_once()
+    mixer, frames, first = mixer_of(voice, rate_hz=rate_hz), round(0.02 * rate_hz), 0
+    if what == "silence":
+        voice.record["silent"], first = 0.0, QUANTUM  # louder than it is
+    else:
+        mixer.render(4 * QUANTUM)
+        assert voice.listen(Ear((0.0,)))
+    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
+    expected = 1 - (faded(frames) if what == "silence" else np.arange(frames) / frames)
+    np.testing.assert_allclose(found[first : first + frames] / found[0], expected, atol=2e-3)
+    assert np.abs(found[first + frames :]).max() < 1e-6
+    assert voice.over == (what == "silence")

@@ -1,162 +1,124 @@
-"""The laws of the contract for both state-space strings, and the recurrence that they share."""
+"""LRU and S5: the laws, the recurrence that both share, plain recurrences, and their starts."""
 
 from __future__ import annotations
 
+from typing import Any, ClassVar
+
+import numpy as np
 import pytest
 import torch
+from torch import Tensor
 
 from engine.models._ssm_kernel import stream
-from engine.models.base import Physics
-from engine.models.configurations import LRUConfiguration, S5Configuration
-from engine.models.lru import LRU
-from engine.models.s5 import S5
-from engine.models.ssm import Block, SSMString, evolve, recur
-from engine.resonators.string import resonator_of
-from engine.truth import ModalState
-from engine.values.string import StringParameters
-from tests.engine.tensors import listening_weights, solve_linear, to_grid
+from engine.models.s5 import S5Layer, hippo_normal
+from engine.models.ssm import Block, DiagonalSSM, SSMString, evolve, recur
+from tests.engine.models.laws import Arrays, ModelLaws, relative, released
 
-PHYSICS = Physics(resonator_of(StringParameters(), 10, grid_points=21), 4_000)
-NAMES = ("lru", "s5")
+Layer = tuple[np.ndarray, ...]
 
 
-def small_model(name: str, seed: int = 0, how: str = "paper") -> SSMString:
-    model: SSMString
-    if name == "lru":
-        model = LRU(LRUConfiguration(21, state_size=24, layers=3))
-    else:
-        model = S5(S5Configuration(21, state_size=32, hippo_blocks=4, layers=3))
-    model.initialise(how, PHYSICS, torch.Generator().manual_seed(seed))
-    return model.eval()
+class StateSpaceLaws(ModelLaws):
+    """Laws of both; `stored` names a layer's weights."""
 
+    linear: ClassVar = {"physics": 2e-3}
+    unused = frozenset({"first_layer.D"})  # as in the source: counted, not used
+    reference = 1e-13
+    stored: tuple[str, ...]
 
-def initial(batch: int = 2, points: int = 21) -> torch.Tensor:
-    return torch.randn(batch, points, generator=torch.Generator().manual_seed(1))
+    def layer_weights(self, arrays: Arrays) -> Arrays:
+        """Those of a layer by our names, from theirs."""
+        raise NotImplementedError
 
+    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
+        """Eigenvalues, B and C of a layer by its equations."""
+        raise NotImplementedError
 
-def random_recurrence(steps: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """v, log λ and x₀, all in double precision."""
-    generator = torch.Generator().manual_seed(3)
+    def weights(self, arrays: Arrays) -> Arrays:
+        found = {}
+        for ours, theirs in (
+            ("first_layer", "first_layer"),
+            ("layers.0.seq", "layers_0/seq"),
+            ("layers.1.seq", "layers_1/seq"),
+        ):
+            stored = self.layer_weights({name: arrays[f"params/{theirs}/{name}"] for name in self.stored})
+            found |= {f"{ours}.{name}": array for name, array in stored.items()}
+        for number in range(2):
+            theirs = f"layers_{number}"
+            dense = [f"params/{theirs}/out{each}" for each in (1, 2)]
+            block = {
+                "gate.weight": torch.cat([arrays[f"{name}/kernel"].T for name in dense]),
+                "gate.bias": torch.cat([arrays[f"{name}/bias"] for name in dense]),
+                "normalization.weight": arrays[f"params/{theirs}/normalization/scale"],
+                "normalization.bias": arrays[f"params/{theirs}/normalization/bias"],
+                "normalization.running_mean": arrays[f"batch_stats/{theirs}/normalization/mean"],
+                "normalization.running_var": arrays[f"batch_stats/{theirs}/normalization/var"],
+            }
+            found |= {f"layers.{number}.{name}": array for name, array in block.items()}
+        return found
 
-    def draw(*shape: int) -> torch.Tensor:
-        return torch.randn(*shape, dtype=torch.complex128, generator=generator)
+    def stir(self, model: Any, generator: torch.Generator) -> None:
+        for block in model.layers:
+            for weight in (block.gate.bias, *block.normalization.parameters(), *block.normalization.buffers()):
+                if weight.is_floating_point():
+                    weight.uniform_(0.5, 1.5, generator=generator)
 
-    log_eigenvalues = torch.complex(-0.1 * draw(5).abs(), 2 * draw(5).real)
-    return draw(steps, 2, 5), log_eigenvalues, draw(2, 5)
+    @torch.no_grad()
+    def test_it_is_its_equations(self) -> None:
+        """One step after the other, in NumPy."""
+        model, start, _ = self.of_the_reference()
 
+        def layer(ssm: DiagonalSSM) -> Layer:
+            stored = {name: weight.numpy() for name, weight in ssm.named_parameters()}
+            return *self.plain(stored), stored["D"]
 
-@pytest.mark.parametrize("steps", [1, 2, 31, 32, 33, 64, 100])
-def test_both_routes_are_the_plain_recurrence(steps: int) -> None:
-    inputs, log_eigenvalues, state = random_recurrence(steps)
-    expected, x = [], state
-    for v in inputs:
-        x = log_eigenvalues.exp() * x + v
-        expected.append(x)
-    parallel, last = recur(inputs, log_eigenvalues, state)
-    torch.testing.assert_close(parallel, torch.stack(expected), rtol=0, atol=1e-12)
-    torch.testing.assert_close(last, expected[-1], rtol=0, atol=1e-12)
-    sequential, last = torch.stack([inputs.real, inputs.imag], dim=-2), state.clone()
-    stream(sequential.numpy(), torch.view_as_real(log_eigenvalues.exp()).numpy(), torch.view_as_real(last).numpy())
-    torch.testing.assert_close(torch.complex(*sequential.unbind(-2)), torch.stack(expected), rtol=0, atol=1e-12)
-    torch.testing.assert_close(last, expected[-1], rtol=0, atol=1e-12)
+        eigenvalue, B, C, _ = layer(model.first_layer)
+        first = start.numpy() @ B.T
+        blocks = [(block, *layer(block.seq)) for block in model.layers]
+        states = [np.zeros((3, len(eigenvalue)), complex) for _ in blocks]
+        for frame in model(start, 200).unbind(1):
+            first = eigenvalue * first
+            y = (first @ C.T).real
+            for i, (block, block_eigenvalue, block_B, block_C, D) in enumerate(blocks):
+                norm = block.normalization
+                u = (y - norm.running_mean.numpy()) / np.sqrt(norm.running_var.numpy() + 1e-5)
+                u = u * norm.weight.numpy() + norm.bias.numpy()
+                states[i] = block_eigenvalue * states[i] + u @ block_B.T
+                v = (states[i] @ block_C.T).real + D * u
+                v = 0.5 * v * (1 + np.tanh(np.sqrt(2 / np.pi) * (v + 0.044715 * v**3)))
+                value, gate = np.split(v @ block.gate.weight.numpy().T + block.gate.bias.numpy(), 2, axis=-1)
+                y = y + value / (1 + np.exp(-gate))
+            np.testing.assert_allclose(frame.numpy(), y, rtol=0, atol=1e-12)
 
+    def test_training_normalises_over_batch_and_time(self) -> None:
+        model = self.made().train()
+        model(released(), 40)
+        assert all(block.normalization.running_mean.any() for block in model.layers)
 
-@pytest.mark.parametrize("steps", [1, 34])
-def test_the_adjoint_is_the_derivative(steps: int) -> None:
-    given = tuple(tensor[..., :1].clone().requires_grad_() for tensor in random_recurrence(steps))
-    assert torch.autograd.gradcheck(recur, given)
-    assert torch.autograd.gradcheck(lambda a, x: evolve(a, x, steps, torch.complex128), given[1:])
+    @pytest.mark.parametrize("how", ["in place", "memory", "parameter", "loaded", "optimiser", "statistics"])
+    def test_what_was_folded_for_rendering_follows_the_weights(self, how: str) -> None:
+        model = self.stirred()
+        with torch.no_grad():
+            before = model(released(), 40)
+        changed_by(model, how)
+        with torch.no_grad():
+            rendered = model(released(), 40)
+        assert relative(rendered, before) > 1e-3
+        plain = model(released(), 40).detach()  # by the definition: nothing is folded
+        assert relative(rendered, plain) < 1e-4
 
-
-def test_phases_stay_exact_after_a_million_steps() -> None:
-    log_eigenvalues = torch.tensor([-1e-7 + 0.3j, -1e-8 + 3.1j], dtype=torch.complex128)
-    state, done = torch.ones(1, 2, dtype=torch.complex128), 0
-    for steps in (1000, 1, 997, 2) * 500:
-        _, state = evolve(log_eigenvalues, state, steps, torch.complex64)
-        done += steps
-    assert done == 1_000_000
-    phase = torch.remainder(done * log_eigenvalues.imag, 2 * torch.pi)
-    expected = torch.polar(torch.exp(done * log_eigenvalues.real), phase)
-    torch.testing.assert_close(state[0], expected, rtol=0, atol=1e-8)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@torch.no_grad()
-def test_any_splitting_into_blocks_is_the_same_motion(name: str) -> None:
-    model = small_model(name)
-    whole = model(initial(), 5000)
-    state, parts = model.encode(initial()), []
-    for steps in (1, 64, 65, 1, 1, 31, 2047, 2790):
-        part, state = model.advance(state, steps)
-        parts.append(part)
-    torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_training_and_rendering_take_the_same_path(name: str) -> None:
-    """With gradients the chunks run in parallel; without them batch norm is folded and a loop runs over time."""
-    model, generator = small_model(name), torch.Generator().manual_seed(4)
-    for block in model.layers:
-        for weight in (block.gate.bias, *block.normalization.parameters(), *block.normalization.buffers()):
-            if weight.is_floating_point():
-                weight.data.uniform_(0.5, 1.5, generator=generator)
-    parallel = model(initial(), 300)
-    assert parallel.requires_grad
-    with torch.no_grad():
-        sequential = model(initial(), 300)
-        assert torch.isnan(model(initial().fill_(torch.nan), 3)).all()
-    torch.testing.assert_close(parallel.detach(), sequential, rtol=0, atol=1e-5 * float(sequential.abs().max()))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_training_normalises_over_batch_and_time_and_reaches_every_weight(name: str) -> None:
-    model = small_model(name).train()
-    model(initial(3), 40).square().mean().backward()
-    unreached = [name for name, weight in model.named_parameters() if weight.grad is None or not weight.grad.any()]
-    assert unreached == ["first_layer.D"]  # as in the source: counted, not used
-    assert all(block.normalization.running_mean.any() for block in model.layers)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@torch.no_grad()
-def test_listening_is_the_grid_at_that_point(name: str) -> None:
-    model = small_model(name)
-    weights = listening_weights([0.37, 0.123], 21)
-    heard = model(initial(), 50, weights)
-    torch.testing.assert_close(heard, model(initial(), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@torch.no_grad()
-def test_physics_initialisation_is_the_linear_string(name: str) -> None:
-    model = small_model(name, how="physics")
-    amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
-    times_s = torch.arange(201, dtype=torch.float64) / PHYSICS.rate_hz
-    truth = to_grid(solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), times_s), 21).float()
-    torch.testing.assert_close(model(truth[:, 0], 200), truth[:, 1:], rtol=0, atol=2e-3 * float(truth.abs().max()))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_seed_decides_all(name: str) -> None:
-    first, again, other = (small_model(name, seed).state_dict() for seed in (1, 1, 2))
-    assert all(torch.equal(first[key], again[key]) for key in first)
-    assert not torch.equal(first["layers.1.seq.B"], other["layers.1.seq.B"])
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_models_can_be_built_without_memory(name: str) -> None:
-    with torch.device("meta"):
-        model = LRU(LRUConfiguration()) if name == "lru" else S5(S5Configuration())
-    assert all(weight.is_meta for weight in model.state_dict().values())
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_physics_initialisation_needs_a_state_for_each_mode(name: str) -> None:
-    model = small_model(name)
-    with pytest.raises(ValueError, match="each of the 30 modes"):
-        model.initialise("physics", Physics(resonator_of(StringParameters(), 30), 4_000), torch.Generator())
-    with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
-        model.initialise("guess", PHYSICS, torch.Generator())
+    @torch.no_grad()
+    def test_a_motion_keeps_the_weights_with_which_its_rendering_began(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """They are folded once, and nothing of it stays in the model."""
+        model, folds, fold = self.stirred(), [], Block.fold
+        monkeypatch.setattr(Block, "fold", lambda block: folds.append(block) or fold(block))
+        first = model(released(), 40)
+        state = model.encode(released())
+        for _ in range(3):
+            _, state = model.advance(state, 7)
+        assert len(folds) == 2 * len(model.layers)
+        changed_by(model, "in place")
+        kept, _ = model.advance(state, 19)
+        assert relative(kept, first[:, 21:]) < 1e-5
 
 
 def changed_by(model: SSMString, how: str) -> None:
@@ -174,43 +136,141 @@ def changed_by(model: SSMString, how: str) -> None:
         model.load_state_dict({name: 1.5 * value for name, value in model.state_dict().items()})
     elif how == "optimiser":
         optimiser = torch.optim.AdamW(model.parameters(), lr=0.1)
-        model.train()(initial(), 8).square().mean().backward()
+        model.train()(released(), 8).square().mean().backward()
         block.normalization.eval()
         optimiser.step()
     else:
-        model.train()(10 * initial(), 8)
+        model.train()(10 * released(), 8)
     model.eval()
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("how", ["in place", "memory", "parameter", "loaded", "optimiser", "statistics"])
-def test_what_was_folded_for_rendering_follows_the_weights(name: str, how: str) -> None:
-    model = small_model(name)
-    with torch.no_grad():
-        before = model(initial(), 40)
-        assert torch.equal(model(initial(), 40), before)
-    changed_by(model, how)
-    with torch.no_grad():
-        rendered = model(initial(), 40)
-    assert not torch.allclose(rendered, before, rtol=1e-3)
-    with torch.enable_grad():
-        plain = model(initial(), 40).detach()  # by the definition: nothing is folded
-    torch.testing.assert_close(rendered, plain, rtol=1e-4, atol=1e-4)
+class TestLRU(StateSpaceLaws):
+    name = "lru"
+    count = 636_221
+    sizes: ClassVar = {"state_size": 24, "layers": 3}
+    too_small: ClassVar = ({"state_size": 8}, "each of the 10 modes")
+    reference_sizes: ClassVar = {"grid_points": 11, "state_size": 8, "layers": 2}
+    stored = ("B_re", "B_im", "C_re", "C_im", "D", "nu_log", "theta_log", "gamma_log")
+
+    def layer_weights(self, arrays: Arrays) -> Arrays:
+        stacked = {name: array for name, array in arrays.items() if name[0] not in "BC"}
+        for matrix, axis in (("B", 1), ("C", -1)):
+            stacked[matrix] = torch.stack([arrays[f"{matrix}_{part}"] for part in ("re", "im")], axis)
+        return stacked
+
+    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
+        B = np.exp(stored["gamma_log"])[:, None] * (stored["B"][:, 0] + 1j * stored["B"][:, 1])
+        C = stored["C"][..., 0] + 1j * stored["C"][..., 1]
+        return np.exp(-np.exp(stored["nu_log"]) + 1j * np.exp(stored["theta_log"])), B, C
+
+    @torch.no_grad()
+    def test_its_papers_start_lies_in_the_ring_with_its_gamma(self) -> None:
+        for block in self.made().layers:
+            radius = torch.exp(-block.seq.nu_log.exp())
+            assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
+            torch.testing.assert_close(block.seq.gamma_log.exp(), torch.sqrt(1 - radius**2), rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("name", NAMES)
+class TestS5(StateSpaceLaws):
+    name = "s5"
+    count = 307_879
+    sizes: ClassVar = {"state_size": 32, "hippo_blocks": 4, "layers": 3}
+    too_small: ClassVar = ({"state_size": 16}, "each of the 10 modes")
+    reference_sizes: ClassVar = {"grid_points": 11, "state_size": 16, "hippo_blocks": 1, "layers": 2}
+    stable = False
+    stored = ("B", "C", "D", "Lambda_re", "Lambda_im", "log_step")
+
+    def layer_weights(self, arrays: Arrays) -> Arrays:
+        return arrays | {"B": arrays["B"].mT}
+
+    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
+        rate = stored["Lambda_re"] + 1j * stored["Lambda_im"]
+        eigenvalue = np.exp(rate * np.exp(stored["log_step"][:, 0]))
+        B = ((eigenvalue - 1) / rate)[:, None] * (stored["B"][:, 0] + 1j * stored["B"][:, 1])
+        return eigenvalue, B, 2 * (stored["C"][..., 0] + 1j * stored["C"][..., 1])
+
+    @torch.no_grad()
+    def test_its_papers_start_is_hippo_in_blocks_with_steps_in_range(self) -> None:
+        for block in self.made().layers:
+            seq = block.seq
+            torch.testing.assert_close(seq.Lambda_im, hippo_normal(8)[0].imag[:4].repeat(4).float())
+            assert (seq.Lambda_re == -0.5).all()
+            assert 0.0001 <= float(seq.log_step.exp().min()) < float(seq.log_step.exp().max()) <= 0.1
+
+    @torch.no_grad()
+    def test_an_eigenvalue_outside_the_unit_circle_is_reported_with_its_pair(self) -> None:
+        model = self.made()
+        model.layers[1].seq.Lambda_re[2] = 0.3
+        assert int((torch.cat(model.log_eigenvalues()).real > 0).sum()) == 2
+
+    def test_its_state_is_whole_blocks_of_pairs(self) -> None:
+        with pytest.raises(ValueError, match="state_size must be a multiple of twice the 16 hippo_blocks, not 100"):
+            self.made(state_size=100, hippo_blocks=16)
+
+
+def test_hippo_is_normal_up_to_its_rank_one_part() -> None:
+    """A_nk = -√(2n+1)√(2k+1) below the diagonal, -(n+1) on it; plus p pᵀ with p_n = √(n+½) it is normal."""
+    n = torch.arange(8, dtype=torch.float64)
+    root = torch.sqrt(2 * n + 1)
+    legs = -torch.tril(torch.outer(root, root), -1) - torch.diag(n + 1)
+    normal = legs + torch.outer(torch.sqrt(n + 0.5), torch.sqrt(n + 0.5))
+    rates, vectors = hippo_normal(8)
+    torch.testing.assert_close(vectors @ torch.diag(rates) @ vectors.mH, normal.to(rates), rtol=0, atol=1e-12)
+    torch.testing.assert_close(rates[:4].conj().resolve_conj(), rates[4:].flip(0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("how", "fan_in", "smallest"), [("paper", 128 * 101, 1e-4), ("physics", 128, 1e-3)])
 @torch.no_grad()
-def test_blocks_are_folded_once_for_a_motion(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And nothing of it stays in the model."""
-    model, folds = small_model(name), []
-    fold = Block.fold
-    monkeypatch.setattr(Block, "fold", lambda block: folds.append(block) or fold(block))
-    first = model(initial(), 40)
-    assert len(folds) == len(model.layers)
-    state = model.encode(initial())
-    for _ in range(3):
-        _, state = model.advance(state, 7)
-    assert len(folds) == 2 * len(model.layers)
-    changed_by(model, "in place")
-    kept, _ = model.advance(state, 19)  # by the weights with which it began
-    torch.testing.assert_close(kept, first[:, 21:], rtol=0, atol=1e-5 * float(first.abs().max()))
+def test_the_papers_code_counts_the_outputs_in_the_fan_in_and_begins_with_shorter_steps(
+    how: str, fan_in: int, smallest: float
+) -> None:
+    layer = S5Layer(64, 101, 101, 16)
+    layer.initialise(how, torch.Generator().manual_seed(0))
+    # real and imaginary parts of variance 1/fan_in each; half of V's columns keep it
+    assert float(layer.C.square().mean()) * fan_in == pytest.approx(1, rel=0.05)
+    assert float(layer.log_step.exp().min()) == pytest.approx(smallest, rel=0.5)
+
+
+def random_recurrence(steps: int) -> tuple[Tensor, Tensor, Tensor]:
+    """v, log λ and x₀, all in double precision."""
+    generator = torch.Generator().manual_seed(3)
+
+    def draw(*shape: int) -> Tensor:
+        return torch.randn(*shape, dtype=torch.complex128, generator=generator)
+
+    log_eigenvalues = torch.complex(-0.1 * draw(5).abs(), 2 * draw(5).real)
+    return draw(steps, 2, 5), log_eigenvalues, draw(2, 5)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 31, 32, 33, 64, 100])
+def test_both_routes_are_the_plain_recurrence(steps: int) -> None:
+    inputs, log_eigenvalues, state = random_recurrence(steps)
+    expected, x = [], state
+    for v in inputs:
+        x = log_eigenvalues.exp() * x + v
+        expected.append(x)
+    parallel, last = recur(inputs, log_eigenvalues, state)
+    streamed, end = torch.stack([inputs.real, inputs.imag], dim=-2), state.clone()
+    stream(streamed.numpy(), torch.view_as_real(log_eigenvalues.exp()).numpy(), torch.view_as_real(end).numpy())
+    for found in (parallel, torch.complex(*streamed.unbind(-2))):
+        torch.testing.assert_close(found, torch.stack(expected), rtol=0, atol=1e-12)
+    for found in (last, end):
+        torch.testing.assert_close(found, expected[-1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [1, 34])
+def test_the_adjoint_is_the_derivative(steps: int) -> None:
+    inputs = tuple(tensor[..., :1].clone().requires_grad_() for tensor in random_recurrence(steps))
+    assert torch.autograd.gradcheck(recur, inputs)
+    assert torch.autograd.gradcheck(lambda a, x: evolve(a, x, steps, torch.complex128), inputs[1:])
+
+
+def test_phases_of_both_stay_exact_after_a_million_steps() -> None:
+    log_eigenvalues = torch.tensor([-1e-7 + 0.3j, -1e-8 + 3.1j], dtype=torch.complex128)
+    state, done = torch.ones(1, 2, dtype=torch.complex128), 0
+    for steps in (1000, 1, 997, 2) * 500:
+        _, state = evolve(log_eigenvalues, state, steps, torch.complex64)
+        done += steps
+    phase = torch.remainder(done * log_eigenvalues.imag, 2 * torch.pi)
+    expected = torch.polar(torch.exp(done * log_eigenvalues.real), phase)
+    torch.testing.assert_close(state[0], expected, rtol=0, atol=1e-8)

@@ -55,23 +55,7 @@ class ChangingVoice(Voice):
 
         Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
         """
-        self._follow(before)
-
-    def stops(self, before: ChangingVoice, seconds: float) -> None:
-        """Before it is handed over: it is the same string, stopped by what plucks it again.
-
-        It begins as a pluck of a string at rest, and `before` fades out in so many seconds from then on. One that
-        has not begun by then never sounds.
-        """
-        self._follow(before)
-        self.record["stops_in"] = max(1, round(seconds * self.program.rate_hz))
-
-    def _follow(self, before: ChangingVoice) -> None:
-        """Keeps the voice before in memory until this one, which is the same string, has begun."""
-        before._forget_before()
-        self._before = before
+        if before.record["previous_voice"] == 0:
+            before._before = None
+        self._before = before  # in memory until this one has begun
         self.record["previous_voice"] = before.address
-
-    def _forget_before(self) -> None:
-        if self.record["previous_voice"] == 0:
-            self._before = None

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.kernels.constants import QUANTUM
@@ -22,11 +21,12 @@ from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices import Mixer, Program, Voice
+from engine.voices import Mixer, Program
 from engine.voices.programs import solver_program, tension_program
+from engine.voices.voice import resonator_rows
+from tests.engine.sounds import RATE_HZ, Signal, mixer_of
 from tests.engine.voices.changing import ChangingVoice
 
-RATE_HZ = 48_000
 STRING = StringParameters(tension_n=80.0, second_moment_m4=1.4e-14)
 EAR = Ear((0.37,))
 PLUCK = Pluck(0.3, 4.0, "raised_cosine", 0.2)
@@ -65,7 +65,7 @@ def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> ChangingVoice:
     return ChangingVoice(of, pluck.displacement(of.grid_points), ear)
 
 
-def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> NDArray[np.float64]:
+def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> Signal:
     """The sound, (frames,), of a string that is plucked and then changed."""
     mixer, voice, blocks, done = Mixer(RATE_HZ, limited=False), struck(of, ear=ear), [], 0
     mixer.add(voice)
@@ -84,7 +84,7 @@ def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> N
     return np.concatenate(blocks).astype(np.float64)
 
 
-def error(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def error(one: Signal, other: Signal) -> float:
     return float(((one - other) ** 2).sum() / (other**2).sum())
 
 
@@ -94,23 +94,12 @@ BEND: Changes = [(40 + 2 * step, bent(step / 20), 0.002) for step in range(1, 41
 @pytest.mark.parametrize(
     ("changes", "allowed"),
     [
-        ([], 1e-9),
         (BEND, 1e-9),
-        ([(50, bent(2), 0.005)], 1e-9),
         ([(0, bent(2), 0.0)], 1e-9),
         ([(60, damped(0.1), 0.01), (160, bent(0), 0.01)], 1e-9),
-        ([(70, Pluck(0.2, 3.0, "raised_cosine", 0.2), 0.0)], 1e-6),
         ([(50, bent(1), 0.0), (70, Pluck(0.6, 4.0, "raised_cosine", 0.15), 0.0), (90, bent(-1), 0.02)], 1e-6),
     ],
-    ids=[
-        "unchanged",
-        "a slow bend",
-        "a jump",
-        "bent before it is struck",
-        "damped and free again",
-        "plucked again",
-        "all",
-    ],
+    ids=["a slow bend", "bent before it is struck", "damped and free again", "all"],
 )
 def test_the_model_follows_the_truth_through_every_change(changes: Changes, allowed: float) -> None:
     """Relative MSE of 0.4 s with a tension rise of 2 %."""
@@ -121,9 +110,9 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     """Against DOP853, quantum by quantum, with the modes that the voice had then."""
     first, last, quanta = modes_of(STRING, 4), modes_of(replace(STRING, tension_n=95.0, length_m=0.6), 4), 12
     of = program("truth", first, coarser=1)
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(of)
+    voice = struck(of)
     voice.begin_at_once()
-    mixer.add(voice)
+    mixer = mixer_of(voice)
     heard = [mixer.render(4 * QUANTUM)[:, 0]]
     voice.retune(last, 5 * QUANTUM / RATE_HZ)
     heard.append(mixer.render((quanta - 4) * QUANTUM)[:, 0])
@@ -132,31 +121,14 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     state, expected, weights = np.concatenate([q, 0 * q]), [], of.weights(EAR)[0][0, :4]
     for quantum in range(quanta):
         share = min(max((quantum - 3) / 5, 0.0), 1.0)
-        squares, sigma, coupling, stretch = (
-            (1 - share) * a + share * b
-            for a, b in (
-                (first.omega**2, last.omega**2),
-                (first.sigma, last.sigma),
-                (first.coupling, last.coupling),
-                (first.stretch, last.stretch),
-            )
-        )
+        own = [(1 - share) * a + share * b for a, b in zip(resonator_rows(first), resonator_rows(last), strict=True)]
 
-        def slope(_s: float, y: NDArray[np.float64], own: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+        def slope(_s: float, y: Signal, own: list[Signal]) -> Signal:
             a, v = y[:4], y[4:]
             return np.concatenate([v, -2 * own[1] * v - own[0] * a - own[2] * a * (own[3] * a * a).sum()])
 
-        times = np.arange(QUANTUM + 1) / RATE_HZ
-        solved = solve_ivp(
-            slope,
-            (0, times[-1]),
-            state,
-            "DOP853",
-            times,
-            args=((squares, sigma, coupling, stretch),),
-            rtol=1e-11,
-            atol=1e-15,
-        ).y
+        times, most = np.arange(QUANTUM + 1) / RATE_HZ, {"rtol": 1e-11, "atol": 1e-15}
+        solved = solve_ivp(slope, (0, times[-1]), state, "DOP853", times, args=(own,), **most).y
         expected.append(weights @ solved[:4, :-1])
         state = solved[:, -1]
     assert np.abs(np.concatenate(heard) - np.concatenate(expected)).max() < 2e-7  # the sound is float32
@@ -164,40 +136,16 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_soft_second_pluck_leaves_the_loud_tail_and_makes_no_click(kind: str, pickup: str) -> None:
-    of, ear = program(kind), Ear((0.37,), pickup)  # type: ignore[arg-type]
-    alone = sound(of, [], ear=ear)
-    touched = sound(of, [(100, Pluck(0.3, 0.02, "raised_cosine", 0.2), 0.0)], ear=ear)
-    after = slice(101 * QUANTUM, 200 * QUANTUM)
+def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind: str, pickup: str) -> None:
+    """Of next to nothing, sample by sample: the motion continues in its own time, however far ahead it was made."""
+    of, ear = program(kind), Ear((0.37, 0.6), pickup)
+    soft, faint = (Pluck(0.3, amplitude_mm, "raised_cosine", 0.2) for amplitude_mm in (0.02, 1e-4))
+    alone, touched = sound(of, [], ear=ear), sound(of, [(100, soft, 0.0)], ear=ear)
+    after, joint = slice(101 * QUANTUM, 200 * QUANTUM), slice(99 * QUANTUM, 104 * QUANTUM)
     assert np.std(touched[after]) == pytest.approx(np.std(alone[after]), rel=0.05)
-    joint = slice(99 * QUANTUM, 104 * QUANTUM)
     bend, usual = np.abs(np.diff(touched, 2))[joint].max(), np.abs(np.diff(alone, 2))[joint].max()
     assert bend < 1.2 * usual
-
-
-def test_a_pluck_of_a_string_that_has_ended_is_a_fresh_one() -> None:
-    of, mixer = program("model"), Mixer(RATE_HZ, limited=False)
-    first = struck(of)
-    mixer.add(first)
-    mixer.render(640)
-    first.release(0.001)
-    mixer.render(640)
-    assert first.over
-    again = struck(of)
-    again.continues(first)
-    mixer.add(again)
-    fresh = Mixer(RATE_HZ, limited=False)
-    fresh.add(struck(of))
-    np.testing.assert_array_equal(mixer.render(6400), fresh.render(6400))
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_second_pluck_of_next_to_nothing_changes_nothing(kind: str, pickup: str) -> None:
-    """Sample by sample: the motion continues in its own time, however far ahead a voice was generated."""
-    of, ear = program(kind), Ear((0.37, 0.6), pickup)  # type: ignore[arg-type]
-    faint = Pluck(0.3, 1e-4, "raised_cosine", 0.2)
-    touched, alone = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear), sound(of, [], ear=ear)
+    touched = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear)
     np.testing.assert_allclose(touched, alone, atol=2e-4 * np.abs(alone).max())
 
 
@@ -208,93 +156,10 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     assert below < 80
     few = modes_of(STRING, below)
 
-    def at(resonator: Resonator) -> NDArray[np.float64]:
-        mixer, voice = Mixer(low_hz, limited=False), struck(series_program(resonator, low_hz))
-        mixer.add(voice)
-        return mixer.render(3_200)[:, 0].astype(np.float64)
+    def at(resonator: Resonator) -> Signal:
+        return mixer_of(struck(series_program(resonator, low_hz)), rate_hz=low_hz).render(3_200)[:, 0]
 
     np.testing.assert_allclose(at(own), at(few), atol=1e-4)
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
-    of, mixer = program(kind), Mixer(RATE_HZ, limited=False)
-    both = Voice(of, 2 * PLUCK.displacement(101), EAR)
-    both.never_ends()
-    alone = Mixer(RATE_HZ, limited=False)
-    alone.add(both)
-    first, second = struck(of), struck(of)
-    second.continues(first)
-    mixer.add(first)
-    mixer.add(second)
-    np.testing.assert_allclose(mixer.render(9_600), alone.render(9_600), atol=1e-6)
-    assert first.over
-    assert not second.over
-
-
-def stopping(before: ChangingVoice, of: Program, seconds: float = 0.006) -> ChangingVoice:
-    voice = struck(of)
-    voice.stops(before, seconds)
-    return voice
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_a_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(kind: str) -> None:
-    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    first = struck(of)
-    mixer.add(first)
-    mixer.render(6_400)
-    mixer.add(stopping(first, of))
-    fresh.add(struck(of))
-    heard = mixer.render(6_400)[:, 0]
-    left = heard - fresh.render(6_400)[:, 0]
-    done = np.minimum(np.arange(1, 6_401) / 288, 1)
-    expected = (1 - done**2 * (3 - 2 * done)) * sound(of, [], 200)[6_400:]
-    np.testing.assert_allclose(left, expected, atol=1e-6)
-    assert first.over
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_of_plucks_that_wait_the_last_alone_sounds_and_the_ringing_one_is_stopped(kind: str) -> None:
-    """Also where the one that is stopped was to begin later."""
-    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    ringing = struck(of)
-    mixer.add(ringing)
-    mixer.render(6_400)
-    waits = stopping(ringing, of)
-    later = stopping(waits, of)
-    later.begin_at(20_000)
-    last = stopping(later, of)
-    mixer.add(waits)
-    mixer.add(later)
-    mixer.add(last)
-    fresh.add(struck(of))
-    heard = mixer.render(32_000)[:, 0]
-    np.testing.assert_allclose(heard[320:], fresh.render(32_000)[320:, 0], atol=1e-6)
-    assert [each.over for each in (ringing, waits, later, last)] == [True, True, True, False]
-
-
-def test_a_pluck_that_is_added_does_not_wait_for_one_of_a_later_frame() -> None:
-    """It is added to the string that rings, and the later one never sounds."""
-    of, mixer, alone = program("model"), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
-    ringing, again = struck(of), struck(of)
-    alone.add(ringing)
-    alone.render(6_400)
-    again.continues(ringing)
-    alone.add(again)
-    expected = alone.render(12_800)
-    ringing = struck(of)
-    mixer.add(ringing)
-    mixer.render(6_400)
-    later = stopping(ringing, of)
-    later.begin_at(8_000)
-    added = struck(of)
-    added.continues(later)
-    mixer.add(later)
-    mixer.add(added)
-    np.testing.assert_array_equal(mixer.render(12_800), expected)
-    assert ringing.over
-    assert later.over
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
@@ -309,18 +174,9 @@ def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) ->
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_endless_bending_does_not_pump_the_string(kind: str) -> None:
-    wild: Changes = [(2 + n, bent(3 * math.sin(n)), 0.0) for n in range(700)]
-    heard = sound(program(kind), wild, 720)
+    wild: Changes = [(2 + n, bent(3 * math.sin(n)), 0.0) for n in range(500)]
+    heard = sound(program(kind), wild, 520)
     assert np.abs(heard[-12_800:]).max() < 3 * np.abs(heard[:12_800]).max()
-
-
-def test_modes_that_are_no_longer_read_are_freed() -> None:
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
-    mixer.add(voice)
-    for turn in range(50):
-        voice.retune(bent(turn / 50))
-        mixer.render(QUANTUM)
-    assert len(voice._blocks) <= 2
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
@@ -339,19 +195,3 @@ def test_modes_count_from_their_frame_on(kind: str) -> None:
     voice.retune(damped(0.2), 0.01)  # at once, but after what was wished for: the same once more
     heard = np.concatenate([heard, mixer.render(240 * quantum)[:, 0]])
     np.testing.assert_allclose(heard, expected, atol=1e-6)
-    assert len(voice._blocks) <= 5
-    voice.retune(bent(0))
-    mixer.render(quantum)
-    voice.retune(bent(0))
-    assert len(voice._blocks) <= 2
-
-
-def test_modes_of_a_voice_that_begins_within_a_quantum_are_no_earlier_than_their_frame() -> None:
-    """The first quantum of its own that begins at the frame or later has them."""
-    quantum, late = QUANTUM, 20
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
-    voice.begin_at(late)
-    voice.retune(bent(2), 0.0, 50 * quantum + late)
-    mixer.add(voice)
-    expected = sound(program("model"), [(50, bent(2), 0.0)])[: 200 * quantum]
-    np.testing.assert_allclose(mixer.render(200 * quantum + late)[late:, 0], expected, atol=1e-6)

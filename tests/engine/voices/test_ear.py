@@ -10,7 +10,7 @@ from engine.excitation import displacement
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR
 from engine.pluck import Pluck
 from engine.resonators.base import Array
-from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.sine_transform import to_grid
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState
 from engine.values.ear import Ear
@@ -19,11 +19,6 @@ from engine.voices.ear import largest, weights_of
 from tests.engine.tensors import solve_linear
 
 POINTS = 101
-
-
-def test_without_solo_it_is_the_engines_listening_point() -> None:
-    weights = weights_of(Ear((0.37, 0.61)), POINTS)
-    np.testing.assert_array_equal(weights, listening_weights(np.array([0.37, 0.61]), POINTS))
 
 
 def test_solo_reads_one_mode_at_the_listening_point() -> None:
@@ -35,18 +30,6 @@ def test_solo_reads_one_mode_at_the_listening_point() -> None:
     everything = sum(motion @ weights_of(Ear((0.37,), solo=mode), POINTS)[:, 0] for mode in range(1, POINTS - 1))
     assert float(everything) == pytest.approx(float(motion @ weights_of(Ear((0.37,)), POINTS)[:, 0]), abs=1e-12)
     assert not weights_of(Ear((0.37,), solo=POINTS), POINTS).any()
-
-
-def test_nodes_are_known() -> None:
-    assert Ear((0.5,), solo=2).is_on_node(0.5)
-    assert not Ear((0.5,), solo=3).is_on_node(0.5)
-    assert Ear((0.0,)).is_on_node(0.0)
-    assert not Ear((0.5,)).is_on_node(0.5)
-
-
-def test_each_pick_up_has_its_full_scale() -> None:
-    assert Ear((0.5,)).full_scale == FULL_SCALE_M
-    assert Ear((0.5,), "velocity").full_scale == FULL_SCALE_M_S
 
 
 STIFF = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
@@ -71,13 +54,9 @@ def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> No
     heard = newtons(to_grid(amplitudes, POINTS))
     expected = STIFF.tension_n * slope - bending * third
     assert heard.tolist() == pytest.approx([expected, expected], rel=1e-4)
-    assert float(newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", mode))[0]) == pytest.approx(
-        expected, rel=1e-4
-    )
-    assert float(newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", mode + 1))[0]) == pytest.approx(
-        0, abs=1e-9
-    )
-    assert not newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", POINTS)).any()
+    for solo, alone in ((mode, expected), (mode + 1, 0.0), (POINTS, 0.0)):
+        found = newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", solo))
+        assert float(found[0]) == pytest.approx(alone, rel=1e-4, abs=1e-9)
 
 
 def test_the_bridge_bears_the_tension_times_the_slope_of_a_pull() -> None:
@@ -102,8 +81,13 @@ def test_no_motion_passes_the_bound_by_much(pluck: Pluck) -> None:
     assert 0.2 * bound < float(np.abs(heard).max()) < 0.2 * RUNAWAY_FACTOR * bound
 
 
-def test_a_bridge_is_no_place_on_the_string_and_needs_a_string() -> None:
-    assert not Ear((0.0,), "bridge").is_on_node(0.0)
-    assert BRIDGE.full_scale == FULL_SCALE_N
+def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string() -> None:
+    assert Ear((0.5,), solo=2).is_on_node(0.5) and Ear((0.0,)).is_on_node(0.0)
+    assert not any(
+        ear.is_on_node(place)
+        for ear, place in ((Ear((0.5,), solo=3), 0.5), (Ear((0.5,)), 0.5), (Ear((0.0,), "bridge"), 0.0))
+    )
+    pickups = ("displacement", "velocity", "bridge")
+    assert [Ear((0.5,), each).full_scale for each in pickups] == [FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N]
     with pytest.raises(ValueError, match="another pick-up"):
         weights_of(BRIDGE, POINTS)

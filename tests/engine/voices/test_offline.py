@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.fields import record_of
 from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetInfo, load_preset
+from engine.presets import Preset, load_preset
 from engine.sources import ModelSource, Runaway
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, model_program, render_voice, rendered_program, truth_program
 from engine.voices.ear import weights_of
 from engine.voices.program import voice_ends_s
 from engine.voices.voice import END_FADE_S
+from tests.engine.sounds import Initial, Shipped, Signal
 
 NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2
 RATE_HZ = 44_100
-Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 
 
 @pytest.fixture
-def preset(shipped: Callable[[str], Preset]) -> Preset:
+def preset(shipped: Shipped) -> Preset:
     return shipped(NAME)
 
 
@@ -66,10 +64,10 @@ def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path, i
     np.testing.assert_allclose(higher[::12][attack:-4], found[attack:-4], atol=1e-5)
 
 
-def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
+def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time(preset: Preset) -> None:
     shares: list[float] = []
-    arguments = (program_of("bank", preset), ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), SECONDS)
-    render_voice(*arguments, shares.append)
+    program, source = program_of("bank", preset), ModelSource(preset)
+    render_voice(program, source, preset.info, PLUCK, Ear((0.37,)), SECONDS, shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 
@@ -77,14 +75,10 @@ def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
         raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        render_voice(*arguments, refuse)
-
-
-def test_a_runaway_is_reported_with_its_time(preset: Preset) -> None:
-    program = program_of("bank", preset)
+        render_voice(program, source, preset.info, PLUCK, Ear((0.37,)), SECONDS, refuse)
     program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"]] = -5e-3  # an e-fold in 50 ms
     with pytest.raises(Runaway) as caught:
-        render_voice(program, ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), 2.0)
+        render_voice(program, source, preset.info, PLUCK, Ear((0.37,)), 2.0)
     assert 0.05 < caught.value.time_s < 1.0
 
 
@@ -97,11 +91,11 @@ def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
     else:
         program = rendered_program(preset.info, RATE_HZ)
 
-        def hum(state: object, steps: int, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], object]:
+        def hum(state: object, steps: int, weights: Signal) -> tuple[Signal, object]:
             wave = 1e-4 * np.cos(np.arange(steps) * math.pi / 4)
             return np.tile(wave[None, :, None], (1, 1, weights.shape[1])), state
 
-        source.advance = hum  # type: ignore[assignment, method-assign]
+        source.advance = hum
     return replace(program, ends_s=0.3), source
 
 
@@ -121,25 +115,27 @@ def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear, preset: Pres
 
 
 @pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
-def test_what_is_played_ends_as_in_a_file(skipped_s: float, preset: Preset, initial_m: Initial) -> None:
+def test_what_is_played_ends_as_in_a_file_and_rings_on_without_losses(
+    skipped_s: float, preset: Preset, initial_m: Initial
+) -> None:
     """Also where it begins later in its motion, or behind its end."""
     program, source = undying("bank", preset)
-    ear = Ear((0.37,))
-    file = render_voice(program, source, preset.info, PLUCK, ear, 1.0)[:, 0]
-    voice = Voice(program, initial_m(preset.info, PLUCK), ear, 0.0 if skipped_s else 1.0)
-    mixer = Mixer(RATE_HZ, limited=False)
-    if skipped_s:
-        voice.skip(skipped_s, mixer)
-        voice.set_gain(1.0)
-    mixer.add(voice)
-    first = round(skipped_s * RATE_HZ / QUANTUM) * QUANTUM
-    played = mixer.render(RATE_HZ - first)[:, 0]
-    faded_in = 2 * round(0.02 * RATE_HZ) if skipped_s else 0
-    assert voice.over
-    if skipped_s < 0.3:
-        np.testing.assert_array_equal(played[faded_in:], file[first + faded_in :])
-    else:
-        assert not played.any()
+    let_go_m, first = initial_m(preset.info, PLUCK), round(skipped_s * RATE_HZ / QUANTUM) * QUANTUM
+    file = render_voice(program, source, preset.info, PLUCK, Ear((0.37,)), 1.0)[first:, 0]
+    for own in (program, replace(program, ends_s=math.inf)):
+        voice, mixer = Voice(own, let_go_m, Ear((0.37,)), 0.0 if skipped_s else 1.0), Mixer(RATE_HZ, limited=False)
+        if skipped_s:
+            voice.skip(skipped_s, mixer)
+            voice.set_gain(1.0)
+        mixer.add(voice)
+        played = mixer.render(RATE_HZ - first)[:, 0]
+        faded_in = 2 * round(0.02 * RATE_HZ) if skipped_s else 0
+        if own is not program:
+            assert np.abs(played[-RATE_HZ // 10 :]).max() > 1e-3 and not voice.over
+        else:
+            assert voice.over
+            expected = file[faded_in:] if skipped_s < 0.3 else 0 * file[faded_in:]
+            np.testing.assert_array_equal(played[faded_in:], expected)
 
 
 def test_it_ends_where_its_string_is_silent_and_not_within_its_training(preset: Preset) -> None:
@@ -153,20 +149,3 @@ def test_it_ends_where_its_string_is_silent_and_not_within_its_training(preset: 
     assert voice_ends_s(damped) == info.horizon_s
     endless = replace(info, string=replace(info.string, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0))
     assert voice_ends_s(endless) == math.inf
-
-
-def test_a_voice_of_a_string_without_losses_rings_on(preset: Preset, initial_m: Initial) -> None:
-    program, _ = undying("bank", preset)
-    voice = Voice(replace(program, ends_s=math.inf), initial_m(preset.info, PLUCK), Ear((0.37,)))
-    mixer = Mixer(RATE_HZ, limited=False)
-    voice.skip(3600.0, mixer)
-    voice.start_with_gain(1.0)
-    mixer.add(voice)
-    assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3
-    assert not voice.over
-
-
-def test_no_more_samples_are_wanted_than_are_heard(preset: Preset, initial_m: Initial) -> None:
-    program, _ = undying("rendered", preset)
-    voice = Voice(program, initial_m(preset.info, PLUCK), Ear((0.37,)), 1.0, 600.0, preset.info.rate_hz)
-    assert voice.room < preset.info.rate_hz

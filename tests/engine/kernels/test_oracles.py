@@ -1,0 +1,310 @@
+"""Kernels: compiled they are what they are in plain Python, and both are what an independent way computes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import astuple, dataclass, replace
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import ArrayLike
+from scipy.linalg import expm
+from scipy.optimize import brentq
+from scipy.signal import freqz
+
+from engine.kernels import compiled, fourier, javari, loudness, pulses, responses, strings, velocities
+from engine.kernels import constants as of
+from engine.kernels.rotation import rotation
+from engine.resonators.losses import loss_rates
+from engine.resonators.string import resonator_of
+from engine.values.string import Losses, StringParameters
+from tests.engine.sounds import Signal
+
+STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
+FLEXIBLE = StringParameters(second_moment_m4=0.0, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
+GIVE = 3e-7  # m/N
+DRAW = np.random.default_rng(1)
+TURNS = 2 * np.pi * np.arange(2048) / 2048
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A kernel, a use of it that returns numbers, and the same numbers by another way.
+
+    Attributes:
+        alone: whether it is compiled here; the player, whose sounds are frozen, compiles it as well.
+    """
+
+    function: Any
+    use: Callable[[Any], ArrayLike]
+    oracle: Callable[[], ArrayLike]
+    rtol: float = 1e-12
+    atol: float = 1e-15
+    alone: bool = True
+
+
+def at(*arguments: Iterable[float]) -> Callable[[Any], ArrayLike]:
+    return lambda kernel: [kernel(*each) for each in zip(*arguments, strict=True)]
+
+
+def pulse_spectrum(turns: float) -> float:
+    """∫ (1 - cos 2πx) cos 2π turns (x - ½) dx, by its middles."""
+    x = (np.arange(200_000) + 0.5) / 200_000
+    return float(((1 - np.cos(2 * np.pi * x)) * np.cos(2 * np.pi * turns * (x - 0.5))).mean())
+
+
+def flow(sigma: float, omega: float, time_s: float) -> Signal:
+    return expm(time_s * np.array([[0, 1], [-(omega**2) - sigma**2, -2 * sigma]])).ravel()
+
+
+def rows(kernel: Any) -> Signal:
+    found = np.empty(4 * 60)
+    kernel(np.array(astuple(STEEL)), 60, 0, 1.0, *[0.0] * 5, found)
+    return found
+
+
+def modes_of_the_equation() -> Signal:
+    eta, mass = np.arange(1, 61) * np.pi / STEEL.length_m, STEEL.density_kg_m3 * STEEL.area_m2
+    bending, stiffness = STEEL.youngs_modulus_pa * STEEL.second_moment_m4, STEEL.youngs_modulus_pa * STEEL.area_m2
+    squares = (bending * eta**4 + STEEL.tension_n * eta**2) / mass
+    sigma = (STEEL.damping_d1_kg_m_s + STEEL.damping_d3_kg_m_s * eta**2) / (2 * mass)
+    return np.concatenate([squares, sigma, stiffness * eta**2 / (4 * mass), eta**2])
+
+
+def polarised_rows(kernel: Any) -> Signal:
+    """Two partials of two modes and one of one, with a bridge that moves and losses by mode."""
+    found = np.empty(4 * 5)
+    kernel(np.array(astuple(STEEL)), 5, 2, 1.01, 0.01, 0.002, 1.2, 1e-4, 0.02, found)
+    return found
+
+
+def polarised_modes() -> Signal:
+    squares, sigma, coupling, stretch = modes_of_the_equation().reshape(4, -1)[:, [0, 0, 1, 1, 2]]
+    losses = loss_rates(Losses(1.2, 1e-4, 0.02), STEEL, 3)[[0, 0, 1, 1, 2]]
+    lost = STEEL.tension_n / STEEL.length_m * np.array([0.01, 0.002, 0.01, 0.002, 0.01])
+    return np.concatenate([squares * [1, 1.01, 1, 1.01, 1], sigma + losses + lost, coupling, stretch])
+
+
+def fretted(kernel: Any) -> Signal:
+    """The pitch of a string that is slackened by a fifth and stopped at 300 Hz, and its modes below 20 kHz."""
+    out = np.zeros(8)
+    assert kernel(np.array(astuple(STEEL)), np.ones(8), 0.9, 300.0, np.empty(8), out)
+    stopped = StringParameters(*out.tolist())
+    return np.array([stopped.pitch_hz, stopped.tension_n / STEEL.tension_n < 0.9, stopped.length_m < STEEL.length_m])
+
+
+SEPARATIONS = [(before, free) for before, free in DRAW.normal(0, 1e-5, (200, 2)).tolist()]
+EDGES = [
+    (*pair, GIVE, stiffness, loss) for pair in SEPARATIONS for stiffness in (1e3, 1e8) for loss in (0.0, 2e4, 1e6)
+]
+
+
+def edge_force(before: float, free: float, give: float, stiffness: float, loss: float) -> float:
+    """The root of F · moved = (V(d₁) - V(d₀)) (1 + loss · moved): a discrete gradient, with loss once it touches."""
+    if before <= 0 and free <= 0:
+        return 0.0
+
+    def left(force: float) -> float:
+        after = free - give * force
+        moved = after - before
+        mean = (
+            0.5 * stiffness * (max(after, 0.0) ** 2 - max(before, 0.0) ** 2) / moved if moved else stiffness * before
+        )
+        return force - mean * (1 + loss * moved if before > 0 else 1.0)
+
+    largest = 1.0
+    while left(largest) < 0 or left(-largest) > 0:
+        largest *= 2
+    return float(brentq(left, -largest, largest, xtol=1e-16, rtol=1e-15))
+
+
+RATIOS = (DRAW.uniform(8_000, 384_000, 200).round() / DRAW.uniform(8_000, 384_000, 200).round()).tolist()
+
+
+def k_weighting(hz: Signal) -> Signal:
+    """By the filters for 48 kHz of ITU-R BS.1770, tables 1 and 2."""
+    shelf = [1.53512485958697, -2.69169618940638, 1.19839281085285], [1.0, -1.69065929318241, 0.73248077421585]
+    high_pass = [1.0, -2.0, 1.0], [1.0, -1.99004745483398, 0.99007225036621]
+    return np.prod([np.abs(freqz(*each, worN=hz, fs=48_000)[1]) ** 2 for each in (shelf, high_pass)], axis=0)
+
+
+def transformed(kernel: Any) -> Signal:
+    """Of a signal forwards, and with its parts exchanged backwards: itself."""
+    found = []
+    for size in (2, 4, 8, 16, 128, 1024, 2048):
+        re, im = np.random.default_rng(size).standard_normal((2, size))
+        room = np.empty((2, size))
+        kernel(re, im, *room, np.cos(TURNS), np.sin(TURNS))
+        found += [re.copy(), im.copy()]
+        kernel(im, re, room[1], room[0], np.cos(TURNS), np.sin(TURNS))
+        found += [re / size, im / size]
+    return np.concatenate(found)
+
+
+def by_numpy() -> Signal:
+    found = []
+    for size in (2, 4, 8, 16, 128, 1024, 2048):
+        re, im = np.random.default_rng(size).standard_normal((2, size))
+        spectrum = np.fft.fft(re + 1j * im)
+        found += [spectrum.real, spectrum.imag, re, im]
+    return np.concatenate(found)
+
+
+VELOCITIES = [(each, curve) for each in range(1, 128, 3) for curve in (-0.7, 0.0, 0.4)]
+SINGLE = np.linspace(-12, 12, 501).astype(np.float32)
+
+KERNELS = {
+    "tanh in single precision": Kernel(compiled.tanh, at(SINGLE), lambda: np.tanh(SINGLE.astype(float)), 0, 2e-7),
+    "the spectrum of a pulse": Kernel(
+        pulses.spectrum,
+        at([0.0, 0.3, 0.5, 1.0, 1 + 1e-7, 7.5]),
+        lambda: [pulse_spectrum(each) for each in (0.0, 0.3, 0.5, 1.0, 1 + 1e-7, 7.5)],
+        2e-7,
+        1e-9,
+    ),
+    "the flow of a mode": Kernel(
+        rotation,
+        at([3.0, 0.0, 900.0], [900.0, 2e4, 30.0], [0.01, 1e-3, 0.002]),
+        lambda: [flow(3.0, 900.0, 0.01), flow(0.0, 2e4, 1e-3), flow(900.0, 30.0, 0.002)],
+        1e-9,
+    ),
+    "the modes of a string": Kernel(strings.rows, rows, modes_of_the_equation, 1e-13),
+    "both directions of its modes": Kernel(strings.rows, polarised_rows, polarised_modes, 1e-13),
+    "a string that is stopped": Kernel(strings.stop, fretted, lambda: [300.0, 1, 1], 1e-9, alone=False),
+    "the time of a contact": Kernel(
+        velocities.contact_s,
+        at([4.0, 4.0, 4.0, 0.0, 4.0], [1.0, 1.0, 1.0, 1.0, 0.0], [0.0, 0.5, 1.0, 0.5, 0.5]),
+        lambda: [0.004, 0.002, 0.001, 0.0, 0.0],
+    ),
+    "a velocity from its value": Kernel(
+        velocities.velocity,
+        lambda kernel: [
+            *(
+                kernel(0.2, 8.0, velocities.between(0.2, 8.0, velocities.share(each, curve)), curve)
+                for each, curve in VELOCITIES
+            ),
+            *(kernel(0.2, 8.0, value, 0.4) for value in (0.0, 0.1, 9.0)),
+            kernel(3.0, 3.0, 3.0, 0.0),
+        ],
+        lambda: [*(each for each, _ in VELOCITIES), 1, 1, 127, 1],
+    ),
+    "the force of a bridge's edge": Kernel(
+        javari.force,
+        lambda kernel: [kernel(*each) for each in EDGES],
+        lambda: [edge_force(*each) for each in EDGES],
+        1e-5,
+        1e-9,
+    ),
+    "a ratio of rates": Kernel(
+        responses.fraction,
+        at(RATIOS),
+        lambda: [Fraction(each).limit_denominator(responses.FINEST_RATIO).as_integer_ratio() for each in RATIOS],
+    ),
+    "K-weighting": Kernel(
+        loudness.k_weight,
+        lambda kernel: kernel(np.array([20.0, 100.0, 997.0, 3_000.0, 10_000.0])),
+        lambda: k_weighting(np.array([20.0, 100.0, 997.0, 3_000.0, 10_000.0])),
+        0.02,
+    ),
+    "a Fourier transform": Kernel(fourier.transform, transformed, by_numpy, 0, 1e-10),
+}
+
+
+@cache
+def both(function: Any) -> tuple[Any, Any]:
+    """A kernel compiled and in plain Python."""
+    if isinstance(function, Dispatcher):
+        return function, function.py_func
+    return njit(error_model="numpy")(function), function
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_compiled_it_is_plain_python_and_the_oracle(name: str) -> None:
+    kernel = KERNELS[name]
+    fast, plain = both(kernel.function) if kernel.alone else (kernel.function, kernel.function)
+    found = np.asarray(kernel.use(fast), float)
+    np.testing.assert_allclose(np.asarray(kernel.use(plain), float), found, rtol=1e-12, atol=kernel.atol)
+    np.testing.assert_allclose(found, np.asarray(kernel.oracle(), float), rtol=kernel.rtol, atol=kernel.atol)
+
+
+@pytest.mark.parametrize(("size", "period"), [(64, 21), (1024, 331), (2048, 7919)])
+def test_a_transform_of_any_period_is_the_sum_over_its_frequencies(size: int, period: int) -> None:
+    """From places on both sides of 0 to places on both sides of it."""
+    draw = np.random.default_rng(period)
+    below, given, lowest, wanted = size // 8, size // 4, size // 16, size // 3
+    times, places = np.arange(-below, given), np.arange(-lowest, wanted)
+    signal = draw.standard_normal(len(times)) + 1j * draw.standard_normal(len(times))
+    work = np.zeros((fourier.ROWS, size))
+    fourier.fill_circle(work[fourier.COSINES], work[fourier.SINES])
+    work[fourier.ONE, times], work[fourier.ONE + 1, times] = signal.real, signal.imag
+    fourier.turn_any(work, period, given, wanted, given - 1 + lowest, size)
+    found = work[fourier.ONE, places] + 1j * work[fourier.ONE + 1, places]
+    expected = np.exp(-2j * np.pi * (np.multiply.outer(places, times) % period) / period) @ signal
+    np.testing.assert_allclose(found, expected, atol=1e-13 * size)
+
+
+def touched(node: int, modes: int, pairs: int = 0) -> Signal:
+    """σ in 1/s that a touch adds to modes (modes,)."""
+    found, string = np.zeros(4 * modes), np.array(astuple(FLEXIBLE))
+    strings.rows(string, modes, pairs, 1.0, *[0.0] * 5, found)
+    strings.touch(string, modes, pairs, node, found)
+    return found[modes : 2 * modes]
+
+
+@pytest.mark.parametrize("node", [2, 3, 5])
+def test_a_touch_adds_the_rates_of_the_modes_that_it_couples(node: int) -> None:
+    """q'' + 2R/(ρAℓ) φ φᵀ q' + ω² q = 0, with φ the modes at the finger: all its eigenvalues, of the lowest modes."""
+    modes, mass = 80, FLEXIBLE.mass_per_length_kg_m
+    omega = np.array([FLEXIBLE.undamped_frequency(mode) for mode in range(1, modes + 1)])
+    at_finger = np.sin(np.arange(1, modes + 1) * np.pi / node)
+    resistance = strings.TOUCH_RESISTANCE * np.sqrt(FLEXIBLE.tension_n * mass)
+    coupling = 2 * resistance / (mass * FLEXIBLE.length_m) * np.outer(at_finger, at_finger)
+    zero, one = np.zeros((modes, modes)), np.eye(modes)
+    found = np.linalg.eigvals(np.block([[zero, one], [-np.diag(omega**2), -coupling]]))
+    found = found[found.imag > omega[0] / 2]
+    exact, rates = -found[np.argsort(found.imag)].real[: 2 * node], touched(node, 2 * node)
+    ringing = np.arange(1, 2 * node + 1) % node == 0
+    np.testing.assert_allclose([exact[ringing], rates[ringing]], 0.0, atol=1e-6 * omega[0])
+    np.testing.assert_allclose(rates[~ringing], exact[~ringing], rtol=0.2)  # exact to first order
+    for direction in (0, 1):  # both polarisations of a partial alike
+        np.testing.assert_allclose(touched(3, 8, 4)[direction::2], touched(3, 4))
+
+
+@pytest.mark.parametrize("string", [StringParameters(), STEEL, replace(STEEL, youngs_modulus_pa=0.0)])
+def test_a_resonator_and_a_string_are_those_of_the_kernels(string: StringParameters) -> None:
+    resonator, found = resonator_of(string, 60), np.empty(4 * 60)
+    strings.rows(string.row, 60, 0, 1.0, *[0.0] * 5, found)
+    own = np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch])
+    np.testing.assert_allclose(own, found, rtol=1e-13)
+    eta = np.arange(1, 61) * np.pi / string.length_m
+    bending = string.youngs_modulus_pa * string.second_moment_m4
+    np.testing.assert_allclose(resonator.end_force, string.tension_n * eta + bending * eta**3, rtol=1e-13)
+    pitch_hz = np.sqrt(found[0] - found[60] ** 2) / (2 * math.pi)
+    assert string.pitch_hz == pytest.approx(pitch_hz, rel=1e-13)
+
+
+@pytest.mark.parametrize(("place", "value"), [(of.LENGTH, 1e-3), (of.TENSION, 0.0), (of.D1, -1.0), (of.AREA, np.nan)])
+def test_what_parameters_refuse_is_impossible_and_what_may_be_zero_is_not(place: int, value: float) -> None:
+    changed = np.array(STEEL.row)
+    changed[[of.MOMENT, of.MODULUS, of.D1, of.D3]] = 0.0
+    assert strings.possible(changed)
+    changed[place] = value
+    assert not strings.possible(changed)
+    with pytest.raises(ValueError):
+        StringParameters(*changed.tolist())
+
+
+def test_a_string_that_does_not_swing_is_overdamped() -> None:
+    assert not strings.overdamped(STEEL.row, 60)
+    assert strings.overdamped(replace(STEEL, damping_d1_kg_m_s=100.0).row, 60)
+    assert strings.overdamped(replace(STEEL, damping_d3_kg_m_s=0.05).row, 60)
+
+
+def test_a_stiff_edge_stops_the_string() -> None:
+    assert javari.force(0.0, 1e-5, GIVE, 1e12, 0.0) * GIVE == pytest.approx(1e-5, rel=1e-4)
