@@ -94,16 +94,6 @@ def test_known_errors_are_the_papers_and_the_projects() -> None:
     assert known_errors(load("studio_nylon_b3")) == {}  # data of its own
 
 
-def test_a_run_of_ones_own_takes_another_seed(run: Run, tiny_run: Path, tmp_path: Path) -> None:
-    words, preset = train(tiny_run, "seeded"), tmp_path / "seeded.safetensors"
-    assert run(*words).status == run(*words, "--seed", 0).status == 0  # its own: the same run
-    own = load_preset(preset)
-    assert run(*words, "--seed", 5).status == 0
-    assert sorted(each.name for each in (tmp_path / "seeded").iterdir()) == ["tiny", "tiny_seed5"]
-    assert load_preset(preset).info.title == f"{own.info.title}, seed 5"
-    assert not equal(own.model.state_dict(), weights(preset))
-
-
 def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(
     run: Run, tiny_run: Path, tmp_path: Path
 ) -> None:
@@ -114,8 +104,12 @@ def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(
     errors = [load_preset(path).info.rel_mse for path in presets]
     middle, deviation = sum(errors) / 2, abs(errors[0] - errors[1]) / 2**0.5
     assert f"2 seeds     rel. MSE {middle:.4g} ± {deviation:.4g}" in done.out
+    one, other = (load_preset(path) for path in presets)
+    assert other.info.title == f"{one.info.title}, seed 1"
+    assert not equal(one.model.state_dict(), other.model.state_dict())
     assert not (SHIPPED / "tiny.safetensors").exists()
-    assert "finished earlier, nothing was trained now" in run(*words).out
+    for again in (words, [*words[:4], "--seed", 0, *words[6:]]):  # its own seed: the same run
+        assert "finished earlier, nothing was trained now" in run(*again).out
     assert "--output" in run(*train(tiny_run, "one"), "--seeds", 2).usage
 
 
@@ -378,14 +372,9 @@ def test_tables_are_printed_written_or_made_again_in_a_document(run: Run, result
     assert document.read_text(encoding="utf-8") == "# Results\n"
     for more in (("--output", folder / "other.md"), ("--format", "csv")):
         assert "--into" in run(*words, "--into", document, *more).usage
-
-
-def test_rows_of_a_recipe_are_chosen_and_csv_is_read_back(run: Run, results: Path, folder: Path) -> None:
+    lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
+    assert {entry["runs"].count("nylon_linear_noise_4k_s5_paper_seed") for entry in lines} == {0, 2}
     chosen = run("table", "--results", results, "--recipe", "ours").out
     assert "2 of 2 rows of the results file are not shown" in chosen
-    lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
-    assert [entry["runs"] for entry in lines if entry["seeds"] == "2"] == [
-        "nylon_linear_noise_4k_s5_paper_seed1 nylon_linear_noise_4k_s5_paper_seed2"
-    ]
     none = run("table", "--results", folder / "none.csv")
     assert "none.csv has no rows" in none.err and "not run (0.0113)" in none.out

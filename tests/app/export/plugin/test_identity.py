@@ -17,9 +17,7 @@ from app.patches.library import SHIPPED, list_patches
 
 PREFIX = "org.learned-strings."
 # Names that fold to one another; those of the factory differ from the last two.
-FOLDING = (
-    "My bass!|my bass-|My bass|my bass|MY BASS|My-bass|My  bass|My bass -|Bäss|ﬁddle|Fiddle"
-)
+FOLDING = "My bass!|my bass-|My bass|my bass|MY BASS|My-bass|My  bass|My bass -|Bäss|ﬁddle|Fiddle"
 MORE = "Straße|STRASSE|İstanbul|istanbul|Ⅷ|²|2|!!!|???|---|| |عود|عود!|\u202eعود|Twelve string guitar|Ukulele  low G"
 LONG = ("古琴" * 18, "古琴" * 18 + "!", "é" * 60, "é" * 59 + "è", "🎸" * 300, "🎸" * 299, "a" * 300, "A" + "a" * 299)
 NAMES = (*FOLDING.split("|"), *MORE.split("|"), *LONG, unicodedata.normalize("NFD", "Bäss"))
