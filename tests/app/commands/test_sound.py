@@ -214,6 +214,7 @@ def test_a_recipe_holds_the_string_that_a_model_of_many_played_and_an_old_one_ha
     facts = json.loads(run("info", first, "--json").out)
     assert StringParameters(**facts["string"]) == read_string(find_string("steel_g3"))
     assert (facts["modes"], facts["preset_rate_hz"], facts["rate_hz"]) == (30, 44_100, 44_100)
+    assert "string tension n" in run("info", first).out
     assert run("render", "--recipe", first, again).status == 0
     assert again.read_bytes() == first.read_bytes()
     assert run("render", MANY, again, *PLUCK).status == 0
@@ -287,6 +288,9 @@ def test_info_names_the_instrument_that_played(run: Run, play: Play, tmp_path: P
     assert (facts["instrument"], facts["preset"], facts["source"]) == ("Jazz guitar", MANY, "truth")
     assert (facts["rate_hz"], facts["bits"], facts["midi"]) == (44_100, "16", "one.mid")
     assert (facts["version"], facts["recorded"]) == (program_version(), None)
+    shown = run("info", out)
+    assert "instrument          Jazz guitar\n" in shown.out
+    assert "a rendering of Jazz guitar (the truth)" in shown.err
     again = run("render", "--recipe", out, tmp_path / "again.wav").failure
     assert f"{out}: is a rendering of Jazz guitar (the truth). It has no recipe to render again" in again
 

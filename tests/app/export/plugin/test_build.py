@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from app.export.plugin import build
+from app.export.plugin import build, texts
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
 from app.export.plugin.identity import held_in
 from app.export.plugin.image import Image, image_of
-from app.export.plugin.objects import digest, objects_of, reason_of
+from app.export.plugin.objects import ObjectError, digest, objects_of, reason_of
 from engine.kernels import cache as kernel_cache
 from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError
@@ -122,7 +122,7 @@ def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
         library.destroy_instances()
 
 
-def test_faults_of_the_disk_are_named_and_leave_nothing(
+def test_faults_of_disk_and_compiler_are_named_and_leave_nothing(
     images: list[Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for said in ("error: NoSpaceLeft", "LLVM ERROR: IO failure on output stream: No space left on device"):
@@ -130,6 +130,14 @@ def test_faults_of_the_disk_are_named_and_leave_nothing(
         with pytest.raises(WriteError, match=r"No space left on device.*free some space"):
             build_plugin(images[:1], "clap", this_target(), tmp_path / "bank", objects)
         assert not list(tmp_path.iterdir())
+    monkeypatch.undo()
+    with monkeypatch.context() as lacking, pytest.raises(PluginError, match=r"linking for \S+ failed: .*error:"):
+        lacking.setattr(build, "objects_of", lambda *_: (tmp_path / "none.o",))
+        build_plugin(images[:1], "clap", this_target(), tmp_path / "bank", objects)
+    with monkeypatch.context() as unknown, pytest.raises(ObjectError, match="compiled: KeyError: 'no part'"):
+        unknown.setattr(texts, "PARTS", ("no part",))
+        objects_of(this_target(), tmp_path)
+    assert [path for path in tmp_path.iterdir() if path.suffix != ".lock"] == []
     monkeypatch.setattr(build, "objects_of", lambda *_: pytest.fail("it was compiled"))
     (tmp_path / "file").touch()
     for folder in (tmp_path / "file", Path("/dev/null/there"), Path("/proc/there")):
@@ -140,7 +148,7 @@ def test_faults_of_the_disk_are_named_and_leave_nothing(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from app.export.plugin import build
+from app.export.plugin import build, texts
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image
 build.objects_of = lambda *_: ()
