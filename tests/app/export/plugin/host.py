@@ -6,6 +6,7 @@ import ctypes as c
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -260,7 +261,7 @@ class Instance:
         return kind.from_address(at)
 
     @property
-    def described(self) -> list[ParamInfo]:
+    def described(self) -> list[Any]:
         """Its parameters, in the plug-in's order."""
         params = self.extension("clap.params", Params)
         found = [ParamInfo() for _ in range(params.count(self.at))]
@@ -268,7 +269,7 @@ class Instance:
         return found
 
     @property
-    def parameters(self) -> dict[str, ParamInfo]:
+    def parameters(self) -> dict[str, Any]:
         """By name."""
         return {info.name.decode(): info for info in self.described}
 
