@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,28 +47,30 @@ def test_sounds_and_pictures_are_small() -> None:
     assert all(path.stat().st_size < 6e5 for path in pictures.iterdir() if path.is_file())
 
 
-def commands() -> Iterator[tuple[str, list[str]]]:
-    """The command lines of all documents: where, and their words after the program's name."""
+@cache
+def program() -> Any:
     from app.commands.cli import cli
 
-    known: Any = typer.main.get_command(cli)
+    return typer.main.get_command(cli)
+
+
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """The command lines of all documents: where, and their words after the program's name."""
     for path in DOCUMENTS:
         for line in path.read_text("utf-8").splitlines():
             if line.startswith("python3 run.py -- "):
                 yield path.name, shlex.split(line.removeprefix("python3 run.py -- "), comments=True)
             for words in re.findall(r"`([^`]+)`", line):  # within a sentence, the beginning may be left out
                 first, _, others = words.removeprefix("python3 run.py -- ").partition(" ")
-                if others and first in known.commands:
+                if others and first in program().commands:
                     yield path.name, shlex.split(f"{first} {others}")
 
 
 def test_commands_and_their_options_exist() -> None:
-    from app.commands.cli import cli
-
     found = list(commands())
     assert len(found) > 20
     for where, words in found:
-        command: Any = typer.main.get_command(cli)
+        command = program()
         while words and hasattr(command, "commands"):
             assert words[0] in command.commands, f"{where}: no command {words[0]!r}"
             command = command.commands[words.pop(0)]

@@ -11,7 +11,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import tomllib
 import venv
 from pathlib import Path
@@ -92,56 +91,38 @@ def test_other_words_are_answered_with_the_usage(run, words, capsys):
     assert "python3 run.py setup" in err and f"not understood: {' '.join(words)}" in err
 
 
-def test_an_absent_file_is_named_before_anything_starts(run, monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(run, "prepare", lambda *_, **__: pytest.fail("prepared"))
-    (tmp_path / "song.mid").touch()
-    with pytest.raises(SystemExit) as exit:
-        run.main(["song.mid", "gone.wav"])
-    assert exit.value.code == 2
-    assert capsys.readouterr() == ("", "run.py: no such file: gone.wav; check the name\n")
-
-
-def test_files_open_in_the_app(run, monkeypatch, capsys, tmp_path):
+def test_files_open_in_the_app_once_they_are_there_and_help_is_printed(run, monkeypatch, capsys, tmp_path):
     started = []
     monkeypatch.setattr(run, "start", started.append)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "take.wav").touch()
     run.main(["take.wav"])
-    assert started == [["take.wav"]]
+    run.main(["--", "render", "a b"])  # nothing to do before it: silent, and no process is started
+    assert started == [["take.wav"], ["render", "a b"]]
     assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(run, "prepare", lambda *_, **__: pytest.fail("prepared"))
+    for words, status, out, err in (
+        (["take.wav", "gone.wav"], 2, "", "run.py: no such file: gone.wav; check the name\n"),
+        (["--help"], 0, "python3 run.py -- render", ""),
+    ):
+        with pytest.raises(SystemExit) as exit:
+            run.main(words)
+        assert exit.value.code == status
+        printed = capsys.readouterr()
+        assert out in printed.out and printed.err == err
 
 
-def test_help_goes_to_standard_output(run, capsys):
-    with pytest.raises(SystemExit) as exit:
-        run.main(["--help"])
-    assert exit.value.code == 0
-    assert "python3 run.py -- render" in capsys.readouterr().out
-
-
-def test_an_old_python_can_read_the_file_and_is_reported(monkeypatch):
+@pytest.mark.parametrize(
+    ("version", "taken"), [((3, 6), False), ((3, 10), False), ((3, 11), True), ((3, 14), True), ((3, 15), False)]
+)
+def test_all_places_state_the_same_versions_of_python_and_old_ones_read_it(version, taken, monkeypatch):
     ast.parse(SOURCE.read_text("utf-8"), feature_version=(3, 6))
-    monkeypatch.setattr(sys, "version_info", (3, 6, 15))
-    with pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
-        load(SOURCE)
-
-
-@pytest.mark.parametrize(("version", "taken"), [((3, 10), False), ((3, 11), True), ((3, 14), True), ((3, 15), False)])
-def test_all_places_state_the_same_versions_of_python(version, taken, monkeypatch):
     asked = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text("utf-8"))["project"]["requires-python"]
     assert SpecifierSet(asked).contains(".".join(map(str, version))) == taken
     assert "Python 3.11 to 3.14" in (SOURCE.parent / "README.md").read_text("utf-8")
     monkeypatch.setattr(sys, "version_info", (*version, 0))
     with contextlib.nullcontext() if taken else pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
         load(SOURCE)
-
-
-def test_a_start_with_nothing_to_do_is_silent_and_starts_no_process(run, monkeypatch, capsys):
-    started = []
-    monkeypatch.setattr(run, "start", started.append)
-    run.main(["--", "render", "a b"])
-    assert started == [["render", "a b"]]
-    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
@@ -184,25 +165,23 @@ def test_a_spoiled_environment_is_seen(run, spoil):
 @pytest.mark.parametrize("action", ["start", "setup", "test"])
 def test_changed_kernels_are_compiled_once_and_that_is_said(run, action, monkeypatch, capsys):
     steps = []
-    monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: steps.append(command[1:]))
+
+    def step(command, trouble, **_):
+        steps.append(command[1:])
+        if len(steps) == 1:
+            raise run.SetupError(trouble)
+
+    monkeypatch.setattr(run, "run_step", step)
     run.prepare(action, True)
     assert steps == []
     (run.ROOT / "engine" / "kernels" / "bank.py").write_text("2")
-    for _ in range(2):
-        run.prepare(action, True)
-    assert steps == [["-m", "engine.warm"]]
-    assert capsys.readouterr().err.count("compiling the sound engine") == 1
-
-
-def test_kernels_that_were_not_compiled_are_compiled_at_the_next_start(run, monkeypatch):
-    def failing(command, trouble, **_):
-        raise run.SetupError(trouble)
-
-    run.COMPILED.unlink()
-    monkeypatch.setattr(run, "run_step", failing)
     with pytest.raises(run.SetupError, match=r"delete \.venv"):
-        run.prepare("start", True)
+        run.prepare(action, True)
     assert not run.compiled()
+    for _ in range(2):  # the next start compiles them
+        run.prepare(action, True)
+    assert steps == [["-m", "engine.warm"]] * 2
+    assert capsys.readouterr().err.count("compiling the sound engine") == 2
 
 
 def test_a_moved_folder_is_seen(run, tmp_path):
@@ -277,39 +256,33 @@ def cardless(run, monkeypatch, tmp_path):
     monkeypatch.setenv("no_proxy", "*")
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         monkeypatch.setattr(run, "CPU_BUILDS", f"http://127.0.0.1:{server.server_port}/cpu")
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
         yield run
         server.shutdown()
 
 
-def test_without_a_card_torch_comes_without_cuda_and_that_is_said(cardless, capsys):
-    assert cardless.torch_source() == ["--extra-index-url", cardless.CPU_BUILDS]
-    assert "no NVIDIA card: taking PyTorch's build without CUDA" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("sign", ["driver", "program"])
-def test_with_a_card_torch_is_the_usual_one(cardless, sign, monkeypatch, capsys):
-    if sign == "driver":
-        cardless.NVIDIA.mkdir()
-    else:
-        monkeypatch.setattr(cardless.shutil, "which", {"nvidia-smi": "/usr/bin/nvidia-smi"}.get)
-    assert cardless.torch_source() == []
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize("fault", ["nobody", "no such page", "silent"])
-def test_builds_out_of_reach_cost_little_time_and_that_is_said(cardless, fault, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "case", ["no card", "a driver", "a program", "nobody answers", "no such page", "a silent server"]
+)
+def test_torch_comes_without_cuda_only_where_no_card_is_and_the_builds_are_in_reach(
+    cardless, case, monkeypatch, capsys
+):
     monkeypatch.setattr(cardless, "ANSWER_S", 0.3)
+    builds, reported = cardless.CPU_BUILDS, "no NVIDIA card: taking PyTorch's build without CUDA"
     with socket.create_server(("127.0.0.1", 0)) as silent:
-        port = silent.getsockname()[1]
-        if fault == "nobody":
-            silent.close()
-        place = f"{cardless.CPU_BUILDS}/absent" if fault == "no such page" else f"http://127.0.0.1:{port}/cpu"
-        monkeypatch.setattr(cardless, "CPU_BUILDS", place)
-        began_s = time.monotonic()
-        assert cardless.torch_source() == []
-        assert time.monotonic() - began_s < 2
-    assert "out of reach" in capsys.readouterr().err
+        if case == "a driver":
+            cardless.NVIDIA.mkdir()
+        elif case == "a program":
+            monkeypatch.setattr(cardless.shutil, "which", {"nvidia-smi": "/usr/bin/nvidia-smi"}.get)
+        elif case == "no such page":
+            monkeypatch.setattr(cardless, "CPU_BUILDS", f"{builds}/absent")
+        elif case != "no card":
+            port = silent.getsockname()[1] if case == "a silent server" else 9
+            monkeypatch.setattr(cardless, "CPU_BUILDS", f"http://127.0.0.1:{port}/cpu")
+        assert cardless.torch_source() == (["--extra-index-url", builds] if case == "no card" else [])
+    err = capsys.readouterr().err
+    wanted = {"no card": reported, "a driver": "", "a program": ""}.get(case, "out of reach")
+    assert wanted in err and (wanted or err == "")
 
 
 def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
@@ -477,25 +450,23 @@ def checks(run, monkeypatch):
         return subprocess.CompletedProcess(command, int(command[2] in failing if len(command) > 2 else 0), b"")
 
     monkeypatch.setattr(run.subprocess, "run", lint)
-    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command, env)) or 5)
+    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command, env)))
     return collections.namedtuple("Checks", "run failing pytests")(run, failing, pytests)
 
 
-def test_the_whole_check_runs_the_tests_in_parallel(checks, monkeypatch, capsys):
+@pytest.mark.parametrize("lint", [None, "mypy"])
+def test_the_check_runs_the_tests_in_parallel_and_names_a_failed_lint(checks, lint, monkeypatch, capsys):
     monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    assert checks.run.main(["test"]) == 5
+    checks.failing.update([lint] if lint else [])
+    assert checks.run.main(["test", *(["tests/test_run.py"] if lint else [])]) == (1 if lint else None)
     ((command, env),) = checks.pytests
-    assert command[3] == "-n" and command[-2:] == ["--dist", "loadfile"]
-    assert (env["QT_QPA_PLATFORM"], env["OMP_NUM_THREADS"]) == ("offscreen", "1")
     out, err = capsys.readouterr()
-    assert out.count("passed") == len(checks.run.LINTS) and err == ""
-
-
-def test_a_failed_lint_fails_the_check_and_is_named_after_the_tests(checks, monkeypatch, capsys):
-    monkeypatch.setattr(checks.run.subprocess, "call", lambda command, cwd, env: checks.pytests.append(command) or 0)
-    checks.failing.add("mypy")
-    assert checks.run.main(["test", "tests/test_run.py"]) == 1
-    assert checks.pytests[0][3:] == ["tests/test_run.py"]
-    out, err = capsys.readouterr()
-    assert "mypy: FAILED" in out and err == "run.py: failed before the tests: mypy\n"
+    assert env["QT_QPA_PLATFORM"] == "offscreen"
+    assert out.count("passed") == len(checks.run.LINTS) - bool(lint)
+    if lint:
+        assert command[3:] == ["tests/test_run.py"]
+        assert "mypy: FAILED" in out and err == "run.py: failed before the tests: mypy\n"
+    else:
+        assert command[3] == "-n" and command[-2:] == ["--dist", "loadfile"] and err == ""
+        assert env["OMP_NUM_THREADS"] == "1"

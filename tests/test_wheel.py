@@ -8,6 +8,18 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+LISTING = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from app.commands import cli
+assert cli.__file__.startswith(sys.path[0])
+for name in ("presets", "instruments"):
+    assert cli.main([name, "--json"]) == 0
+    print("\x1e")
+from app.views.theme import SIGNS
+from training.cell import load
+print(json.dumps([load("studio_nylon_b3").model, load("nylon_linear_noise_4k_lru").model, SIGNS.is_dir()]))
+"""
 
 
 def run(*command: object, folder: Path, **variables: str) -> str:
@@ -29,23 +41,10 @@ def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
     run(*pip, "wheel", "--no-build-isolation", "--no-deps", "-w", tmp_path, source, folder=elsewhere)
     run(*pip, "install", "--no-deps", "--target", installed, *tmp_path.glob("*.whl"), folder=elsewhere)
     # the installed package alone: without the development install's paths
-    start = f"import sys; sys.path.insert(0, {str(installed)!r}); "
-    command = (sys.executable, "-W", "ignore", "-c")
-    listed = json.loads(
-        run(
-            *command,
-            start + "from app.commands import cli; assert cli.__file__.startswith(sys.path[0]); "
-            "sys.exit(cli.main(['presets', '--json']))",
-            folder=elsewhere,
-        )
-    )
+    command = (sys.executable, "-W", "ignore", "-c", LISTING, installed)
+    presets, patches, others = map(json.loads, run(*command, folder=elsewhere).split("\x1e"))
     shipped = sorted(path.stem for path in (ROOT / "presets").glob("*.safetensors"))
-    assert sorted(each["name"] for each in listed) == shipped
-    patches = json.loads(
-        run(*command, start + "from app.commands import cli; cli.main(['instruments', '--json'])", folder=elsewhere)
-    )
+    assert sorted(each["name"] for each in presets) == shipped
     assert {each["name"] for each in patches} == {path.stem for path in (ROOT / "presets/patches").glob("*.json")}
-    looked_up = start + "from training.cell import load; from app.views.theme import SIGNS; "
-    looked_up += "print(load('studio_nylon_b3').model, load('nylon_linear_noise_4k_lru').model, SIGNS.is_dir())"
-    assert run(*command, looked_up, folder=elsewhere).split() == ["koopman_integrated", "lru", "True"]
+    assert others == ["koopman_integrated", "lru", True]
     assert list(elsewhere.iterdir()) == []

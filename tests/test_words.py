@@ -7,7 +7,8 @@ import io
 import re
 import subprocess
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -47,14 +48,20 @@ THIRD = re.compile(
     r"|Raises|Reads|Renders|Returns|Says|Sends|Sets|Shows|Starts|Stops|Takes|Tells|Trains|Turns|Waits|Writes)\b"
 )
 LONGEST = 30  # words of a sentence
+LONGEST_OF_DOCSTRINGS = 25
 LONGEST_SUBJECT = 72
 SINCE = "5d41648"  # the last commit before subjects were checked
 SUBJECT = re.compile(r"[a-z][\w./, -]*: \S.*[^.]$")
 
 
+@cache
+def tokens(path: Path) -> tuple[tokenize.TokenInfo, ...]:
+    return tuple(tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline))
+
+
 def written(path: Path) -> Iterator[tuple[int, str]]:
     """The strings and comments of a Python file, with the line each starts in."""
-    for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline):
+    for token in tokens(path):
         if token.type in (tokenize.COMMENT, tokenize.STRING) or tokenize.tok_name[token.type] == "FSTRING_MIDDLE":
             text = re.sub(r"``?[^`\n]*``?", "`code`", token.string)  # names in docstrings
             if re.match(r"[rb]*f", text, re.IGNORECASE):
@@ -89,47 +96,70 @@ def test_no_name_has_a_word_of_the_list() -> None:
     found = {
         f"{path.relative_to(ROOT)}:{token.start[0]}: {token.string}"
         for path in set(CODE) - {Path(__file__)}
-        for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
+        for token in tokens(path)
         if token.type == tokenize.NAME and NAMES & set(token.string.casefold().split("_"))
     }
     assert not found, "\n" + "\n".join(sorted(found))
 
 
-def sentences(path: Path) -> Iterator[tuple[int, str]]:
-    """Sentences of a Markdown file's paragraphs and list items, with their line; no tables, no headings."""
-    number, words = 1, ""
-    for line_number, line in [*prose(path), (0, "")]:
-        if (
-            not line.strip()
-            or line.lstrip().startswith(("#", "|", "-", "*", "!", "```", "<!--"))
-            or re.match(r"\s*\d+\. ", line)
-        ):
-            yield from ((number, each) for each in re.split(r"(?<=[.!?:;])[*_)]*\s+", words) if each)
+def paragraphs(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Paragraphs and list items of numbered lines; no headings, no tables, no code."""
+    number, words, table = 1, "", False
+    for line_number, line in [*lines, (0, "")]:
+        plain = line.strip()
+        table = bool(plain) and (table or plain.startswith("|") or re.search(r"\S {3,}\S", plain) is not None)
+        other = plain.startswith(("#", "!", "```", "<!--", ">>>")) or table
+        if not plain or other or plain.startswith(("-", "*")) or re.match(r"\d+\. ", plain):
+            yield number, words
             number, words = line_number, ""
-            if line.lstrip().startswith(("#", "|", "!", "```", "<!--")):
-                continue
-        words += " " + line.strip()
+        if not other:
+            words += f" {plain}"
+
+
+def long_sentences(lines: Iterable[tuple[int, str]], longest: int) -> list[tuple[int, str]]:
+    split = re.compile(r"(?<=[.!?:;])[*_)]*\s+")
+    found = [(number, each) for number, words in paragraphs(lines) for each in split.split(words.strip())]
+    return [(number, each) for number, each in found if len(re.findall(r"\w[\w'’-]*", each)) > longest]
 
 
 @pytest.mark.parametrize("path", PROSE, ids=lambda path: path.name)
 def test_sentences_are_short(path: Path) -> None:
-    long = [(number, each) for number, each in sentences(path) if len(re.findall(r"\w[\w'’-]*", each)) > LONGEST]
+    long = long_sentences(prose(path), LONGEST)
     assert not long, "\n" + "\n".join(f"{path.name}:{number}: {each}" for number, each in long)
 
 
-@pytest.mark.parametrize("name", ["app", "engine", "training", "run.py"])
-def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
-    found = []
+PRODUCT = ["app", "engine", "training", "run.py"]
+
+
+def docstrings(name: str) -> Iterator[tuple[str, ast.AST, bool, ast.Constant]]:
+    """Docstrings of a folder's files: the file, the holder, whether it is the holder's own or a field's, the text."""
     for path in [path for path in CODE if path.is_relative_to(ROOT / name)]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            wrong = [CLAUSES]
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                wrong.append(THIRD)
-            elif not isinstance(node, ast.Module | ast.ClassDef):
-                continue
-            for first in filter(None, (each.match(ast.get_docstring(node) or "") for each in wrong)):
-                found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                for place, each in enumerate(node.body):
+                    text = each.value if isinstance(each, ast.Expr) else None
+                    if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                        yield str(path.relative_to(ROOT)), node, place == 0, text
+
+
+@pytest.mark.parametrize("name", PRODUCT)
+def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
+    found = []
+    for file, node, own, text in docstrings(name):
+        function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        firsts = [each.match(text.value) for each in ([CLAUSES, THIRD] if function else [CLAUSES])]
+        found += [f"{file}: {getattr(node, 'name', 'the module')}: {first[0]} …" for first in firsts if first and own]
     assert found == []
+
+
+@pytest.mark.parametrize("name", PRODUCT)
+def test_sentences_of_docstrings_are_short(name: str) -> None:
+    found = []
+    for file, _, _, text in docstrings(name):
+        plain = re.sub(r"``?[^`]*``?", lambda code: "`code`" + "\n" * code[0].count("\n"), text.value)
+        long = long_sentences(enumerate(plain.splitlines(), text.lineno), LONGEST_OF_DOCSTRINGS)
+        found += [f"{file}:{number}: {each}" for number, each in long]
+    assert not found, "\n" + "\n".join(found)
 
 
 def test_commit_subjects_name_their_area_and_are_short() -> None:

@@ -2,7 +2,7 @@
 
     python -m tests.fuzz.guided [TARGET ...] [--seconds 60]
 
-Needs `atheris` (Linux; not among the program's own requirements). Each target of `test_attack` is a process of its
+Needs `atheris` (Linux; not among the program's own requirements). Each target of `readers` is a process of its
 own. What is refused must be refused by that reader's own error, in one line; the first file for which this does not
 hold is kept in the present folder, and its traceback is printed. Status 1 where there is any.
 """
@@ -16,7 +16,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-PRESET = "preset.safetensors"
 LONGEST_BYTES = 20_000  # of a file; a whole one of its kind is smaller, or it is cut
 SLOWEST_S = 20  # of a file
 
@@ -32,10 +31,10 @@ def main() -> int:
         return 2
     if chosen.alone:
         _fuzz(chosen.target[0], chosen.seconds)
-    from tests.fuzz.test_attack import TARGETS
+    from tests.fuzz.readers import TARGETS
 
     failed = []
-    for name in chosen.target or [PRESET, *(target.name for target in TARGETS)]:
+    for name in chosen.target or [target.name for target in TARGETS]:
         print(f"{name}, {chosen.seconds} s", flush=True)
         command = [sys.executable, "-m", "tests.fuzz.guided", name, "--seconds", str(chosen.seconds), "--alone"]
         if subprocess.call(command):
@@ -56,15 +55,9 @@ def _fuzz(name: str, seconds: int) -> None:
     import atheris
 
     with atheris.instrument_imports(include=["app", "engine", "training"], exclude=_compiled()):
-        from engine.presets import SHIPPED, PresetError
-        from tests.fuzz.costs import Costs
-        from tests.fuzz.test_attack import TARGETS, Target, in_one_line, use
+        from tests.fuzz.readers import TARGETS, in_one_line
 
-    preset = SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors"
     targets = {each.name: each for each in TARGETS}
-    targets[PRESET] = Target(
-        PRESET, lambda folder: preset.read_bytes(), lambda path: use(path, Costs()), (PresetError,)
-    )
     target = targets[name]
     with tempfile.TemporaryDirectory(prefix="guided") as folder:
         corpus, place = Path(folder) / "corpus", Path(folder) / "there"

@@ -21,7 +21,7 @@ KILLS = {  # 200 in all with `run.py test --fuzz`
     "render": (2, 60),
     "dataset": (2, 50),
     "train": (1, 20),
-    "train_lru": (1, 15),
+    "train_lru": (0, 15),
     "sweep": (0, 10),  # its workers load torch again each time
     "save_patches": (2, 20),
     "save_many_settings": (2, 25),

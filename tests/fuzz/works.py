@@ -61,21 +61,8 @@ UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
 
 def render(folder: Path) -> None:
-    _done(
-        main(
-            [
-                "render",
-                str(PRESET),
-                str(folder / "out.wav"),
-                "--position",
-                "0.4",
-                "--amplitude-mm",
-                "2",
-                "--seconds",
-                "4",
-            ]
-        )
-    )
+    pluck = ["--position", "0.4", "--amplitude-mm", "2", "--seconds", "4"]
+    _done(main(["render", str(PRESET), str(folder / "out.wav"), *pluck]))
 
 
 def dataset(folder: Path) -> None:

@@ -1,15 +1,84 @@
+"""Command lines in this process, and the files that they read: each is made when a line names it."""
+
 from __future__ import annotations
 
+import math
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import soundfile
+import torch
 
 from app.commands.cli import main
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes
 from engine.excitation import displacement
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.presets import find_string, load_preset, save_preset
+from engine.resonators.string import resonator_of
+from engine.schema import write
+from training.cli import console
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+
+DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_modulated=False, steps=600, count=20)
+HORIZON = 500  # frames of `tiny`
+EVENTS = [TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.1, NoteOff(57))]
+CONFIGURATION = """
+title = "Tiny"
+model = "koopman_var"
+model_configuration = { state_size = 8, multiplier_widths = [4] }
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 5
+steps = 50
+count = 20
+[recipe]
+epochs = 3
+batch_size = 8
+steps_per_batch = 8
+first_horizon = 10
+validate_every = 1
+"""
+PLAN = """
+description = "Two runs."
+[data]
+count = 10
+steps = 60
+[[block]]
+models = ["koopman_var", "koopman"]
+strings = ["linear"]
+initials = ["noise"]
+rates_hz = [4000]
+horizons = [60]
+"""
+ARRAYS = {
+    "flat": np.zeros(101),
+    "deep": np.zeros((1, 2, 101)),
+    "empty": np.zeros((0, 101)),
+    "coarse": np.zeros((2, 50)),
+    "complex": np.zeros((1, 101), complex),
+    "words": np.full((1, 101), "a"),
+    "objects": np.full((1, 101), None),
+    "nan": np.full((1, 101), np.nan),
+    "infinite": np.full((1, 101), np.inf),
+}
+BYTES = {
+    "nothing": b"",
+    "text": b"1 2 3",
+    "riff": b"RIFF nothing",
+    "table": b"a,b\n1,2\n",
+    "epoch": CONFIGURATION.replace("epochs", "epoch").encode(),
+    "koopmann": PLAN.replace('"koopman"', '"koopmann"').encode(),
+}
 
 
 @dataclass(frozen=True)
@@ -21,26 +90,32 @@ class Outcome:
     err: str
 
     @property
+    def message(self) -> str:
+        """All of standard error in one line, without a frame and quotation marks."""
+        return " ".join(self.err.replace("│", " ").replace("'", "").split())
+
+    @property
     def failure(self) -> str:
         """The one line of a failure."""
         lines = self.err.splitlines()
-        assert self.status == 1
-        assert len(lines) == 1, self.err
-        assert self.out == ""
+        assert (self.status, self.out, len(lines)) == (1, "", 1), self.err
         return lines[0]
 
     @property
     def usage(self) -> str:
-        """The message of bad usage."""
-        assert self.status == 2
-        assert self.out == ""
-        return self.err
+        """The message of bad usage, in one line."""
+        assert (self.status, self.out) == (2, "")
+        return self.message
+
+
+Run = Callable[..., Outcome]
+FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
-    """Runs a command line in this process, without the lines of progress that a slow machine prints."""
-    monkeypatch.setattr("training.cli.console._Lines", lambda what, every_s: lambda *_, **__: None)
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run a command line in this process; lines of progress come only after an hour."""
+    monkeypatch.setattr(console, "bars", partial(console.bars, 3600.0))
 
     def run(*words: object) -> Outcome:
         capsys.readouterr()
@@ -48,9 +123,6 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
         return Outcome(status, *capsys.readouterr())
 
     return run
-
-
-FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 @pytest.fixture
@@ -71,17 +143,95 @@ def full_disk() -> FullDisk:
 
 
 @pytest.fixture
-def u0(tmp_path: Path) -> Path:
-    """Three plucks (3, 101) in m."""
-    plucks = [displacement("gaussian", 0.3 + 0.1 * i, 0.05, (2 + i) * 1e-3, 101) for i in range(3)]
-    path = tmp_path / "u0.npy"
-    np.save(path, np.stack(plucks))
-    return path
-
-
-@pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """An empty folder for results."""
     path = tmp_path / "results"
     path.mkdir()
     return path
+
+
+@pytest.fixture
+def u0(tmp_path: Path) -> Path:
+    """Three plucks (3, 101) in m."""
+    path = tmp_path / "u0.npy"
+    np.save(path, np.stack([displacement("gaussian", 0.3 + 0.1 * i, 0.05, (2 + i) * 1e-3, 101) for i in range(3)]))
+    return path
+
+
+@pytest.fixture
+def tiny(small_preset: Path, tmp_path: Path) -> Path:
+    """The linear string in closed form, its decay rates too high by a tenth."""
+    model = build_model("koopman_integrated")
+    physics = Physics(resonator_of(DATA.string, DATA.modes, tension_modulated=False), DATA.rate_hz, 1e-3)
+    model.initialise("physics", physics, torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        model.get_parameter("nu_log").add_(math.log(1.1))
+    run = TrainingConfiguration("Tiny", "koopman_integrated", DATA, Recipe(epochs=1), horizon=HORIZON)
+    info = replace(
+        load_preset(small_preset).info,
+        model="koopman_integrated",
+        model_configuration={},
+        tension_modulated=False,
+        horizon_steps=HORIZON,
+        training=write(run),
+        test_rel_mse=0.75,
+    )
+    path = tmp_path / "tiny.safetensors"
+    save_preset(path, info, model)
+    return path
+
+
+@pytest.fixture
+def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of shipped presets with one file, `good`."""
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    shutil.copy(small_preset, shipped / "good.safetensors")
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", shipped)
+    return shipped
+
+
+class Made:
+    """Files of a folder: `{made:flat.npy}` in a line is that array's path, and others are made alike."""
+
+    def __init__(self, folder: Path, preset: Path) -> None:
+        self.folder = folder
+        self.preset = preset
+
+    def __format__(self, name: str) -> str:
+        path = self.folder / name
+        stem, _, kind = name.partition(".")
+        if stem == "place":
+            path.mkdir(exist_ok=True)
+        elif stem in BYTES:
+            path.write_bytes(BYTES[stem])
+        elif kind == "npy":
+            np.save(path, ARRAYS[stem], allow_pickle=True)
+        elif kind == "npz":
+            np.savez(path, a=np.zeros((1, 101)))
+        elif kind == "mid":
+            path.write_bytes(midi_bytes(EVENTS))
+        elif kind == "wav":
+            seconds = np.arange(48_000) / 48_000
+            soundfile.write(path, 0.5 * np.sin(2400 * seconds) * np.exp(-5.3 * seconds), 48_000)
+        elif stem == "tiny":
+            path.write_text(CONFIGURATION, encoding="utf-8")
+        elif stem == "plan":
+            path.write_text(PLAN, encoding="utf-8")
+        elif kind == "toml":  # a string of another value: FIELD=VALUE.toml, or without it
+            self._write_string(path, *stem.split("="))
+        elif kind == "safetensors":
+            path.write_bytes(self.preset.read_bytes()[:-50])
+        return str(path)
+
+    def _write_string(self, path: Path, field: str, value: str) -> None:
+        lines = find_string("steel_e4").read_text(encoding="utf-8").splitlines()
+        others = [line for line in lines if not line.startswith(field)]
+        path.write_text("\n".join([*others, f"{field} = {value}" if value else ""]), encoding="utf-8")
+
+
+@pytest.fixture
+def places(small_preset: Path, u0: Path, tiny: Path, folder: Path, tmp_path: Path) -> dict[str, Any]:
+    """What a line's braces stand for."""
+    made = Made(tmp_path, small_preset)
+    return {"preset": small_preset, "u0": u0, "tiny": tiny, "out": folder / "out", "folder": folder, "made": made}

@@ -1,174 +1,121 @@
+"""The program's own behaviour: help, files that open in the app, failures, progress, the current folder."""
+
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
 import types
 from pathlib import Path
+from typing import Any
 
 import pytest
-import typer
 
 from app.commands import cli, render
 from app.export.sound import SOURCES
 from app.shared.vocabulary import BITS
+from engine.python_process import python_command, python_environment
 from engine.values.ear import PICKUPS
-from training.cli import arguments
+from tests.app.commands.conftest import Run
+from training.cli import console
 
 ROOT = Path(__file__).parents[3]
-COMMANDS = [
-    "presets",
-    "models",
-    "simulate",
-    "predict",
-    "render",
-    "info",
-    "sampled",
-    "compare",
-    "train",
-    "evaluate",
-]
 
 
-def python(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("OMP_", "GOMP_"))}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, cwd=ROOT, env={**environment, **variables}, capture_output=True, text=True)
 
 
-def test_help_is_there_without_the_heavy_imports() -> None:
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[list[Path]]:
+    """Files with which the app was opened; it ends with status 3."""
+    found: list[list[Path]] = []
+    main = types.SimpleNamespace(run=lambda files=(): found.append(list(files)) or 3)
+    monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
+    return found
+
+
+def test_help_needs_none_of_the_heavy_imports() -> None:
     done = python(
         "import sys; from app.commands.cli import main; status = main(['--help'])\n"
         "assert not {'torch', 'numpy', 'scipy', 'numba', 'soundfile', 'PySide6'} & set(sys.modules)\n"
         "sys.exit(status)"
     )
     assert (done.returncode, done.stderr) == (0, "")
-    for name in COMMANDS:
+    for name in ("presets", "models", "simulate", "predict", "render", "info", "sampled", "compare", "train"):
         assert f"\n  {name} " in done.stdout
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP prints its settings")
-@pytest.mark.parametrize(("chosen", "turns"), [({}, "0"), ({"GOMP_SPINCOUNT": "123"}, "123")])
-def test_threads_of_a_command_sleep_while_they_wait(chosen: dict[str, str], turns: str) -> None:
-    """They spin for so many turns, by torch's own OpenMP, unless the user wants otherwise."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("OMP_", "GOMP_"))}
-    done = subprocess.run(
-        [sys.executable, "-m", "app.commands.cli", "models"],
-        cwd=ROOT,
-        env={**environment, "OMP_DISPLAY_ENV": "VERBOSE", **chosen},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert f"GOMP_SPINCOUNT = '{turns}'" in done.stderr
-
-
-def test_commands_need_neither_window_nor_sound_packages() -> None:
-    # pydantic is not among them: newer versions of typer themselves need it
+def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wait() -> None:
+    """OpenMP spins for no turns; pydantic is needed: newer versions of typer themselves need it."""
     done = python(
         "import sys\n"
         "for name in ('PySide6', 'pyqtgraph', 'sounddevice', 'soundfile', 'psygnal'):\n"
         "    sys.modules[name] = None\n"
-        "import app.commands.arrays, training.run\n"
         "from app.commands.cli import main\n"
         "assert main(['models', '--json']) == 0\n"
+        "import app.commands.arrays, training.run\n"
         "pluck = ['--position', '.5', '--amplitude-mm', '1', '--seconds', '1']\n"
-        "sys.exit(main(['render', 'x', 'y.wav', *pluck]))"
+        "sys.exit(main(['render', 'x', 'y.wav', *pluck]))",
+        OMP_DISPLAY_ENV="VERBOSE",
     )
     assert done.returncode == 1
     assert '"parameters": 134885' in done.stdout
-    assert done.stderr.startswith("learned-strings: this needs soundfile, which cannot be imported")
-    assert done.stderr.count("\n") == 1
+    reported = [line for line in done.stderr.splitlines() if line.startswith("learned-strings")]
+    assert len(reported) == 1
+    assert reported[0].startswith("learned-strings: this needs soundfile, which cannot be imported")
+    assert sys.platform != "linux" or "GOMP_SPINCOUNT = '0'" in done.stderr
 
 
-@pytest.mark.parametrize("words", [[], *([name] for name in COMMANDS)])
-def test_everything_has_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main([*words, "--help"]) == 0
-    assert "Usage: learned-strings" in capsys.readouterr().out
-
-
-def test_without_a_command_the_app_opens_and_gives_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=lambda: 3))  # type: ignore[arg-type]
-    assert cli.main([]) == 3
+@pytest.mark.parametrize("group", [[], ["family"], ["drums"], ["render"]])
+def test_help_cuts_no_summary(run: Run, group: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    done = run(*group, "--help")
+    assert done.status == 0 and "Usage: learned-strings" in done.out
+    listed = done.out.partition("Commands:")[2].strip().splitlines() if group in (["family"], ["drums"]) else []
+    assert all(line.endswith(".") and not line.endswith("...") for line in listed)
 
 
 def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run: Run, opened: list[list[Path]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    opened: list[Path] = []
-
-    def run(files: list[Path]) -> int:
-        opened.extend(files)
-        return 3
-
-    monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=run))  # type: ignore[arg-type]
     monkeypatch.chdir(tmp_path)
     for name in ("song.mid", "models"):
         Path(name).touch()
-    assert cli.main(["song.mid", "./models"]) == 3
-    assert opened == [tmp_path / "song.mid", tmp_path / "models"]
-    assert cli.main(["models", "--json"]) == 0
-    assert len(opened) == 2 and "koopman" in capsys.readouterr().out
+    assert [run(*words).status for words in ([], ["song.mid", "./models"], ["models"])] == [3, 3, 0]
+    assert opened == [[], [tmp_path / "song.mid", tmp_path / "models"]]
+    absent = run("song.mid", "gone.wav")
+    assert (absent.status, absent.err) == (2, "learned-strings: gone.wav: no such file; check the name\n")
+    assert len(opened) == 2
+    assert run("--version").out.strip()
 
 
-def test_an_absent_file_is_named_and_nothing_opens(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_failure_is_one_line_its_traceback_on_demand_and_an_interruption_status_130(
+    run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "app.window.main", None)  # type: ignore[arg-type]
-    (tmp_path / "song.mid").touch()
-    assert cli.main([str(tmp_path / "song.mid"), "gone.wav"]) == 2
-    assert capsys.readouterr().err == "learned-strings: gone.wav: no such file; check the name\n"
+    errors: list[BaseException] = [ValueError("first\nsecond"), ValueError("again"), KeyboardInterrupt()]
 
+    def fail() -> int:
+        raise errors.pop(0)
 
-def test_the_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out.strip()
-
-
-@pytest.mark.parametrize("words", [["unknown"], ["render"], ["models", "--nonsense"]])
-def test_bad_usage_is_status_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(words) == 2
-    found = capsys.readouterr()
-    assert found.out == ""
-    assert "Error: " in found.err
-
-
-def _failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    def run() -> int:
-        raise error
-
-    monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=run))  # type: ignore[arg-type]
-
-
-def test_a_failure_is_one_line_without_a_traceback(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _failing(monkeypatch, ValueError("first\nsecond"))
-    assert cli.main([]) == 1
-    assert capsys.readouterr().err == "learned-strings: first second\n"
-
-
-def test_a_failure_shows_its_traceback_on_demand(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _failing(monkeypatch, ValueError("reported"))
+    monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=fail))  # type: ignore[arg-type]
+    assert run().failure == "learned-strings: first second"
     monkeypatch.setenv(cli.DEBUG_VARIABLE, "1")
-    assert cli.main([]) == 1
-    assert "Traceback" in capsys.readouterr().err
-
-
-def test_an_interruption_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
-    _failing(monkeypatch, KeyboardInterrupt())
-    assert cli.main([]) == 130
+    shown = run()
+    assert shown.status == 1 and "Traceback" in shown.err
+    assert run().status == 130
 
 
 @pytest.mark.parametrize(
     ("error", "expected"),
     [
-        (ModuleNotFoundError("No module named 'mido'", name="mido"), "this needs mido"),
+        (ModuleNotFoundError("No module named 'mido'", name="mido"), "this needs mido, which cannot be imported"),
         (PermissionError(13, "Permission denied", "/x/y"), "/x/y: Permission denied; check the path"),
-        (
-            OSError(28, "No space left on device", "/x/y"),
-            "/x/y: cannot be written (No space left on device); free some",
-        ),
+        (OSError(28, "No space left on device", "/x"), "/x: cannot be written (No space left on device); free some"),
         (OSError("/x/y: cannot be written; free some space"), "/x/y: cannot be written; free some space"),
         (MemoryError(), "not enough memory"),
         (KeyError("z"), "internal error: KeyError 'z'; set LEARNED_STRINGS_DEBUG=1"),
@@ -180,14 +127,131 @@ def test_a_failure_names_what_and_the_remedy(error: Exception, expected: str) ->
     assert cli.describe(error).startswith(expected)
 
 
-def test_what_is_known_without_soundfile_is_what_they_say() -> None:
-    assert render.Bits.__args__ == BITS
-    assert render.Source.__args__ == SOURCES
-    assert render.Pickup.__args__ == PICKUPS
+def test_choices_that_are_known_without_soundfile_are_its_own() -> None:
+    assert (render.Bits.__args__, render.Source.__args__, render.Pickup.__args__) == (BITS, SOURCES, PICKUPS)
 
 
-@pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), float("inf")])
-def test_a_range_error_names_option_value_and_range(value: float) -> None:
-    with pytest.raises(typer.BadParameter, match=rf"must lie in 0 … 1 mm, not {value:g}") as reported:
-        arguments.check_range("--option", value, 0, 1, "mm")
-    assert reported.value.param_hint == "--option"
+def test_progress_off_a_terminal_is_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    with console.progress("work") as report:
+        for second in range(31):
+            now[0] = float(second)
+            report(second / 60, f"step {second}")
+    assert capsys.readouterr().err.splitlines() == [
+        "learned-strings: work: 17%, 50 s left step 10",
+        "learned-strings: work: 33%, 40 s left step 20",
+        "learned-strings: work: 50%, 30 s left step 30",
+    ]
+
+
+def test_progress_on_a_terminal_is_a_bar_and_names_are_shown_as_they_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with console.progress("[/b].mid by [red]") as report:
+        report(0.5, "[/i]", left_s=90)
+    found = capsys.readouterr()
+    assert found.out == "" and "[/b].mid by [red]" in found.err
+
+
+DURATIONS = {
+    0.025: "25 ms",
+    0.25: "0.25 s",
+    1 / 3: "0.333 s",
+    1.0: "1 s",
+    8.24: "8.24 s",
+    31.9: "32 s",
+    59.99: "1 min 0 s",
+    200: "3 min 20 s",
+    7500: "2 h 5 min",
+}
+
+
+def test_durations_are_words() -> None:
+    assert {seconds: console.duration(seconds) for seconds in DURATIONS} == DURATIONS
+
+
+def test_json_is_valid_for_any_number_and_a_table_keeps_a_long_cell_on_its_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    console.print_json({"a": [float("inf"), float("nan"), 1.5], "b": (1, None)})
+    assert json.loads(capsys.readouterr().out) == {"a": [None, None, 1.5], "b": [1, None]}
+    console.print_table(("a", "b"), [("x" * 300, 1234.5678), ("y", None)])
+    lines = capsys.readouterr().out.splitlines()
+    assert any("x" * 300 in line and "1235" in line for line in lines)
+    assert any("y" in line and "-" in line for line in lines)
+
+
+# Files in the current folder that are named as modules are never run: not by a command, not by its processes.
+
+PROJECT = ("app", "engine", "training", "presets", "run")
+USED = ("ziglang", "numba", "llvmlite", "numpy", "scipy", "torch", "mido", "soundfile", "typer", "click", "psutil")
+LIBRARY = ("json", "pickle", "socket", "struct", "tempfile", "subprocess", "runpy", "signal", "random", "threading")
+SHADOW = "import pathlib\npathlib.Path(__file__).with_suffix('.ran').touch()\nraise SystemExit('shadowed')\n"
+COMMANDS = (
+    ("presets",),
+    ("models",),
+    ("instruments",),
+    ("info", "no such file.safetensors"),
+    ("plugin", "concert_harp", "--dry-run"),
+    ("play", "no such file.mid", "--out", "x.wav"),
+    ("render", "no such preset", "x.wav"),
+    ("learn", "no such file.wav"),
+    ("sampled", "concert_harp", "x.sfz", "--size-only"),
+    ("train", "no such configuration"),
+    ("sweep", "no such plan"),
+    *((name, "--help") for name in ("simulate", "predict", "compare", "evaluate", "table", "family", "drums")),
+)
+CHILDREN = f"""
+import subprocess, sys
+from app.commands.cli import main
+from engine.python_process import python_command, python_environment
+from training.sweeping.processes import Layout, process_workers
+if __name__ == "__main__":
+    for words in {COMMANDS!r}:
+        main(words)
+    for module in (["ziglang", "version"], ["app.export.plugin.texts"]):
+        subprocess.run(python_command("-m", *module), env=python_environment(), stdin=subprocess.DEVNULL)
+    with process_workers(Layout("cpu", 1, ({{}},))) as workers:
+        print(workers.submit({{}}).result(300.0))
+"""
+
+
+def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path: Path) -> None:
+    """As the installed command starts: the current folder is not on its path."""
+    folder = tmp_path / "current"
+    folder.mkdir()
+    for name in (*PROJECT, *USED, *LIBRARY):
+        (folder / f"{name}.py").write_text(SHADOW, encoding="utf-8")
+    script = tmp_path / "script.py"  # a worker of `multiprocessing` reads it again
+    script.write_text(CHILDREN, encoding="utf-8")
+    places = [path for path in sys.path if path and Path(path).is_absolute()]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys([str(ROOT), *places]))}
+    done = subprocess.run([sys.executable, script], cwd=folder, env=environment, capture_output=True, text=True)
+    assert not sorted(path.name for path in folder.glob("**/*.ran"))
+    assert done.stdout.splitlines()[-1].startswith("{'rows': [], 'error': "), done.stderr
+
+
+def test_every_process_is_started_by_the_one_way_that_leaves_the_current_folder_out() -> None:
+    product = [path for name in ("app", "engine", "training") for path in (ROOT / name).rglob("*.py")]
+    starting = re.compile(r"[(\[]\s*sys\.executable")
+    starters = {path.name for path in product if starting.search(path.read_text(encoding="utf-8"))}
+    assert starters == {"python_process.py"}
+
+
+def test_a_process_finds_code_where_this_one_does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Also after `python -m`, which puts the current folder on the path, and for a folder of the user's own."""
+    own, current = tmp_path / "own", tmp_path / "current"
+    for each in (own, current):
+        each.mkdir()
+    (own / "of_the_user.py").write_text("", encoding="utf-8")
+    monkeypatch.chdir(current)
+    monkeypatch.setattr(sys, "path", [str(current), "", ".", *sys.path, str(own)])
+    code = "import sys, app, engine, of_the_user; print(app.__file__); print(*sys.path, sep='\\n')"
+    options: dict[str, Any] = {"env": python_environment(), "capture_output": True, "text": True, "check": True}
+    found, *places = subprocess.run(python_command("-c", code), **options).stdout.splitlines()
+    assert Path(found).parents[1] == ROOT
+    assert str(own) in places and not {str(current), "", "."} & set(places)

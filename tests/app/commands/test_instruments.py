@@ -1,57 +1,221 @@
-"""The command that lists instruments."""
+"""Commands that list instruments and write them for samplers and as plug-ins."""
 
 from __future__ import annotations
 
 import json
+import shutil
+import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
+import soundfile
 
-from app.patches.library import SHIPPED, find_patch
+from app.export.plugin.identity import held_in, identifier
+from app.export.plugin.image import Image
+from app.export.sampled.plan import SampledPlan
+from app.patches.library import SHIPPED, find_patch, list_patches
 from app.shared.parameters import OF_PATCHES
+from engine.presets import preset_digest
+from tests.app.commands.conftest import Run
+from training.heard_file import NAME, Heard, add_heard
 
 
-def test_factory_instruments_are_listed(run) -> None:
-    found = run("instruments", "--json")
-    assert found.status == 0 and found.err == ""
-    listed = json.loads(found.out)
-    assert {each["file"] for each in listed} == {str(path) for path in SHIPPED.glob("*.json")}
-    table = run("instruments").out
-    for each in listed:
-        assert set(each) == {"name", "title", "category", "own", "description", "file"} and not each["own"]
-        assert each["name"] in table and each["title"] in table
+def test_a_preset_is_found_by_its_name_the_shipped_one_first(
+    run: Run, installed: Path, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    for name in ("mine", "good"):  # of two of one name, the shipped one counts
+        shutil.copy(small_preset, own / f"{name}.safetensors")
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    found = {entry["name"]: entry["file"] for entry in json.loads(run("presets", "--json").out)}
+    assert found == {"good": str(installed / "good.safetensors"), "mine": str(own / "mine.safetensors")}
+    words = ("--position", 0.5, "--amplitude-mm", 2, "--seconds", 0.01)
+    assert [run("compare", name, *words).status for name in found] == [0, 0]
+    for name, message in {
+        "goood": "no preset 'goood'; did you mean good? Give one of your own by its file",
+        "other": "`learned-strings presets` lists all",
+        "runs/missing.safetensors": "missing.safetensors: no such file",
+    }.items():
+        assert message in run("compare", name, *words).failure
 
 
-def test_an_instruments_parameters_are_listed_with_its_values(run) -> None:
-    own = find_patch("classical_guitar").patch
-    listed = {each["id"]: each for each in json.loads(run("instruments", "classical_guitar", "--json").out)}
-    assert set(listed) == {id for id in OF_PATCHES if own.has(id)}
-    for id, each in listed.items():
-        parameter = OF_PATCHES[id]
-        assert each == {
-            "id": id,
-            "name": parameter.name,
-            "unit": parameter.unit,
-            "value": own.value(id),
-            "lowest": parameter.limits[0],
-            "highest": parameter.limits[1],
-            "default": parameter.default,
-        }
-    assert "damping.release_t60_s" in run("instruments", "classical_guitar").out
-    assert "did you mean classical_guitar" in run("instruments", "clasical_guitar").failure
+def test_a_hostile_table_of_differences_hides_no_preset(run: Run, installed: Path) -> None:
+    digest = preset_digest(installed / "good.safetensors")
+    add_heard(installed, [Heard("good", digest, 4.0, 9.0, 5.2, 3.0, 13.0)])
+    with (installed / NAME).open("a") as table:
+        table.write("<script>,1e999,nan\n")
+    for heard, reported in (
+        ("pitch 13 cents too high …", f"{NAME}: line 3: holds 3"),
+        ("not measured", "not a text"),
+    ):
+        done = run("presets", "--json")
+        (preset,) = json.loads(done.out)
+        assert (done.status, preset["heard"]) == (0, heard)
+        assert reported in done.err
+        (installed / NAME).write_bytes(b"\xff" * 100)
 
 
-def test_a_broken_instrument_is_reported_and_hides_no_other(
-    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_instruments_are_listed_and_a_broken_one_is_reported(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
     own = tmp_path / "patches"
     own.mkdir()
-    some = json.loads(next(SHIPPED.glob("*.json")).read_text(encoding="utf-8"))
+    some = json.loads((SHIPPED / "classical_guitar.json").read_text(encoding="utf-8"))
     (own / "mine.json").write_text(json.dumps({**some, "name": "Mine"}))
     (own / "broken.json").write_text("{")
     found = run("instruments", "--json")
     assert found.status == 0
     assert found.err.startswith(f"learned-strings: {own / 'broken.json'}: not JSON") and found.err.count("\n") == 1
-    (mine,) = (each for each in json.loads(found.out) if each["own"])
-    assert (mine["name"], mine["title"]) == ("mine", "Mine")
+    listed = json.loads(found.out)
+    assert [(each["name"], each["title"]) for each in listed if each["own"]] == [("mine", "Mine")]
+    files = {each["file"] for each in listed if not each["own"]}
+    assert files == {str(path) for path in SHIPPED.glob("*.json")}
+    table = run("instruments").out
+    for each in listed:
+        assert set(each) == {"name", "title", "category", "own", "description", "file"}
+        assert each["name"] in table and each["title"] in table
+
+
+def test_an_instruments_parameters_are_listed_with_its_values(run: Run) -> None:
+    own = find_patch("classical_guitar").patch
+    listed = {each["id"]: each for each in json.loads(run("instruments", "classical_guitar", "--json").out)}
+    assert set(listed) == {id for id in OF_PATCHES if own.has(id)}
+    for id, each in listed.items():
+        parameter = OF_PATCHES[id]
+        assert (each["name"], each["unit"], each["value"]) == (parameter.name, parameter.unit, own.value(id))
+        assert (each["lowest"], each["highest"], each["default"]) == (*parameter.limits, parameter.default)
+    assert "damping.release_t60_s" in run("instruments", "classical_guitar").out
+
+
+# Samplers
+
+GUITAR = "Classical guitar"
+SMALL = ("--keys", "C4-62", "--layers", 2, "--seconds", 0.2)  # 60 to 62
+
+
+@pytest.fixture
+def notes(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
+    """Notes that were rendered: decaying sines, in place of the instrument."""
+    rendered: list[tuple] = []
+
+    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
+        rendered.append((patch.room.mix, key, velocity, held_s, seconds, rate_hz, source))
+        time_s = np.arange(round(seconds * rate_hz)) / rate_hz
+        sound = velocity / 127 * np.exp(-30 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
+        return np.stack([sound] * len(patch.pickup.points), axis=1).astype(np.float32)
+
+    monkeypatch.setitem(sys.modules, "app.instrument.offline", SimpleNamespace(render_note=render_note))
+    return rendered
+
+
+def test_an_sfz_with_its_samples(run: Run, notes: list[tuple], folder: Path) -> None:
+    patch, out = find_patch(GUITAR).patch, folder / "a.sfz"
+    plan = SampledPlan(patch, (60, 62), layers=2)
+    found = run("sampled", GUITAR, out, *SMALL, "--source", "truth", "--rate", 44_100)
+    assert found.status == 0
+    assert notes == [(patch.room.mix, z.key, z.velocity, 0.2, 0.2, 44_100, "truth") for z in plan.zones]
+    assert patch.room.mix > 0
+    assert found.out.startswith(f"{out}: 6 samples, ")
+    assert "6 samples (3 keys, 2 velocity layers), at most 0.3 MB" in found.err
+    pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the instrument\n"
+    assert found.out.endswith(pitch) and pitch in found.err
+    assert len(list((folder / "a_samples").glob("*.flac"))) == 6
+    room = "a released key ends the room's tail as well; --dry leaves the room to the sampler"
+    dry = run("sampled", GUITAR, out, *SMALL, "--dry", "--format", "wav", "--bits", "16")
+    assert room in found.err and room not in dry.err
+    assert {mix for mix, *_ in notes[6:]} == {0.0}
+    for path in (folder / "a_samples").iterdir():
+        facts = soundfile.info(path)
+        assert path.stat().st_size == 44 + 2 * facts.channels * facts.frames
+
+
+def test_a_soundfont_is_one_file_and_a_large_one_is_asked_for(
+    run: Run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = run("sampled", GUITAR, folder / "a.sf2", *SMALL, "--every", 3)
+    assert found.status == 0
+    assert [path.name for path in folder.iterdir()] == ["a.sf2"]
+    assert {key for _, key, *_ in notes} == {61}
+    assert "2 samples (1 key, each for 3 keys, 2 velocity layers)" in found.err
+    monkeypatch.setattr("app.commands.sampled.ASKED_ABOVE_BYTES", 1000)
+    assert [run("sampled", GUITAR, folder / "b.sfz", *SMALL, *more).status for more in ((), ("--yes",))] == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "count"), [("40-43", 4), (" 40 - 43 ", 4), ("60", 1), ("E2-G2", 4), ("c4-d4", 3), ("F#2-Gb2", 1)]
+)
+def test_keys_are_numbers_or_notes(run: Run, folder: Path, text: str, count: int) -> None:
+    found = run("sampled", GUITAR, folder / "a.sfz", "--keys", text, "--layers", 1, "--size-only")
+    assert f"({count} key" in found.out
+
+
+# Plug-ins
+
+
+def made_at_once(images: list[Image], form: str, target: str, path: Path, *_: Any, replace: bool) -> Path:
+    """A plug-in that has the identifiers alone."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"".join(image.id.encode() + b"\0" for image in images))
+    return path
+
+
+@pytest.fixture
+def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The folder below which plug-ins are installed; they are made without a compiler."""
+    monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
+    monkeypatch.setattr("app.export.plugin.build.build_plugin", made_at_once)
+    image = "app.export.plugin.image.image_of"
+    monkeypatch.setattr(image, lambda patch, _: Image(identifier(patch.name), patch.name, b"", (), ()))
+    return tmp_path
+
+
+def held(home: Path) -> dict[str, int]:
+    return {path.name: len(held_in(path)) for path in home.rglob("*.clap") if path.is_file()}
+
+
+def test_one_bank_does_not_replace_another(run: Run, home: Path) -> None:
+    assert run("plugin", "all", "--install").status == 0
+    whole = held(home)["Learned Strings.clap"]
+    assert whole > 50
+    assert run("plugin", "concert_harp", "electric_bass", "--install").status == 0
+    assert held(home) == {"Learned Strings.clap": whole, "Concert harp + Electric bass.clap": 2}
+    many = [entry.name for entry in list_patches(SHIPPED)[0]][:9]
+    made = run("plugin", *many, "--install")
+    (name,) = (name for name, count in held(home).items() if count == 9)
+    assert name.endswith(" + 8 others.clap") and "replaces" not in made.out
+    assert run("plugin", *reversed(many[1:]), many[0], "--install").status == 0  # another first one, another name
+    others = (many[0], *many[2:], "concert_toms", "--install")
+    refused = run("plugin", *others)
+    assert refused.status == 1 and refused.err.count("\n") == 1
+    assert all(words in refused.err for words in (name, "holds another instrument", "--replace"))
+    assert held(home)[name] == 9
+    for words in ((*others, "--replace"), ("all", "--install")):  # the latter: the same again
+        assert "replaces the one before" in run("plugin", *words).out
+
+
+def test_nothing_is_written_where_one_of_several_would_lose_something(run: Run, home: Path) -> None:
+    harp = home / "out" / "Concert harp.vst3"
+    harp.parent.mkdir()
+    harp.write_bytes(b"org.learned-strings.another\0")
+    assert run("plugin", "concert_harp", "--format", "all", "--out", harp.parent).status == 1
+    assert [path.name for path in harp.parent.iterdir()] == [harp.name]
+
+
+def test_names_that_differ_in_marks_and_case_are_three_instruments(run: Run, home: Path) -> None:
+    harp = json.loads((SHIPPED / "concert_harp.json").read_text(encoding="utf-8"))
+    files = [home / f"{stem}.json" for stem in ("one", "two", "three")]
+    for file, name in zip(files, ("My bass!", "my bass-", "My bass"), strict=True):
+        file.write_text(json.dumps({**harp, "name": name}), encoding="utf-8")
+    assert run("plugin", *files, "--out", home / "out").status == 0
+    assert list(held(home).values()) == [3]
+
+
+def test_without_a_compiler_the_extra_is_named(run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: None)
+    assert "learned-strings[plugin]" in run("plugin", "Concert harp", "--out", folder).failure
+    assert not list(folder.iterdir())

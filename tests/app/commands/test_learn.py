@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
 import sys
 import time
+from contextlib import redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import soundfile
 
+from app.commands.cli import main
 from app.instrument import learned
+from app.instrument.offline import render_note
+from app.patches.library import find_patch
 from app.shared.parameters import NOISE_DB
+from engine.presets import load_preset
 from engine.result_file import WriteError
+from tests.app.commands.conftest import Run
 from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
@@ -24,68 +32,90 @@ from training.recording.checkpoint import restore, save
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = synthetic_note(4, seconds=0.8)  # 317 Hz
-    path = tmp_path_factory.mktemp("recordings") / "note.wav"
-    soundfile.write(path, made.samples, made.rate_hz, subtype="PCM_24")
+    path = tmp_path_factory.mktemp("recordings") / os.fsdecode(b"caf\xe9.wav")  # as old archives have names
+    with path.open("wb") as file:
+        soundfile.write(file, made.samples, made.rate_hz, subtype="PCM_24", format="WAV")
     return path
 
 
-def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
-    found = run("learn", recording, "--name", "My string", "--scale-length", 0.65, "--json")
-    assert found.status == 0, found.err
-    data = json.loads(found.out)
-    assert data["recordings"][0]["errors"]["esr"] < 0.01
-    assert Path(data["preset"]) == folder / "my_string.safetensors"
-    assert (folder / "bodies" / "my_string.wav").is_file() and (folder / "patches" / "my_string.json").is_file()
+WORDS = ("--name", "My string", "--scale-length", "0.65", "--json")
 
-    out = folder / "again.wav"  # which is without the attack
+
+@pytest.fixture(scope="module")
+def whole(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """A folder with the instrument that was learned, and what the command printed."""
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patched, redirect_stdout(io.StringIO()) as printed:
+        patched.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+        assert main(["learn", str(recording), *WORDS]) == 0
+    return folder, json.loads(printed.getvalue().encode())
+
+
+@pytest.fixture
+def own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of the user's instruments."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+    return folder
+
+
+def files(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def test_a_note_becomes_an_instrument(
+    run: Run, recording: Path, whole: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, data = whole
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    assert data["recordings"][0]["errors"]["esr"] < 0.01
+    assert Path(data["preset"]) == own / "my_string.safetensors"
+    assert (own / "bodies" / "my_string.wav").is_file() and (own / "patches" / "my_string.json").is_file()
+
+    out = tmp_path / "again.wav"  # which is without the attack
     assert run("render", "my_string", out, "--as-recorded").status == 0
-    truth, rate_hz = soundfile.read(recording)
+    with recording.open("rb") as file:
+        truth, rate_hz = soundfile.read(file)
     sound, rendered_hz = soundfile.read(out)
     assert (rendered_hz, len(sound)) == (rate_hz, len(truth))
     part = slice(round(0.11 * rate_hz), round(0.85 * rate_hz))
     assert np.sum((truth[part] - sound[part]) ** 2) < 0.01 * np.sum(truth[part] ** 2)
 
-    from app.instrument.offline import render_note
-    from app.patches.library import find_patch
-    from engine.presets import load_preset
-
     patch = find_patch("my_string").patch
     low, high = patch.range
-    preset = load_preset(folder / "my_string.safetensors")
-    for key in (low, (low + high) // 2, high):
+    preset, middle = load_preset(own / "my_string.safetensors"), (low + high) // 2
+    for key in (low, middle, high):
         assert np.abs(render_note(patch, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
 
     # the recorded attack sounds with the stroke, as loud at every rate, and has a switch
     assert patch.noise.kind == "recorded"
     loud, off = (patch.with_value("noise.onset_db", each) for each in (0.0, NOISE_DB[0]))
-    key, energies = (low + high) // 2, []
+    energies = []
     for rate in (44_100, 96_000):
-        first, second = (render_note(each, preset, key, 100, 0.4, 0.4, rate) for each in (loud, off))
+        first, second = (render_note(each, preset, middle, 100, 0.4, 0.4, rate) for each in (loud, off))
         only = (first - second)[:, 0].astype(float)
         energies.append(float(only @ only) / rate)
         assert np.abs(only[round(0.36 * rate) :]).max() < 1e-2 * np.abs(only).max()
     assert energies[0] > 1e-6 and energies[0] == pytest.approx(energies[1], rel=0.25)
+    assert "exists already" in run("learn", recording, "--name", "My string").failure
 
-    taken = run("learn", recording, "--name", "My string")
-    assert "exists already" in taken.failure
+
+def steps_of(folder: Path) -> int:
+    """The steps of a fit that the folder's checkpoint has."""
+    checkpoints = list((folder / "unfinished").glob("*.json"))
+    return json.loads(checkpoints[0].read_text())["steps"] if checkpoints else 0
 
 
 def test_a_killed_command_continues_with_the_same_result(
-    run, recording, folder: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, recording: Path, whole: tuple[Path, dict[str, Any]], own: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["learn", str(recording), "--name", "Mine"]
-    whole, cut = folder / "whole", folder / "cut"
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(whole))
-    assert run(*words).status == 0
-
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(cut))
+    words = ["learn", str(recording), *WORDS]
     command = [sys.executable, "-m", "app.commands.cli", *words]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ)) as process:
-        while process.poll() is None and steps_of(cut) <= 8:
+        while process.poll() is None and steps_of(own) <= 8:
             time.sleep(0.01)
         process.kill()
-    assert steps_of(cut) > 8 and not (cut / "mine.safetensors").exists()
+    preset = "my_string.safetensors"
+    assert steps_of(own) > 8 and not (own / preset).exists()
 
     restored = []
 
@@ -94,21 +124,16 @@ def test_a_killed_command_continues_with_the_same_result(
         return restored[-1]
 
     monkeypatch.setattr("training.recording.fit.restore", restore_and_note)
-    assert run(*words).status == 0
+    done = run(*words[:-1])  # in words
+    assert done.status == 0 and str(own / "my_string.safetensors") in done.out
     assert restored[0] > 8
-    assert not any((cut / "unfinished").iterdir())
-    assert (cut / "mine.safetensors").read_bytes() == (whole / "mine.safetensors").read_bytes()
+    assert not any((own / "unfinished").iterdir())
+    assert (own / preset).read_bytes() == (whole[0] / preset).read_bytes()
 
 
-def steps_of(folder: Path) -> int:
-    """How many steps of a fit the folder's checkpoint has."""
-    files = list((folder / "unfinished").glob("*.json"))
-    return json.loads(files[0].read_text())["steps"] if files else 0
-
-
-def test_an_interrupted_command_says_how_it_continues(run, recording, folder: Path, monkeypatch) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
-
+def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
+    run: Run, recording: Path, own: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def save_and_stop(*given: object) -> None:
         save(*given)
         raise KeyboardInterrupt
@@ -116,69 +141,36 @@ def test_an_interrupted_command_says_how_it_continues(run, recording, folder: Pa
     with monkeypatch.context() as patched:
         patched.setattr("training.recording.fit.save", save_and_stop)
         stopped = run("learn", recording, "--name", "Mine")
-    assert stopped.status == 130
-    assert "the same command continues there" in stopped.err
-    (checkpoint,) = (folder / "unfinished").iterdir()
+    assert stopped.status == 130 and "the same command continues there" in stopped.err
+    (checkpoint,) = (own / "unfinished").iterdir()
     checkpoint.write_text("{}")
     damaged = run("learn", recording, "--name", "Mine").failure
     assert "damaged checkpoint" in damaged and "delete it to start again" in damaged
 
 
-def test_what_cannot_be_learned_is_reported_and_leaves_nothing(
-    run, folder: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_sound_without_a_string_is_reported_and_only_an_option_keeps_it(
+    run: Run, own: Path, tmp_path: Path
 ) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder / "own"))
-    noise = folder / "noise.wav"
-    soundfile.write(noise, 0.1 * np.random.default_rng(0).standard_normal(88_200), 44_100)
-    assert "give one plucked note" in run("learn", noise, "--name", "Noise").err
-    assert not (folder / "own").exists()
-
-
-def test_where_no_string_is_found_only_the_option_keeps_it(
-    run, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = folder / "own"
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    soundfile.write(tmp_path / "noise.wav", 0.1 * np.random.default_rng(0).standard_normal(88_200), 44_100)
     samples, rate_hz = membrane(np.random.default_rng(30))
-    soundfile.write(folder / "drum.wav", samples[:rate_hz], rate_hz, subtype="FLOAT")
-    assert "drum.wav: no string found" in run("learn", folder / "drum.wav", "--name", "Drum").failure
-    assert [path for path in own.rglob("*") if path.is_file()] == []
-    kept = run("learn", folder / "drum.wav", "--name", "Drum", "--anyway", "--json")
+    drum = tmp_path / "drum.wav"
+    soundfile.write(drum, samples[:rate_hz], rate_hz, subtype="FLOAT")
+    assert "give one plucked note" in run("learn", tmp_path / "noise.wav", "--name", "Noise").err
+    assert "drum.wav: no string found" in run("learn", drum, "--name", "Drum").failure
+    assert files(own) == []
+    kept = run("learn", drum, "--name", "Drum", "--anyway", "--json")
     assert kept.status == 0, kept.err
     (found,) = json.loads(kept.out)["recordings"]
     assert found["found"] is False and found["linear_esr"] > 0
     assert (own / "drum.safetensors").is_file()
 
 
-def test_only_a_learned_preset_has_a_recording(run, small_preset: Path, folder: Path) -> None:
-    assert "was not learned" in run("render", small_preset, folder / "a.wav", "--as-recorded").err
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("Mandolin", "Mandolin: a factory instrument has this name; choose another"),
-        ("  ", "the name: must not be blank; give a name"),
-        ("x" * 300, "the name: must have at most 60 characters"),
-        ("a/b", "the name: must not begin or end with a full stop"),
-    ],
-)
-def test_an_impossible_name_is_refused_before_the_fit(
-    run, recording: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
-) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
-    monkeypatch.setattr(learned, "learn_files", lambda *_, **__: pytest.fail("it was fitted"))
-    assert words in run("learn", recording, "--name", name).failure
-    assert list(folder.iterdir()) == []
-
-
 def test_where_an_instrument_cannot_be_written_none_of_its_files_stays(
-    run, recording: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, recording: Path, own: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise WriteError("patches: cannot be written (No space left on device)")
 
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
     monkeypatch.setattr(learned, "save_patch", full)
     assert "No space left" in run("learn", recording, "--name", "My string").failure
-    assert [path for path in folder.rglob("*") if path.is_file()] == []
+    assert files(own) == []

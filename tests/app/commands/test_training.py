@@ -1,95 +1,90 @@
+"""train, sweep, results and table: runs, their files, and how they continue."""
+
 from __future__ import annotations
 
 import csv
 import errno
+import io
+import json
 import shutil
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import torch
 
+from engine.compare.relative import RelativeError
 from engine.presets import SHIPPED, load_preset, preset_digest
-from tests.app.commands.conftest import FullDisk
-from training.cell import load
+from engine.result_file import REMEDIES
+from engine.schema import read, write
+from tests.app.commands.conftest import CONFIGURATION, PLAN, FullDisk, Run
+from training.cell import Cell, configuration_of, load
+from training.cli import console
+from training.cli.sweep import Shown
 from training.cli.training import known_errors
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
+from training.fitting.fit import Progress
 from training.heard_file import read_heard
 from training.heard_words import heard_sentence
+from training.results import Row, add_rows, read_results
+from training.sweeping.plan import load_plan
+from training.sweeping.processes import Layout
+from training.sweeping.task import Task, Workers
 
-CONFIGURATION = """
-title = "Tiny"
-model = "koopman_var"
-model_configuration = { state_size = 8, multiplier_widths = [4] }
-[data]
-initial = "gaussian"
-rate_hz = 4000
-modes = 5
-steps = 50
-count = 20
-[recipe]
-epochs = 3
-batch_size = 8
-steps_per_batch = 8
-first_horizon = 10
-validate_every = 1
-"""
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a test trains."""
-
-    folder: Path
-
-    @property
-    def cache(self) -> list[Any]:
-        return ["--cache", self.folder / "cache"]
-
-    @property
-    def configuration(self) -> Path:
-        path = self.folder / "tiny.toml"
-        path.write_text(CONFIGURATION, encoding="utf-8")
-        return path
-
-    def train(self, name: str) -> list[Any]:
-        runs, preset = self.folder / name, self.folder / f"{name}.safetensors"
-        return ["train", self.configuration, "--runs", runs, "--output", preset, *self.cache]
-
-    def log(self, name: str) -> list[dict[str, str]]:
-        with (self.folder / name / "tiny" / "log.csv").open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
+NAMES = ["nylon_linear_noise_4k_koopman_var_60", "nylon_linear_noise_4k_koopman_60"]
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Place:
-    return Place(tmp_path)
+def tiny_run(tmp_path: Path) -> Path:
+    path = tmp_path / "tiny.toml"
+    path.write_text(CONFIGURATION, encoding="utf-8")
+    return path
 
 
-def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place) -> None:
-    found = run(*place.train("a"))
+def train(configuration: Path, name: str) -> list[Any]:
+    folder = configuration.parent
+    files = ["--runs", folder / name, "--output", folder / f"{name}.safetensors", "--cache", folder / "cache"]
+    return ["train", configuration, *files]
+
+
+def log(configuration: Path, name: str) -> list[dict[str, str]]:
+    with (configuration.parent / name / "tiny" / "log.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return load_preset(path).model.state_dict()
+
+
+def equal(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
+    return all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_training_writes_a_preset_and_ends_with_its_own_error(run: Run, tiny_run: Path, tmp_path: Path) -> None:
+    found = run(*train(tiny_run, "a"))
     assert (found.status, found.err) == (0, "")
-    path = place.folder / "a.safetensors"
-    info = load_preset(path).info
-    lines = found.out.splitlines()
+    path = tmp_path / "a.safetensors"
+    info, lines = load_preset(path).info, found.out.splitlines()
     assert lines[0] == str(path)
     assert f"rel. MSE {info.rel_mse:.4g}, rel. MAE {info.rel_mae:.4g}" in lines[1]
     assert f"rel. MSE {info.test_rel_mse:.4g}, rel. MAE {info.test_rel_mae:.4g}" in lines[2]
-    heard, problems = read_heard(place.folder)
+    heard, problems = read_heard(tmp_path)
     assert problems == []
     assert lines[3].startswith("untrained   rel. MSE ")
     assert lines[5] == f"heard       {heard_sentence(heard[preset_digest(path)], path.stem)}"
     assert info.trained_range.position == (0.3, 0.7)
-    assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
+    assert [row["epoch"] for row in log(tiny_run, "a")] == ["1", "2", "3"]
 
-
-def test_a_shipped_preset_is_not_replaced(run, place: Place) -> None:
-    runs = place.folder / "runs"
-    found = run("train", place.configuration, "--runs", runs, *place.cache)
-    assert found.out.splitlines()[0] == str(runs / "tiny" / "tiny.safetensors")
-    assert not (SHIPPED / "tiny.safetensors").exists()
+    tiny_run.write_text(CONFIGURATION.replace("epochs = 3", "epochs = 4"), encoding="utf-8")
+    assert "was trained with other settings; delete it" in run(*train(tiny_run, "a")).failure
+    if not torch.cuda.is_available():
+        assert "no CUDA device can be used here" in run(*train(tiny_run, "b"), "--device", "cuda").failure
 
 
 def test_known_errors_are_the_papers_and_the_projects() -> None:
@@ -99,38 +94,30 @@ def test_known_errors_are_the_papers_and_the_projects() -> None:
     assert known_errors(load("studio_nylon_b3")) == {}  # data of its own
 
 
-def test_a_run_of_ones_own_takes_another_seed(run, place: Place) -> None:
-    words = place.train("seeded")
-    assert run(*words).status == run(*words, "--seed", 0).status == 0  # its own: the same run
-    own = load_preset(place.folder / "seeded.safetensors")
-    assert run(*words, "--seed", 5).status == 0
-    other = load_preset(place.folder / "seeded.safetensors")
-    assert sorted(each.name for each in (place.folder / "seeded").iterdir()) == ["tiny", "tiny_seed5"]
-    assert other.info.title == f"{own.info.title}, seed 5"
-    weights = own.model.state_dict(), other.model.state_dict()
-    assert any(not torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
-    twice = run("train", "nylon_linear_gaussian_4k_lru_seed3", "--seed", 5)
-    assert twice.status == 2 and "has a seed already" in twice.err
-
-
-def test_seeds_are_trained_together_and_their_mean_is_printed(run, place: Place) -> None:
-    runs = place.folder / "runs"
-    done = run("train", place.configuration, "--runs", runs, "--seeds", 2, *place.cache)
+def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(
+    run: Run, tiny_run: Path, tmp_path: Path
+) -> None:
+    words = ["train", tiny_run, "--runs", tmp_path / "runs", "--seeds", 2, "--cache", tmp_path / "cache"]
+    done = run(*words)
     assert done.status == 0, done.err
-    names = ("tiny", "tiny_seed1")
-    errors = [load_preset(runs / name / f"{name}.safetensors").info.rel_mse for name in names]
+    presets = [tmp_path / "runs" / name / f"{name}.safetensors" for name in ("tiny", "tiny_seed1")]
+    errors = [load_preset(path).info.rel_mse for path in presets]
     middle, deviation = sum(errors) / 2, abs(errors[0] - errors[1]) / 2**0.5
     assert f"2 seeds     rel. MSE {middle:.4g} ± {deviation:.4g}" in done.out
-    again = run("train", place.configuration, "--runs", runs, "--seeds", 2, *place.cache)
-    assert "finished earlier, nothing was trained now" in again.out
-    usage = run(*place.train("one"), "--seeds", 2).usage
-    assert "--output" in usage
+    one, other = (load_preset(path) for path in presets)
+    assert other.info.title == f"{one.info.title}, seed 1"
+    assert not equal(one.model.state_dict(), other.model.state_dict())
+    assert not (SHIPPED / "tiny.safetensors").exists()
+    for again in (words, [*words[:4], "--seed", 0, *words[6:]]):  # its own seed: the same run
+        assert "finished earlier, nothing was trained now" in run(*again).out
+    assert "--output" in run(*train(tiny_run, "one"), "--seeds", 2).usage
 
 
-def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_run_continues_to_the_same_weights(
+    run: Run, tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
-    assert run(*place.train("whole")).status == 0
-
+    assert run(*train(tiny_run, "whole")).status == 0
     save = Checkpoint.save
 
     def save_and_kill(self: Checkpoint, path: Path) -> None:
@@ -140,42 +127,24 @@ def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch
 
     with monkeypatch.context() as patched:
         patched.setattr(Checkpoint, "save", save_and_kill)
-        killed = run(*place.train("cut"))
-    assert killed.status == 130
-    assert "the same command continues with" in killed.err
-    assert not (place.folder / "cut.safetensors").exists()
+        killed = run(*train(tiny_run, "cut"))
+    assert killed.status == 130 and "the same command continues with" in killed.err
+    assert not (tmp_path / "cut.safetensors").exists()
 
-    assert run(*place.train("cut")).status == 0
-    whole, cut = (load_preset(place.folder / f"{name}.safetensors").model.state_dict() for name in ("whole", "cut"))
-    assert all(torch.equal(whole[name], cut[name]) for name in whole)
-    rows = place.log("cut")
+    assert run(*train(tiny_run, "cut")).status == 0
+    assert equal(weights(tmp_path / "whole.safetensors"), weights(tmp_path / "cut.safetensors"))
+    rows = log(tiny_run, "cut")
     assert [row["epoch"] for row in rows] == ["1", "2", "3"]
-    assert [row["loss"] for row in rows] == [row["loss"] for row in place.log("whole")]
-
-
-def test_a_run_of_another_configuration_is_refused(run, place: Place) -> None:
-    run(*place.train("a"))
-    text = CONFIGURATION.replace("epochs = 3", "epochs = 4")
-    other = place.folder / "other"
-    other.mkdir()
-    (other / "tiny.toml").write_text(text, encoding="utf-8")
-    words = [
-        "train",
-        other / "tiny.toml",
-        "--runs",
-        place.folder / "a",
-        "--output",
-        place.folder / "b",
-        *place.cache,
-    ]
-    assert "was trained with other settings; delete it" in run(*words).failure
+    assert [row["loss"] for row in rows] == [row["loss"] for row in log(tiny_run, "whole")]
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])
-def test_a_full_disk_leaves_no_half_data_set(place: Place, bytes_left: int, full_disk: FullDisk) -> None:
-    configuration, cache = load(str(place.configuration)).data, place.folder / "cache"
+def test_a_full_disk_leaves_no_half_data_set(
+    tiny_run: Path, tmp_path: Path, bytes_left: int, full_disk: FullDisk
+) -> None:
+    configuration, cache = load(str(tiny_run)).data, tmp_path / "cache"
     load_dataset(configuration, cache)
-    (made,) = (path for path in (place.folder / "cache" / "datasets").iterdir() if path.is_dir())
+    (made,) = (path for path in (cache / "datasets").iterdir() if path.is_dir())
     whole = {path.name: path.read_bytes() for path in made.iterdir()}
     shutil.rmtree(made)
     with full_disk(bytes_left), pytest.raises(OSError) as full:
@@ -186,16 +155,226 @@ def test_a_full_disk_leaves_no_half_data_set(place: Place, bytes_left: int, full
     assert {path.name: path.read_bytes() for path in made.iterdir()} == whole
 
 
-def test_a_configuration_that_is_not_there_is_reported(run) -> None:
-    assert "no training configuration 'nothing'" in run("train", "nothing").failure
+# Sweeps
 
 
-def test_a_wrong_field_is_reported(run, place: Place) -> None:
-    path = place.folder / "wrong.toml"
-    path.write_text(CONFIGURATION.replace("epochs", "epoch"), encoding="utf-8")
-    assert f"{path}.recipe: unknown field 'epoch'" in run("train", path).failure
+def row_of(name: str, digest: str = "", **changes: Any) -> Row:
+    fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
+    fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "seconds": 8.0}
+    return Row(digest or name, name, **({**fields, "finished": "2026-01-01T00:00:00Z"} | changes))
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
-def test_a_device_that_is_not_there_is_reported(run, place: Place) -> None:
-    assert "no CUDA device can be used here" in run(*place.train("a"), "--device", "cuda").failure
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "trial.toml"
+    path.write_text(PLAN, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def words(plan: Path, tmp_path: Path) -> list[Any]:
+    return ["sweep", plan, "--runs", tmp_path / "runs", "--device", "cpu"]
+
+
+Script = Callable[[Callable[[str], Row | str]], list[Layout]]
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Script:
+    """Make workers that train nothing: a task ends as a function of its name says."""
+
+    def make(outcome: Callable[[str], Row | str]) -> list[Layout]:
+        layouts: list[Layout] = []
+
+        def submit(plain: Any) -> Future[dict[str, Any]]:
+            (run,) = read(Task, plain, "task").runs
+            found = outcome(run.name)
+            rows = [] if isinstance(found, str) else [write(found) | {"digest": run.digest}]
+            future: Future[dict[str, Any]] = Future()
+            future.set_result({"rows": rows, "error": found if isinstance(found, str) else ""})
+            return future
+
+        @contextmanager
+        def process_workers(layout: Layout) -> Iterator[Workers]:
+            layouts.append(layout)
+            yield Workers("a script", submit, lambda: 1)
+
+        monkeypatch.setattr("training.sweeping.processes.process_workers", process_workers)
+        return layouts
+
+    return make
+
+
+def test_a_sweep_ends_with_its_rows(run: Run, words: list[Any], tmp_path: Path, script: Script) -> None:
+    layouts = script(row_of)
+    found = run(*words, "--workers", "3", "--threads", "2")
+    assert found.status == 0
+    assert (len(layouts[0].environments), layouts[0].threads) == (2, 2)  # not more than runs
+    file = tmp_path / "runs" / "trial" / "results.csv"  # a trial's own
+    assert [row.name for row in read_results(file)] == sorted(NAMES)
+    lines = found.err.splitlines()
+    assert lines[0] == f"learned-strings: trial: 2 of 2 runs to do; rows go to {file}"
+    assert lines[1] == "learned-strings: on a script"
+    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8 s (1 done, 0 running, 1 waiting; about 8 s left)" in lines[2]
+    assert [name in found.out for name in NAMES] == [True, True]
+    again = run(*words, "--json")
+    assert [row["name"] for row in json.loads(again.out)] == sorted(NAMES)
+    assert again.err == f"learned-strings: trial: 0 of 2 runs to do; rows go to {file}\n"
+
+
+def test_failed_runs_are_the_commands_failure_after_all_else_is_done(
+    run: Run, words: list[Any], script: Script
+) -> None:
+    script(lambda name: "OSError: no space" if name == NAMES[0] else row_of(name))
+    found = run(*words, "--retries", "0")
+    assert found.status == 1
+    assert found.err.splitlines()[-1] == (
+        f"learned-strings: 1 of 2 runs failed: {NAMES[0]}; their rows say why, and the same command tries them again"
+    )
+    assert f"{NAMES[0]}: failed, OSError: no space" in found.err and "done" in found.out
+
+
+def test_an_interrupted_sweep_continues_with_what_is_left(
+    run: Run, words: list[Any], script: Script, plan: Path, tmp_path: Path
+) -> None:
+    def interrupted(name: str) -> Row:
+        if name == NAMES[1]:
+            raise KeyboardInterrupt
+        return row_of(name)
+
+    script(interrupted)
+    found = run(*words)
+    assert found.status == 130 and "stopped; the same command continues" in found.err
+    before = sorted(tmp_path.rglob("*"))
+    facts = json.loads(run(*words, "--dry-run", "--json").out)
+    assert {each["name"]: (each["status"], each["rel_mae"]) for each in facts} == {
+        NAMES[0]: ("done", 0.5),
+        NAMES[1]: ("", None),
+    }
+    assert sorted(tmp_path.rglob("*")) == before
+    begun: list[str] = []
+    script(lambda name: begun.append(name) or row_of(name))
+    assert run(*words).status == 0
+    assert begun == NAMES[1:]
+    assert {run.name for run in load_plan(str(plan)).runs} == set(NAMES)
+
+
+@pytest.mark.parametrize(("scheme", "warned"), [("tcp", True), ("tls", False)])
+def test_a_cluster_without_its_extra_is_one_line_and_an_open_scheduler_is_warned_of(
+    run: Run, words: list[Any], monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    found = run(*words, "--scheduler", f"{scheme}://127.0.0.1:9")
+    assert found.status == 1
+    reported = found.err.splitlines()[-1]
+    assert reported.startswith(f"learned-strings: {scheme}://127.0.0.1:9: a cluster needs Dask")
+    assert "install the extra learned-strings[cluster] as docs/install.md says" in reported
+    assert ("can run code on its workers" in found.err) == warned
+
+
+def test_files_of_other_machines_are_merged(run: Run, tmp_path: Path, full_disk: FullDisk) -> None:
+    here, there, elsewhere = (tmp_path / f"{name}.csv" for name in ("here", "there", "elsewhere"))
+    add_rows(here, [row_of("a")])
+    add_rows(there, [row_of("a", rel_mae=0.25, finished="2026-01-02T00:00:00Z"), row_of("b")])
+    add_rows(elsewhere, [row_of("a", status="failed", rel_mae=None, finished="2026-01-03T00:00:00Z"), row_of("c")])
+    before = here.read_bytes()
+    for bytes_left in (0, 700):
+        with full_disk(bytes_left):
+            reported = run("results", "merge", there, "--results", here).failure
+        assert reported == f"learned-strings: {here}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+        assert here.read_bytes() == before and not list(tmp_path.glob("*.unfinished"))
+    found = run("results", "merge", there, elsewhere, "--results", here)
+    assert (found.status, found.out) == (0, f"{here}: 3 rows, 2 of them new\n")
+    assert [(row.name, row.rel_mae) for row in read_results(here)] == [("a", 0.25), ("b", 0.5), ("c", 0.5)]
+    before = here.read_bytes()
+    there.write_text("something else\n", encoding="utf-8")
+    assert f"{there}: not a results file" in run("results", "merge", elsewhere, there, "--results", here).failure
+    assert here.read_bytes() == before
+
+
+def progress_of(seconds: float, seconds_left: float, validation: RelativeError | None = None) -> Progress:
+    return Progress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left)
+
+
+def named(name: str) -> Any:
+    return SimpleNamespace(name=name)
+
+
+def test_the_time_left_follows_from_the_runs_so_far() -> None:
+    ended: list[str] = []
+
+    def begin(what: str) -> Any:
+        return lambda share, *reported: ended.append(what) if share == 1 else None
+
+    shown = Shown(begin, 5, 2)
+    assert shown.summary() == "0 done, 0 running, 5 waiting"
+    for name in ("a", "b"):
+        shown.started(named(name))
+    assert shown.seconds_left() is None
+    shown.progressed(named("a"), progress_of(10, 30))
+    assert shown.seconds_left() == (30 + 4 * 40) / 2
+    shown.finished(row_of("a", seconds=20.0))
+    assert shown.seconds_left() == 4 * 20 / 2
+    shown.finished(row_of("b", status="diverged", seconds=None))
+    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
+    assert ended == ["a", "b"]
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_each_run_that_is_under_way_is_shown(
+    terminal: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal, raising=False)
+    monkeypatch.setenv("COLUMNS", "150")
+    for every_s in (60.0, 0.0):
+        with console.bars(every_s) as begin:
+            shown = Shown(begin, 3, 2)
+            shown.started(named("a"))
+            shown.progressed(named("a"), progress_of(1, 3, RelativeError(0.25, 0.125)))
+    reported = capsys.readouterr().err
+    facts = "3 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125"
+    assert facts in reported
+    assert terminal or reported == f"learned-strings: a: 25%, {facts}\n"
+
+
+# Tables
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    path = tmp_path / "results.csv"
+    facts: dict[str, Any] = {"model": "s5", "string": "linear", "initial": "noise", "rate_hz": 4000, "horizon": 4000}
+    for seed in (1, 2):
+        cell = Cell("s5", False, "noise", 4000, recipe="paper", seed=seed)
+        figures = {"rel_mse": 0.001, "rel_mae": 0.01 * seed, "initialisation": "paper"}
+        digest = configuration_of(cell).digest
+        add_rows(path, [Row(digest, cell.name, "done", **facts, recipe="paper", seed=seed, **figures)])
+    return path
+
+
+def test_tables_are_printed_written_or_made_again_in_a_document(run: Run, results: Path, folder: Path) -> None:
+    words = ["table", "--results", results, "--metric", "mae"]
+    printed = run(*words)
+    assert (printed.status, printed.err) == (0, "")
+    assert "**0.015 (0.1023) ×0.15**" in printed.out and "not run (0.0113)" not in printed.out.partition("S5")[0]
+    assert printed.out.count("### 400 frames, relative MAE") == 1
+    path, document = folder / "tables.md", folder / "RESULTS.md"
+    assert run(*words, "--output", path).out == f"{path}\n"
+    assert path.read_text(encoding="utf-8") == printed.out
+    document.write_text("# Results\n\nWords.\n\n<!-- tables -->\nan older table\n", encoding="utf-8")
+    for _ in range(2):
+        assert run(*words, "--into", document).out == f"{document}\n"
+        made = document.read_text(encoding="utf-8")
+        assert made == f"# Results\n\nWords.\n\n<!-- tables -->\n\n{printed.out}"
+    document.write_text("# Results\n", encoding="utf-8")
+    refused = run(*words, "--into", document).failure
+    assert "has no line <!-- tables -->; put it where the tables are to begin" in refused
+    assert document.read_text(encoding="utf-8") == "# Results\n"
+    for more in (("--output", folder / "other.md"), ("--format", "csv")):
+        assert "--into" in run(*words, "--into", document, *more).usage
+    lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
+    assert {entry["runs"].count("nylon_linear_noise_4k_s5_paper_seed") for entry in lines} == {0, 2}
+    chosen = run("table", "--results", results, "--recipe", "ours").out
+    assert "2 of 2 rows of the results file are not shown" in chosen
+    none = run("table", "--results", folder / "none.csv")
+    assert "none.csv has no rows" in none.err and "not run (0.0113)" in none.out

@@ -11,260 +11,71 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.app.export.plugin.abi import filled, structure
+
 NOTE_ON, NOTE_OFF, NOTE_CHOKE, NOTE_END, EXPRESSION, PARAM, MIDI = 0, 1, 2, 3, 4, 5, 10
 
 
-class Version(c.Structure):
-    _fields_ = (("major", c.c_uint32), ("minor", c.c_uint32), ("revision", c.c_uint32))
-
-
-class Header(c.Structure):
-    _fields_ = (
-        ("size", c.c_uint32),
-        ("time", c.c_uint32),
-        ("space", c.c_uint16),
-        ("type", c.c_uint16),
-        ("flags", c.c_uint32),
-    )
-
-
-_PLACE = (("note_id", c.c_int32), ("port", c.c_int16), ("channel", c.c_int16), ("key", c.c_int16))
-
-
-class NoteEvent(c.Structure):
-    _fields_ = (("header", Header), *_PLACE, ("velocity", c.c_double))
-
-
-class ExpressionEvent(c.Structure):
-    _fields_ = (("header", Header), ("id", c.c_int32), *_PLACE, ("value", c.c_double))
-
-
-class ParamEvent(c.Structure):
-    _fields_ = (("header", Header), ("id", c.c_uint32), ("cookie", c.c_void_p), *_PLACE, ("value", c.c_double))
-
-
-class MidiEvent(c.Structure):
-    _fields_ = (("header", Header), ("port", c.c_uint16), ("data", c.c_uint8 * 3))
-
-
-SIZE_FN = c.CFUNCTYPE(c.c_uint32, c.c_void_p)
-GET_FN = c.CFUNCTYPE(c.c_void_p, c.c_void_p, c.c_uint32)
-PUSH_FN = c.CFUNCTYPE(c.c_bool, c.c_void_p, c.c_void_p)
-
-
-class InEvents(c.Structure):
-    _fields_ = (("context", c.c_void_p), ("size", SIZE_FN), ("get", GET_FN))
-
-
-class OutEvents(c.Structure):
-    _fields_ = (("context", c.c_void_p), ("push", PUSH_FN))
-
-
-class Audio(c.Structure):
-    _fields_ = (
-        ("data32", c.POINTER(c.POINTER(c.c_float))),
-        ("data64", c.c_void_p),
-        ("channels", c.c_uint32),
-        ("latency", c.c_uint32),
-        ("constant", c.c_uint64),
-    )
-
-
-class Process(c.Structure):
-    _fields_ = (
-        ("steady", c.c_int64),
-        ("frames", c.c_uint32),
-        ("transport", c.c_void_p),
-        ("inputs", c.c_void_p),
-        ("outputs", c.POINTER(Audio)),
-        ("inputs_count", c.c_uint32),
-        ("outputs_count", c.c_uint32),
-        ("in_events", c.POINTER(InEvents)),
-        ("out_events", c.POINTER(OutEvents)),
-    )
-
-
-P = c.c_void_p
-
-
-class Plugin(c.Structure):
-    _fields_ = (
-        ("descriptor", P),
-        ("data", P),
-        ("init", c.CFUNCTYPE(c.c_bool, P)),
-        ("destroy", c.CFUNCTYPE(None, P)),
-        ("activate", c.CFUNCTYPE(c.c_bool, P, c.c_double, c.c_uint32, c.c_uint32)),
-        ("deactivate", c.CFUNCTYPE(None, P)),
-        ("start_processing", c.CFUNCTYPE(c.c_bool, P)),
-        ("stop_processing", c.CFUNCTYPE(None, P)),
-        ("reset", c.CFUNCTYPE(None, P)),
-        ("process", c.CFUNCTYPE(c.c_int32, P, c.POINTER(Process))),
-        ("get_extension", c.CFUNCTYPE(P, P, c.c_char_p)),
-        ("on_main_thread", c.CFUNCTYPE(None, P)),
-    )
-
-
-class HostStructure(c.Structure):
-    _fields_ = (
-        ("version", Version),
-        ("data", P),
-        ("name", c.c_char_p),
-        ("vendor", c.c_char_p),
-        ("url", c.c_char_p),
-        ("host_version", c.c_char_p),
-        ("get_extension", c.CFUNCTYPE(P, P, c.c_char_p)),
-        ("request_restart", c.CFUNCTYPE(None, P)),
-        ("request_process", c.CFUNCTYPE(None, P)),
-        ("request_callback", c.CFUNCTYPE(None, P)),
-    )
-
-
-class Descriptor(c.Structure):
-    _fields_ = (("version", Version), *((n, c.c_char_p) for n in ("id", "name", "vendor")))
-
-
-class Factory(c.Structure):
-    _fields_ = (
-        ("count", c.CFUNCTYPE(c.c_uint32, P)),
-        ("descriptor", c.CFUNCTYPE(c.POINTER(Descriptor), P, c.c_uint32)),
-        ("create", c.CFUNCTYPE(c.POINTER(Plugin), P, P, c.c_char_p)),
-    )
-
-
-class Entry(c.Structure):
-    _fields_ = (
-        ("version", Version),
-        ("init", c.CFUNCTYPE(c.c_bool, c.c_char_p)),
-        ("deinit", c.CFUNCTYPE(None)),
-        ("get_factory", c.CFUNCTYPE(P, c.c_char_p)),
-    )
-
-
-class ParamInfo(c.Structure):
-    _fields_ = (
-        ("id", c.c_uint32),
-        ("flags", c.c_uint32),
-        ("cookie", P),
-        ("name", c.c_char * 256),
-        ("module", c.c_char * 1024),
-        ("low", c.c_double),
-        ("high", c.c_double),
-        ("standard", c.c_double),
-    )
-
-
-class Params(c.Structure):
-    _fields_ = (
-        ("count", c.CFUNCTYPE(c.c_uint32, P)),
-        ("info", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(ParamInfo))),
-        ("value", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(c.c_double))),
-        ("to_text", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.c_double, c.c_char_p, c.c_uint32)),
-        ("from_text", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.c_char_p, c.POINTER(c.c_double))),
-    )
-
-
-WRITE_FN = c.CFUNCTYPE(c.c_int64, P, P, c.c_uint64)
-
-
-class Stream(c.Structure):
-    _fields_ = (("context", P), ("move", WRITE_FN))
-
-
-class State(c.Structure):
-    _fields_ = tuple((n, c.CFUNCTYPE(c.c_bool, P, c.POINTER(Stream))) for n in ("save", "load"))
-
-
-class Frames(c.Structure):
-    _fields_ = (("get", c.CFUNCTYPE(c.c_uint32, P)),)
-
-
-class Render(c.Structure):
-    _fields_ = (("required", c.CFUNCTYPE(c.c_bool, P)), ("set", c.CFUNCTYPE(c.c_bool, P, c.c_int32)))
-
-
+Version = structure("u32 major; u32 minor; u32 revision")
+Header = structure("u32 size; u32 time; u16 space; u16 type; u16 flags")
+PLACE = "i32 note_id; i16 port; i16 channel; i16 key"
+NoteEvent = structure(f"Header header; {PLACE}; f64 velocity", Header=Header)
+ExpressionEvent = structure(f"Header header; i32 id; {PLACE}; f64 value", Header=Header)
+ParamEvent = structure(f"Header header; u32 id; ptr cookie; {PLACE}; f64 value", Header=Header)
+MidiEvent = structure("Header header; u16 port; u8[3] data", Header=Header)
+InEvents = structure("ptr context; u32(ptr) size; ptr(ptr, u32) get")
+OutEvents = structure("ptr context; bool(ptr, ptr) push")
+Audio = structure("ptr data32; ptr data64; u32 channels; u32 latency; u64 constant")
+Process = structure(
+    "i64 steady; u32 frames; ptr transport; ptr inputs; ptr outputs; u32 inputs_count; u32 outputs_count;"
+    " ptr in_events; ptr out_events"
+)
+Plugin = structure(
+    "ptr descriptor; ptr data; bool(ptr) init; void(ptr) destroy; bool(ptr, f64, u32, u32) activate;"
+    " void(ptr) deactivate; bool(ptr) start_processing; void(ptr) stop_processing; void(ptr) reset;"
+    " i32(ptr, ptr) process; ptr(ptr, str) get_extension; void(ptr) on_main_thread"
+)
+HostStructure = structure(
+    "Version version; ptr data; str name; str vendor; str url; str host_version; ptr(ptr, str) get_extension;"
+    " void(ptr) request_restart; void(ptr) request_process; void(ptr) request_callback",
+    Version=Version,
+)
+Descriptor = structure("Version version; str id; str name; str vendor", Version=Version)
+Factory = structure("u32(ptr) count; ptr(ptr, u32) descriptor; ptr(ptr, ptr, str) create")
+Entry = structure("Version version; bool(str) init; void() deinit; ptr(str) get_factory", Version=Version)
+ParamInfo = structure(
+    "u32 id; u32 flags; ptr cookie; char[256] name; char[1024] module; f64 low; f64 high; f64 standard"
+)
+Params = structure(
+    "u32(ptr) count; bool(ptr, u32, ptr) info; bool(ptr, u32, ptr) value; bool(ptr, u32, f64, ptr, u32) to_text;"
+    " bool(ptr, u32, str, ptr) from_text"
+)
+Stream = structure("ptr context; i64(ptr, ptr, u64) move")
+State = structure("bool(ptr, ptr) save; bool(ptr, ptr) load")
+Frames = structure("u32(ptr) get")
+Render = structure("bool(ptr) required; bool(ptr, i32) set")
+PresetLoad = structure("bool(ptr, u32, str, str) from_location")
+HostParams = structure("void(ptr, u32) rescan; void(ptr, u32, u32) clear; void(ptr) request_flush")
+HostPresetLoad = structure("void(ptr, u32, str, str, i32, str) on_error; void(ptr, u32, str, str) loaded")
+UniversalId = structure("str abi; str id")
+Receiver = structure(
+    "ptr data; void(ptr, i32, str) on_error; bool(ptr, str, str) begin_preset; void(ptr, ptr) add_plugin_id;"
+    " void(ptr, str) set_soundpack_id; void(ptr, u32) set_flags; void(ptr, str) add_creator;"
+    " void(ptr, str) set_description; void(ptr, u64, u64) set_timestamps; void(ptr, str) add_feature;"
+    " void(ptr, str, str) add_extra_info"
+)
+Location = structure("u32 flags; str name; u32 kind; str location")
+ProviderDescriptor = structure("Version version; str id; str name; str vendor", Version=Version)
+Provider = structure(
+    "ptr descriptor; ptr data; bool(ptr) init; void(ptr) destroy; bool(ptr, u32, str, ptr) get_metadata;"
+    " ptr(ptr, str) get_extension"
+)
+Indexer = structure(
+    "Version version; str name; str vendor; str url; str host_version; ptr data; bool(ptr, ptr) declare_filetype;"
+    " bool(ptr, ptr) declare_location; bool(ptr, ptr) declare_soundpack; ptr(ptr, str) get_extension",
+    Version=Version,
+)
 IN_FILE, IN_PLUGIN = 0, 1  # kinds of places of presets
-S = c.c_char_p
-
-
-class PresetLoad(c.Structure):
-    _fields_ = (("from_location", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, S, S)),)
-
-
-class HostParams(c.Structure):
-    _fields_ = (
-        ("rescan", c.CFUNCTYPE(None, P, c.c_uint32)),
-        ("clear", c.CFUNCTYPE(None, P, c.c_uint32, c.c_uint32)),
-        ("request_flush", c.CFUNCTYPE(None, P)),
-    )
-
-
-class HostPresetLoad(c.Structure):
-    _fields_ = (
-        ("on_error", c.CFUNCTYPE(None, P, c.c_uint32, S, S, c.c_int32, S)),
-        ("loaded", c.CFUNCTYPE(None, P, c.c_uint32, S, S)),
-    )
-
-
-class UniversalId(c.Structure):
-    _fields_ = (("abi", S), ("id", S))
-
-
-TEXT_FN, TWO_TEXTS_FN = c.CFUNCTYPE(None, P, S), c.CFUNCTYPE(None, P, S, S)
-
-
-class Receiver(c.Structure):
-    _fields_ = (
-        ("data", P),
-        ("on_error", c.CFUNCTYPE(None, P, c.c_int32, S)),
-        ("begin_preset", c.CFUNCTYPE(c.c_bool, P, S, S)),
-        ("add_plugin_id", c.CFUNCTYPE(None, P, c.POINTER(UniversalId))),
-        ("set_soundpack_id", TEXT_FN),
-        ("set_flags", c.CFUNCTYPE(None, P, c.c_uint32)),
-        ("add_creator", TEXT_FN),
-        ("set_description", TEXT_FN),
-        ("set_timestamps", c.CFUNCTYPE(None, P, c.c_uint64, c.c_uint64)),
-        ("add_feature", TEXT_FN),
-        ("add_extra_info", TWO_TEXTS_FN),
-    )
-
-
-class Location(c.Structure):
-    _fields_ = (("flags", c.c_uint32), ("name", S), ("kind", c.c_uint32), ("location", S))
-
-
-class ProviderDescriptor(c.Structure):
-    _fields_ = (("version", Version), ("id", S), ("name", S), ("vendor", S))
-
-
-class Provider(c.Structure):
-    _fields_ = (
-        ("descriptor", c.POINTER(ProviderDescriptor)),
-        ("data", P),
-        ("init", c.CFUNCTYPE(c.c_bool, P)),
-        ("destroy", c.CFUNCTYPE(None, P)),
-        ("get_metadata", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, S, c.POINTER(Receiver))),
-        ("get_extension", c.CFUNCTYPE(P, P, S)),
-    )
-
-
-class Indexer(c.Structure):
-    _fields_ = (
-        ("version", Version),
-        *((name, S) for name in ("name", "vendor", "url", "host_version")),
-        ("data", P),
-        ("declare_filetype", c.CFUNCTYPE(c.c_bool, P, P)),
-        ("declare_location", c.CFUNCTYPE(c.c_bool, P, c.POINTER(Location))),
-        ("declare_soundpack", c.CFUNCTYPE(c.c_bool, P, P)),
-        ("get_extension", c.CFUNCTYPE(P, P, S)),
-    )
-
-
-class PresetFactory(c.Structure):
-    _fields_ = (
-        ("count", c.CFUNCTYPE(c.c_uint32, P)),
-        ("descriptor", c.CFUNCTYPE(c.POINTER(ProviderDescriptor), P, c.c_uint32)),
-        ("create", c.CFUNCTYPE(c.POINTER(Provider), P, P, S)),
-    )
 
 
 @dataclass
@@ -285,27 +96,23 @@ class Browser:
 
     def __init__(self, library: Library) -> None:
         self.locations: list[tuple[int, str, int, str | None]] = []
-        self._indexer = Indexer(Version(1, 2, 0), b"tests")
-        self._indexer.declare_location = Indexer._fields_[7][1](self._declare)
-        self.factory = c.cast(library.entry.get_factory(b"clap.preset-discovery-factory/2"), c.POINTER(PresetFactory))
-        assert self.factory
-        own = self.factory.contents
-        self.ids = [own.descriptor(self._at, each).contents.id.decode() for each in range(own.count(self._at))]
 
-    @property
-    def _at(self) -> int:
-        return c.addressof(self.factory.contents)
+        def declare(_indexer: int, at: int) -> bool:
+            place = Location.from_address(at)
+            name, location = place.name.decode(), place.location and place.location.decode()
+            self.locations.append((place.flags, name, place.kind, location))
+            return True
 
-    def _declare(self, _indexer: int, location: c._Pointer[Location]) -> bool:
-        at = location.contents
-        self.locations.append((at.flags, at.name.decode(), at.kind, at.location and at.location.decode()))
-        return True
+        self.indexer = filled(Indexer, version=Version(1, 2, 0), name=b"tests", declare_location=declare)
+        self.at = library.entry.get_factory(b"clap.preset-discovery-factory/2")
+        self.factory = Factory.from_address(self.at)
+        ids = (self.factory.descriptor(self.at, each) for each in range(self.factory.count(self.at)))
+        self.ids = [ProviderDescriptor.from_address(each).id.decode() for each in ids]
 
-    def create(self, id: str | None, indexer: bool = True) -> c._Pointer[Provider]:
-        """A provider: null where there is none."""
-        at = c.addressof(self._indexer) if indexer else None
-        found: c._Pointer[Provider] = self.factory.contents.create(self._at, at, None if id is None else id.encode())
-        return found
+    def create(self, id: str | None, indexer: bool = True) -> int | None:
+        """A provider's address: none where there is none."""
+        at = c.addressof(self.indexer) if indexer else None
+        return self.factory.create(self.at, at, None if id is None else id.encode())
 
     def read(self, kind: int = IN_PLUGIN, most: int = 1_000, bare: bool = False) -> tuple[bool, list[Preset]]:
         """Whether the provider succeeded, and presets, up to one more than `most`; bare: only what is required."""
@@ -315,31 +122,24 @@ class Browser:
             found.append(Preset(name.decode(), key.decode()))
             return len(found) <= most
 
-        kinds: dict[str, Any] = dict(Receiver._fields_)
-        receiver = Receiver()
-        receiver.begin_preset = kinds["begin_preset"](begin)
-        if not bare:
+        def add_plugin(_receiver: int, at: int) -> None:
+            id = UniversalId.from_address(at)
+            found[-1].plugins.append((id.abi.decode(), id.id.decode()))
 
-            def add_plugin(_receiver: int, at: c._Pointer[UniversalId]) -> None:
-                found[-1].plugins.append((at.contents.abi.decode(), at.contents.id.decode()))
-
-            def set_flags(_receiver: int, flags: int) -> None:
-                found[-1].flags = flags
-
-            def describe(_receiver: int, text: bytes) -> None:
-                found[-1].description = text.decode()
-
-            receiver.add_plugin_id = kinds["add_plugin_id"](add_plugin)
-            receiver.set_flags = kinds["set_flags"](set_flags)
-            receiver.set_description = TEXT_FN(describe)
-            receiver.add_creator = TEXT_FN(lambda _, text: found[-1].creators.append(text.decode()))
-            receiver.add_feature = TEXT_FN(lambda _, text: found[-1].features.append(text.decode()))
-        provider = self.create(self.ids[0])
-        assert provider
-        at, own = c.addressof(provider.contents), provider.contents
+        optional = {
+            "add_plugin_id": add_plugin,
+            "set_flags": lambda _, flags: setattr(found[-1], "flags", flags),
+            "set_description": lambda _, text: setattr(found[-1], "description", text.decode()),
+            "add_creator": lambda _, text: found[-1].creators.append(text.decode()),
+            "add_feature": lambda _, text: found[-1].features.append(text.decode()),
+        }
+        receiver = filled(Receiver, begin_preset=begin, **({} if bare else optional))
+        at = self.create(self.ids[0])
+        assert at
+        own = Provider.from_address(at)
         assert own.init(at)
         assert not own.get_extension(at, b"unknown")
-        done = own.get_metadata(at, kind, None, receiver)
+        done = own.get_metadata(at, kind, None, c.byref(receiver))
         assert not own.get_metadata(at, kind, None, None)
         own.destroy(at)
         return bool(done), found
@@ -386,24 +186,25 @@ class Library:
 
     def __init__(self, path: Path) -> None:
         self.instances: list[Instance] = []
-        self._library = c.CDLL(str(path))
-        self.entry = Entry.in_dll(self._library, "clap_entry")
+        self.library = c.CDLL(str(path))
+        self.entry = Entry.in_dll(self.library, "clap_entry")
         assert self.entry.init(str(path).encode())
-        self.factory = c.cast(self.entry.get_factory(b"clap.plugin-factory"), c.POINTER(Factory)).contents
-        self._factory_at = c.addressof(self.factory)
+        self.at = self.entry.get_factory(b"clap.plugin-factory")
+        self.factory = Factory.from_address(self.at)
 
     @property
     def plugins(self) -> dict[str, str]:
         """Names by id."""
-        found = {}
-        for index in range(self.factory.count(self._factory_at)):
-            each = self.factory.descriptor(self._factory_at, index).contents
-            found[each.id.decode()] = each.name.decode()
-        return found
+        all_of = (self.factory.descriptor(self.at, index) for index in range(self.factory.count(self.at)))
+        described = [Descriptor.from_address(each) for each in all_of]
+        return {each.id.decode(): each.name.decode() for each in described}
 
     def create(self, id: str) -> Instance:
         self.instances.append(Instance(self, id))
         return self.instances[-1]
+
+    def create_named(self, name: str) -> Instance:
+        return self.create(next(id for id, shown in self.plugins.items() if shown == name))
 
     def destroy_instances(self) -> None:
         while self.instances:
@@ -419,85 +220,81 @@ class Instance:
         self.loaded: list[tuple[int, bytes | None, bytes | None]] = []
         self.errors: list[str] = []
         self.ended: list[int] = []
-
-        def count(_host: int) -> None:
-            self.callbacks += 1
-
-        rescan, clear, flush = (kind for _, kind in HostParams._fields_)
-        on_error, on_load = (kind for _, kind in HostPresetLoad._fields_)
         self._offers: dict[bytes, c.Structure] = {
-            b"clap.params": HostParams(
-                rescan(lambda host, flags: self.rescans.append(flags)),
-                clear(lambda host, id, flags: None),
-                flush(lambda host: None),
+            b"clap.params": filled(
+                HostParams,
+                rescan=lambda host, flags: self.rescans.append(flags),
+                clear=lambda host, id, flags: None,
+                request_flush=lambda host: None,
             ),
-            b"clap.preset-load/2": HostPresetLoad(
-                on_error(lambda host, kind, location, key, code, text: self.errors.append(text.decode())),
-                on_load(lambda host, kind, location, key: self.loaded.append((kind, location, key))),
+            b"clap.preset-load/2": filled(
+                HostPresetLoad,
+                on_error=lambda host, kind, location, key, code, text: self.errors.append(text.decode()),
+                loaded=lambda host, kind, location, key: self.loaded.append((kind, location, key)),
             ),
         }
 
         def offered(_host: int, id: bytes) -> int | None:
             return c.addressof(self._offers[id]) if id in self._offers else None
 
-        none = HostStructure._fields_[7][1](lambda host: None)
-        self._host = HostStructure(
-            Version(1, 2, 0),
-            None,
-            b"tests",
-            b"",
-            b"",
-            b"1",
-            HostStructure._fields_[6][1](offered),
-            none,
-            none,
-            HostStructure._fields_[9][1](count),
+        self._host = filled(
+            HostStructure,
+            version=Version(1, 2, 0),
+            name=b"tests",
+            vendor=b"",
+            url=b"",
+            host_version=b"1",
+            get_extension=offered,
+            request_restart=lambda host: None,
+            request_process=lambda host: None,
+            request_callback=lambda host: setattr(self, "callbacks", self.callbacks + 1),
         )
-        found = library.factory.create(library._factory_at, c.addressof(self._host), id.encode())
-        assert found, f"{id} is not in the library"
-        self.at = c.addressof(found.contents)
-        self._own = found.contents
+        self.at = library.factory.create(library.at, c.addressof(self._host), id.encode())
+        assert self.at, f"{id} is not in the library"
+        self._own = Plugin.from_address(self.at)
         assert self._own.init(self.at)
         self.frame = 0
 
     def extension(self, id: str, kind: type[c.Structure]) -> c.Structure:
         at = self._own.get_extension(self.at, id.encode())
         assert at, f"no extension {id}"
-        return c.cast(at, c.POINTER(kind)).contents
+        return kind.from_address(at)
 
     @property
-    def parameters(self) -> dict[str, ParamInfo]:
-        """By name."""
+    def described(self) -> list[Any]:
+        """Its parameters, in the plug-in's order."""
         params = self.extension("clap.params", Params)
-        found = {}
-        for index in range(params.count(self.at)):
-            info = ParamInfo()
-            assert params.info(self.at, index, info)
-            found[info.name.decode()] = info
+        found = [ParamInfo() for _ in range(params.count(self.at))]
+        assert all(params.info(self.at, index, c.byref(info)) for index, info in enumerate(found))
         return found
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """By name."""
+        return {info.name.decode(): info for info in self.described}
 
     @property
     def ids(self) -> list[int]:
-        """Of its parameters, in the plug-in's order."""
-        params, info = self.extension("clap.params", Params), ParamInfo()
-        found = []
-        for index in range(params.count(self.at)):
-            assert params.info(self.at, index, info)
-            found.append(info.id)
-        return found
+        return [info.id for info in self.described]
 
     def value(self, id: int) -> float:
         found = c.c_double()
-        assert self.extension("clap.params", Params).value(self.at, id, found)
+        assert self.extension("clap.params", Params).value(self.at, id, c.byref(found))
         return found.value
 
     def text(self, id: int, value: float) -> str:
         """A value in words, which lead back to it, within single precision."""
         params, found, back = self.extension("clap.params", Params), c.create_string_buffer(64), c.c_double()
         assert params.to_text(self.at, id, value, found, len(found))
-        assert params.from_text(self.at, id, found.value, back)
+        assert params.from_text(self.at, id, found.value, c.byref(back))
         assert abs(back.value - value) < 2e-6
         return found.value.decode()
+
+    def number(self, id: int, text: bytes) -> float | None:
+        """The value of a text; none where it is refused."""
+        found = c.c_double()
+        done = self.extension("clap.params", Params).from_text(self.at, id, text, c.byref(found))
+        return found.value if done else None
 
     @property
     def latency(self) -> int:
@@ -538,7 +335,7 @@ class Instance:
             kept.extend(c.string_at(data, size))
             return size
 
-        assert self.extension("clap.state", State).save(self.at, Stream(None, WRITE_FN(write)))
+        assert self.extension("clap.state", State).save(self.at, c.byref(filled(Stream, move=write)))
         return bytes(kept)
 
     def load(self, content: bytes) -> bool:
@@ -549,7 +346,7 @@ class Instance:
             c.memmove(data, part, len(part))
             return len(part)
 
-        return bool(self.extension("clap.state", State).load(self.at, Stream(None, WRITE_FN(read))))
+        return bool(self.extension("clap.state", State).load(self.at, c.byref(filled(Stream, move=read))))
 
     def withdraw_extensions(self) -> None:
         """As a host that offers none."""
@@ -568,30 +365,29 @@ class Instance:
     def repeated(self, out: NDArray[np.float32], events: Sequence[Event] = ()) -> Callable[[], None]:
         """A call that gives the next frames to `out`, (2, frames), and makes nothing that could take time."""
         frames = out.shape[1]
-        rows = (c.POINTER(c.c_float) * 2)(*(row.ctypes.data_as(c.POINTER(c.c_float)) for row in out))
+        rows = (c.c_void_p * 2)(*(row.ctypes.data for row in out))
         for event in events:
             event.content.header.time = event.frame - self.frame
         kept = [event.content for event in events]
-        incoming = InEvents(
-            None, SIZE_FN(lambda _list: len(kept)), GET_FN(lambda _list, index: c.addressof(kept[index]))
-        )
 
-        def push(_list: int, event: int) -> bool:
-            note = c.cast(event, c.POINTER(NoteEvent)).contents
+        def push(_list: int, at: int) -> bool:
+            note = NoteEvent.from_address(at)
             if note.header.type == NOTE_END:
                 self.ended.append(note.note_id)
             return True
 
-        outgoing = OutEvents(None, PUSH_FN(push))
-        audio = Audio(rows, None, 2, 0, 0)
-        process = Process(
-            self.frame, frames, None, None, c.pointer(audio), 0, 1, c.pointer(incoming), c.pointer(outgoing)
-        )
-
-        memory = out, rows, audio, incoming, outgoing  # which the call keeps alive
+        incoming = filled(InEvents, size=lambda _: len(kept), get=lambda _, index: c.addressof(kept[index]))
+        outgoing = filled(OutEvents, push=push)
+        audio = Audio(c.addressof(rows), None, 2, 0, 0)
+        lists = c.addressof(incoming), c.addressof(outgoing)
+        process = Process(self.frame, frames, None, None, c.addressof(audio), 0, 1, *lists)
+        at, memory = (
+            c.addressof(process),
+            (out, rows, audio, incoming, outgoing, process),
+        )  # which the call keeps alive
 
         def call() -> None:
-            self.status = self._own.process(self.at, process)
+            self.status = self._own.process(self.at, at)
             assert self.status != 0 and memory
             self.frame += frames
 

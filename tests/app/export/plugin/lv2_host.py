@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes as c
 import struct
 from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.export.plugin.image import Control
+from tests.app.export.plugin.abi import filled, function, structure
 
 P = c.c_void_p
 MAP = "http://lv2plug.in/ns/ext/urid#map"
@@ -21,39 +22,15 @@ EVENTS, LEFT, RIGHT, LATENCY, FIRST = range(5)
 State = dict[str, bytes]  # a property's value by its key; each is a chunk
 
 
-class Descriptor(c.Structure):
-    _fields_ = (
-        ("uri", c.c_char_p),
-        ("instantiate", c.CFUNCTYPE(P, P, c.c_double, c.c_char_p, P)),
-        ("connect_port", c.CFUNCTYPE(None, P, c.c_uint32, P)),
-        ("activate", c.CFUNCTYPE(None, P)),
-        ("run", c.CFUNCTYPE(None, P, c.c_uint32)),
-        ("deactivate", c.CFUNCTYPE(None, P)),
-        ("cleanup", c.CFUNCTYPE(None, P)),
-        ("extension_data", c.CFUNCTYPE(P, c.c_char_p)),
-    )
-
-
-MAP_FN = c.CFUNCTYPE(c.c_uint32, P, c.c_char_p)
-
-
-class UridMap(c.Structure):
-    _fields_ = (("handle", P), ("map", MAP_FN))
-
-
-class Feature(c.Structure):
-    _fields_ = (("uri", c.c_char_p), ("data", P))
-
-
-STORE = c.CFUNCTYPE(c.c_int, P, c.c_uint32, P, c.c_size_t, c.c_uint32, c.c_uint32)
-RETRIEVE = c.CFUNCTYPE(P, P, c.c_uint32, c.POINTER(c.c_size_t), c.POINTER(c.c_uint32), c.POINTER(c.c_uint32))
-
-
-class StateInterface(c.Structure):
-    _fields_ = (
-        ("save", c.CFUNCTYPE(c.c_int, P, STORE, P, c.c_uint32, P)),
-        ("restore", c.CFUNCTYPE(c.c_int, P, RETRIEVE, P, c.c_uint32, P)),
-    )
+Descriptor = structure(
+    "str uri; ptr(ptr, f64, str, ptr) instantiate; void(ptr, u32, ptr) connect_port; void(ptr) activate;"
+    " void(ptr, u32) run; void(ptr) deactivate; void(ptr) cleanup; ptr(str) extension_data"
+)
+UridMap = structure("ptr handle; u32(ptr, str) map")
+Feature = structure("str uri; ptr data")
+Store = function("i32", "ptr", "u32", "ptr", "size", "u32", "u32")
+Retrieve = function("ptr", "ptr", "u32", "ptr", "ptr", "ptr")
+StateInterface = structure("i32(ptr, ptr, ptr, u32, ptr) save; i32(ptr, ptr, ptr, u32, ptr) restore")
 
 
 class Refused(Exception):
@@ -72,9 +49,9 @@ class Instance:
     ) -> None:
         (binary,) = bundle.glob("*.so")
         find = c.CDLL(str(binary)).lv2_descriptor
-        find.restype = c.POINTER(Descriptor)
-        found = {each.contents.uri: each for each in iter(map(find, range(1000)).__next__, None) if each}
-        self._own = found[f"urn:{id}".encode()].contents
+        find.restype = P
+        described = map(Descriptor.from_address, takewhile(bool, map(find, range(1000))))
+        self._own = next(each for each in described if each.uri == f"urn:{id}".encode())
         self._uris = list[bytes]()
 
         def number(_handle: int, uri: bytes) -> int:
@@ -82,7 +59,7 @@ class Instance:
                 self._uris.append(uri)
             return 1 + self._uris.index(uri)
 
-        self._map = UridMap(None, MAP_FN(number))
+        self._map = filled(UridMap, map=number)
         self._feature = Feature(MAP.encode(), c.addressof(self._map))
         features = (P * 2)(c.addressof(self._feature), None)
         self._midi = number(0, b"http://lv2plug.in/ns/ext/midi#MidiEvent")
@@ -114,7 +91,7 @@ class Instance:
             state[self._uris[key - 1].decode()] = c.string_at(value, size)
             return 0
 
-        assert self._state.save(self._at, STORE(store), None, POD | PORTABLE, None) == 0
+        assert self._state.save(self._at, c.cast(Store(store), P), None, POD | PORTABLE, None) == 0
         return state
 
     def restore(self, state: State, kind: str = CHUNK) -> bool:
@@ -122,20 +99,22 @@ class Instance:
         kept = {key: c.create_string_buffer(value, len(value)) for key, value in state.items()}
         known = self._map.map(None, kind.encode())
 
-        def retrieve(_handle: int, key: int, size: Any, found: Any, flags: Any) -> int | None:
+        def retrieve(_handle: int, key: int, size: int, found: int, flags: int) -> int | None:
             value = kept.get(self._uris[key - 1].decode())
             if value is None:
                 return None
-            size[0], found[0], flags[0] = len(value), known, POD | PORTABLE
+            c.c_size_t.from_address(size).value = len(value)
+            c.c_uint32.from_address(found).value = known
+            c.c_uint32.from_address(flags).value = POD | PORTABLE
             return c.addressof(value)
 
-        return self._state.restore(self._at, RETRIEVE(retrieve), None, 0, None) == 0
+        return self._state.restore(self._at, c.cast(Retrieve(retrieve), P), None, 0, None) == 0
 
     @property
     def _state(self) -> StateInterface:
         at = self._own.extension_data(STATE.encode())
         assert at, "no state"
-        return c.cast(at, c.POINTER(StateInterface)).contents
+        return StateInterface.from_address(at)
 
     def render(self, frames: int, messages: Sequence[tuple[int, bytes]], block: int = 512) -> NDArray[np.float32]:
         """(frames, 2), without the latency; `messages` are pairs of a frame, in order, and three bytes of MIDI."""

@@ -76,15 +76,24 @@ def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controlle
     ]
 
 
+def midi_bytes(event: NoteOn | NoteOff | Bend | Controller) -> tuple[int, int, int]:
+    """The message of an event."""
+    if isinstance(event, NoteOn):
+        return 0x90 | event.channel, event.key, event.velocity
+    if isinstance(event, NoteOff):
+        return 0x80 | event.channel, event.key, 0
+    if isinstance(event, Bend):
+        wheel = 8192 + round(event.value * (8191 if event.value > 0 else 8192))
+        return 0xE0 | event.channel, wheel & 127, wheel >> 7
+    return 0xB0 | event.channel, event.number, event.value
+
+
 def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
     if isinstance(event, NoteOn):
         return note_on(frame, event.key, event.velocity, event.channel)
     if isinstance(event, NoteOff):
         return note_off(frame, event.key, event.channel)
-    if isinstance(event, Bend):
-        wheel = 8192 + round(event.value * (8191 if event.value > 0 else 8192))
-        return midi(frame, 0xE0 | event.channel, wheel & 127, wheel >> 7)
-    return midi(frame, 0xB0 | event.channel, event.number, event.value)
+    return midi(frame, *midi_bytes(event))
 
 
 def played(

@@ -16,45 +16,11 @@ from app.export.plugin.image import Image
 from app.patches.library import SHIPPED, list_patches
 
 PREFIX = "org.learned-strings."
-NAMES = (
-    "My bass!",
-    "my bass-",
-    "My bass",
-    "my bass",
-    "MY BASS",
-    "My-bass",
-    "My  bass",
-    "My bass -",
-    "Bäss",
-    unicodedata.normalize("NFD", "Bäss"),
-    "ﬁddle",
-    "Fiddle",
-    "Straße",
-    "STRASSE",
-    "İstanbul",
-    "istanbul",
-    "Ⅷ",
-    "²",
-    "2",
-    "古琴" * 18,
-    "古琴" * 18 + "!",
-    "é" * 60,
-    "é" * 59 + "è",
-    "🎸" * 300,
-    "🎸" * 299,
-    "!!!",
-    "???",
-    "---",
-    "",
-    " ",
-    "عود",
-    "عود!",
-    "\u202eعود",
-    "a" * 300,
-    "A" + "a" * 299,
-    "Twelve string guitar",  # not the factory's Twelve-string guitar
-    "Ukulele  low G",
-)
+# Names that fold to one another; those of the factory differ from the last two.
+FOLDING = "My bass!|my bass-|My bass|my bass|MY BASS|My-bass|My  bass|My bass -|Bäss|ﬁddle|Fiddle"
+MORE = "Straße|STRASSE|İstanbul|istanbul|Ⅷ|²|2|!!!|???|---|| |عود|عود!|\u202eعود|Twelve string guitar|Ukulele  low G"
+LONG = ("古琴" * 18, "古琴" * 18 + "!", "é" * 60, "é" * 59 + "è", "🎸" * 300, "🎸" * 299, "a" * 300, "A" + "a" * 299)
+NAMES = (*FOLDING.split("|"), *MORE.split("|"), *LONG, unicodedata.normalize("NFD", "Bäss"))
 
 
 def is_valid(id: str) -> bool:
@@ -79,7 +45,7 @@ def respelled(name: str) -> st.SearchStrategy[str]:
 
 
 @given(st.text(max_size=300), st.data())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_a_random_name_and_its_other_spellings_differ(name: str, data: st.DataObject) -> None:
     names = {name, data.draw(respelled(name)), data.draw(st.text(max_size=300))}
     again = {data.draw(respelled(each)) for each in sorted(names)}

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.app.export.plugin.abi import structure
+
 P, I32, U32, F64 = c.c_void_p, c.c_int32, c.c_uint32, c.c_double
 OK, NO_INTERFACE = 0, -1
 COMPONENT = uuid.UUID("E831FF31-F2D5-4301-928E-BBEE25697802").bytes
@@ -24,92 +26,29 @@ TUNING = 2
 AUDIO, EVENTS, INPUT, OUTPUT = 0, 1, 0, 1
 
 
-class Class3(c.Structure):
-    _fields_ = (
-        ("id", c.c_uint8 * 16),
-        ("cardinality", I32),
-        ("category", c.c_char * 32),
-        ("name", c.c_uint16 * 64),
-        ("flags", U32),
-        ("subcategories", c.c_char * 128),
-        ("vendor", c.c_uint16 * 64),
-        ("version", c.c_uint16 * 64),
-        ("sdk", c.c_uint16 * 64),
-    )
+Class3 = structure(
+    "u8[16] id; i32 cardinality; char[32] category; u16[64] name; u32 flags; char[128] subcategories;"
+    " u16[64] vendor; u16[64] version; u16[64] sdk"
+)
+Parameter = structure(
+    "u32 id; u16[128] title; u16[128] short_title; u16[128] units; i32 steps; f64 standard; i32 unit; i32 flags"
+)
+Note = structure("i16 channel; i16 key; f32 cents; f32 velocity; i32 length; i32 id")
+NoteOff = structure("i16 channel; i16 key; f32 velocity; i32 id; f32 cents")
+Expressed = structure("u32 type; i32 note; f64 value")
 
 
-class Parameter(c.Structure):
-    _fields_ = (
-        ("id", U32),
-        ("title", c.c_uint16 * 128),
-        ("short_title", c.c_uint16 * 128),
-        ("units", c.c_uint16 * 128),
-        ("steps", I32),
-        ("standard", F64),
-        ("unit", I32),
-        ("flags", I32),
-    )
-
-
-class Note(c.Structure):
-    _fields_ = (
-        ("channel", c.c_int16),
-        ("key", c.c_int16),
-        ("one", c.c_float),
-        ("velocity", c.c_float),
-        ("length", I32),
-        ("id", I32),
-    )
-
-
-class NoteOff(c.Structure):
-    _fields_ = (
-        ("channel", c.c_int16),
-        ("key", c.c_int16),
-        ("velocity", c.c_float),
-        ("id", I32),
-        ("cents", c.c_float),
-    )
-
-
-class Expressed(c.Structure):
-    _fields_ = (("type", U32), ("note", I32), ("value", F64))
-
-
-class _Content(c.Union):
+class Content(c.Union):
     _fields_ = (("on", Note), ("off", NoteOff), ("expressed", Expressed))
 
 
-class Event(c.Structure):
-    _fields_ = (
-        ("bus", I32),
-        ("frame", I32),
-        ("quarter", F64),
-        ("flags", c.c_uint16),
-        ("type", c.c_uint16),
-        ("content", _Content),
-    )
-
-
-class Setup(c.Structure):
-    _fields_ = (("mode", I32), ("sample_size", I32), ("most_frames", I32), ("rate_hz", F64))
-
-
-class Buffers(c.Structure):
-    _fields_ = (("channels", I32), ("silence", c.c_uint64), ("data", P))
-
-
-class Process(c.Structure):
-    _fields_ = (
-        *((name, I32) for name in ("mode", "sample_size", "frames", "inputs_count", "outputs_count")),
-        ("inputs", P),
-        ("outputs", c.POINTER(Buffers)),
-        ("changes", P),
-        ("changes_out", P),
-        ("events", P),
-        ("events_out", P),
-        ("context", P),
-    )
+Event = structure("i32 bus; i32 frame; f64 quarter; u16 flags; u16 type; Content content", Content=Content)
+Setup = structure("i32 mode; i32 sample_size; i32 most_frames; f64 rate_hz")
+Buffers = structure("i32 channels; u64 silence; ptr data")
+Process = structure(
+    "i32 mode; i32 sample_size; i32 frames; i32 inputs_count; i32 outputs_count; ptr inputs; ptr outputs;"
+    " ptr changes; ptr changes_out; ptr events; ptr events_out; ptr context"
+)
 
 
 class Interface:
@@ -156,15 +95,15 @@ def text(units: Any) -> str:
 
 
 def note_on(key: int, velocity: float, channel: int = 0, id: int = -1, cents: float = 0.0) -> Event:
-    return Event(type=NOTE_ON, content=_Content(on=Note(channel, key, cents, velocity / 127, 0, id)))
+    return Event(type=NOTE_ON, content=Content(on=Note(channel, key, cents, velocity / 127, 0, id)))
 
 
 def note_off(key: int, channel: int = 0) -> Event:
-    return Event(type=NOTE_OFF, content=_Content(off=NoteOff(channel, key, 0.0, -1, 0.0)))
+    return Event(type=NOTE_OFF, content=Content(off=NoteOff(channel, key, 0.0, -1, 0.0)))
 
 
 def tuned(id: int, semitones: float) -> Event:
-    return Event(type=EXPRESSION, content=_Content(expressed=Expressed(TUNING, id, 0.5 + semitones / 240)))
+    return Event(type=EXPRESSION, content=Content(expressed=Expressed(TUNING, id, 0.5 + semitones / 240)))
 
 
 class Library:
@@ -202,7 +141,7 @@ class Instance:
         parts = [component.query(id) for id in (PROCESSOR, CONTROLLER, MIDI_MAPPING, EXPRESSIONS)]
         assert all(parts)
         self.component = component
-        self.processor, self.controller, self.mapping, self.expressions = parts  # type: ignore[assignment]
+        self.processor, self.controller, self.mapping, self.expressions = parts
         assert component.call(3, I32, P()) == OK
         assert component.call(7, I32, I32(AUDIO), I32(OUTPUT)) == component.call(7, I32, I32(EVENTS), I32(INPUT)) == 1
         assert component.call(7, I32, I32(AUDIO), I32(INPUT)) == 0
@@ -211,52 +150,52 @@ class Instance:
 
     def accepts(self, rate_hz: float, most: int = 4096) -> bool:
         setup = Setup(0, 0, most, rate_hz)
-        return bool(self.processor.call(7, I32, c.pointer(setup)) == OK)  # type: ignore[union-attr]
+        return bool(self.processor.call(7, I32, c.pointer(setup)) == OK)
 
     def activate(self, rate_hz: float) -> None:
         assert self.accepts(rate_hz)
         assert self.component.call(11, I32, c.c_uint8(1)) == OK
-        assert self.processor.call(8, I32, c.c_uint8(1)) == OK  # type: ignore[union-attr]
+        assert self.processor.call(8, I32, c.c_uint8(1)) == OK
         self.frame = 0
 
     def destroy(self) -> None:
         """Checks that nothing holds it any more."""
-        assert self.processor.call(8, I32, c.c_uint8(0)) == OK  # type: ignore[union-attr]
+        assert self.processor.call(8, I32, c.c_uint8(0)) == OK
         assert self.component.call(11, I32, c.c_uint8(0)) == OK
         assert self.component.call(4, I32) == OK
         for each in (self.processor, self.controller, self.mapping, self.expressions):
-            assert each.release() > 0  # type: ignore[union-attr]
+            assert each.release() > 0
         assert self.component.release() == 0
 
     @property
     def latency(self) -> int:
-        return int(self.processor.call(6, U32))  # type: ignore[union-attr]
+        return int(self.processor.call(6, U32))
 
     @property
     def parameters(self) -> dict[str, Parameter]:
         found = {}
-        for index in range(self.controller.call(8, I32)):  # type: ignore[union-attr]
+        for index in range(self.controller.call(8, I32)):
             info = Parameter()
-            assert self.controller.call(9, I32, I32(index), c.pointer(info)) == OK  # type: ignore[union-attr]
+            assert self.controller.call(9, I32, I32(index), c.pointer(info)) == OK
             found[text(info.title)] = info
         return found
 
     def value(self, id: int) -> float:
-        return float(self.controller.call(14, F64, U32(id)))  # type: ignore[union-attr]
+        return float(self.controller.call(14, F64, U32(id)))
 
     def set_value(self, id: int, value: float) -> bool:
         """In the controller."""
-        return bool(self.controller.call(15, I32, U32(id), F64(value)) == OK)  # type: ignore[union-attr]
+        return bool(self.controller.call(15, I32, U32(id), F64(value)) == OK)
 
     def shown(self, id: int, value: float) -> str:
         found = (c.c_uint16 * 128)()
-        assert self.controller.call(10, I32, U32(id), F64(value), found) == OK  # type: ignore[union-attr]
+        assert self.controller.call(10, I32, U32(id), F64(value), found) == OK
         return text(found)
 
     def assigned(self, channel: int, number: int) -> int | None:
         """The parameter of a controller."""
         found = U32()
-        result = self.mapping.call(3, I32, I32(0), c.c_int16(channel), c.c_int16(number), c.pointer(found))  # type: ignore[union-attr]
+        result = self.mapping.call(3, I32, I32(0), c.c_int16(channel), c.c_int16(number), c.pointer(found))
         return found.value if result == OK else None
 
     def save(self) -> bytes:
@@ -284,7 +223,7 @@ class Instance:
         stream = Given((I32, (P, I32, P), read), (I32, (P, I32, P), lambda *_: 1))
         found = self.component.call(12, I32, P(stream.at)) == OK
         left[0] = content
-        return (self.controller.call(5, I32, P(stream.at)) == OK) == found and found  # type: ignore[union-attr]
+        return (self.controller.call(5, I32, P(stream.at)) == OK) == found and found
 
     def block(
         self, frames: int, events: Sequence[tuple[int, Event]], changes: Sequence[tuple[int, int, float]] = ()
@@ -331,8 +270,8 @@ class Instance:
         none = (I32, (), lambda: 0)
         answered = Given(none, none, (P, (P, P), add))
         process = Process(
-            0, 0, frames, 0, 1, None, c.pointer(buffers), changed.at, answered.at, listed.at, None, None
+            0, 0, frames, 0, 1, None, c.addressof(buffers), changed.at, answered.at, listed.at, None, None
         )
-        assert self.processor.call(9, I32, c.pointer(process)) == OK  # type: ignore[union-attr]
+        assert self.processor.call(9, I32, c.pointer(process)) == OK
         self.frame += frames
         return out.T.copy()

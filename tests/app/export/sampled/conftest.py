@@ -1,12 +1,11 @@
-"""A patch that is rendered without a model: decaying sines at the patch's own levels."""
+"""A patch that is rendered without a model, decaying sines at the patch's own levels, and players of samples."""
 
 from __future__ import annotations
 
 import math
 import shutil
-import struct
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +13,24 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
+from app.instrument.events import Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes
 from app.patches.patch import Fretted, Patch
 from engine.values.string import StringParameters
 
 T60_S = 2.0
 RATE_HZ = 48_000
+BLOCK = 64
+
+Sound = NDArray[np.floating]
+Render = Callable[..., NDArray[np.float32]]
+PatchOf = Callable[..., Patch]
+Events = Sequence[tuple[float, int, int]]  # time in s, key, velocity; 0 releases
+Play = Callable[[Path, Events, float], Sound]
 
 
 @pytest.fixture
-def patch_of() -> Callable[..., Patch]:
+def patch_of() -> PatchOf:
     """A patch of keys 45 … 64; fields as given."""
 
     def made(**fields: object) -> Patch:
@@ -33,12 +41,12 @@ def patch_of() -> Callable[..., Patch]:
 
 
 @pytest.fixture
-def patch(patch_of: Callable[..., Patch]) -> Patch:
+def patch(patch_of: PatchOf) -> Patch:
     return patch_of()
 
 
 @pytest.fixture
-def render() -> Callable[..., NDArray[np.float32]]:
+def render() -> Render:
     """A sine of the key's pitch, and the softer the wider the pluck; a right channel is 6 dB softer."""
 
     def rendered(
@@ -50,82 +58,47 @@ def render() -> Callable[..., NDArray[np.float32]]:
             decay *= 10 ** (-3 * np.maximum(0, time_s - held_s) / patch.damping.release_t60_s)
         pluck = patch.pluck.pluck(velocity)
         level = pluck.amplitude_mm / 10 * 10 ** (patch.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
-        sound = level * decay * np.sin(2 * math.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
+        sound = level * decay * np.sin(2 * math.pi * hz_of(key) * time_s)
         return np.stack([sound / 2**side for side in range(len(patch.pickup.points))], axis=1).astype(np.float32)
 
     return rendered
 
 
-@pytest.fixture
-def pitch_cents() -> Callable[[NDArray[np.floating], int, int], float]:
-    """How far a sound is from a key's pitch of equal temperament: its strongest partial, by a parabola."""
-
-    def found(sound: NDArray[np.floating], rate_hz: int, key: int) -> float:
-        bins = 2**19
-        spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound)), bins))
-        peak = int(spectrum[1:-1].argmax()) + 1
-        below, top, above = np.log(spectrum[peak - 1 : peak + 2])
-        hz = (peak + 0.5 * (below - above) / (below - 2 * top + above)) * rate_hz / bins
-        return float(1200 * np.log2(hz / (440 * 2 ** ((key - 69) / 12))))
-
-    return found
+def hz_of(key: float) -> float:
+    return 440 * 2 ** ((key - 69) / 12)
 
 
-@pytest.fixture
-def level_db() -> Callable[[NDArray[np.floating]], float]:
+def strongest_hz(sound: Sound, rate_hz: int = RATE_HZ) -> float:
+    """The frequency of the strongest partial, by a parabola."""
+    bins = 2**19
+    spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound)), bins))
+    peak = int(spectrum[1:-1].argmax()) + 1
+    below, top, above = np.log(spectrum[peak - 1 : peak + 2])
+    return (peak + 0.5 * (below - above) / (below - 2 * top + above)) * rate_hz / bins
+
+
+def cents(hz: float, other_hz: float) -> float:
+    return float(1200 * np.log2(hz / other_hz))
+
+
+def level_db(sound: Sound) -> float:
     """Root mean square in dB."""
-    return lambda sound: float(10 * np.log10(np.mean(np.square(sound.astype(np.float64)))))
+    return float(10 * np.log10(np.mean(np.square(sound.astype(np.float64)))))
 
 
-def midi(events: list[tuple[float, int, int]], seconds: float) -> bytes:
-    """A file of one track at a tick a millisecond: (time in s, key, velocity; 0 releases), at full volume."""
-
-    def count(ticks: int) -> bytes:
-        return bytes([ticks >> 14 | 0x80, ticks >> 7 & 0x7F | 0x80, ticks & 0x7F])
-
-    track, now = b"\x00\xb0\x07\x7f", 0
-    for time_s, key, velocity in events:
-        track += count(round(1000 * time_s) - now) + bytes([0x90, key, velocity])
-        now = round(1000 * time_s)
-    track += count(round(1000 * seconds) - now) + b"\xff\x2f\x00"
-    head = b"MThd" + struct.pack(">IHHH", 6, 0, 1, 500)
-    return head + b"MTrk" + struct.pack(">I", len(track)) + track
-
-
-@pytest.fixture
-def play(tmp_path: Path) -> Callable[..., NDArray[np.float64]]:
-    """Plays events by FluidSynth, without its effects: (2, frames)."""
+def by_fluidsynth(path: Path, events: Events, seconds: float) -> Sound:
+    """Events as FluidSynth plays them, without its effects: (2, frames)."""
     program = shutil.which("fluidsynth")
     if program is None:
         pytest.skip("needs FluidSynth, as Debian's package fluidsynth brings it")
-
-    def played(path: Path, events: list[tuple[float, int, int]], seconds: float) -> NDArray[np.float64]:
-        song, out = tmp_path / "song.mid", tmp_path / "song.wav"
-        song.write_bytes(midi(events, seconds))
-        effects = ["-R", "0", "-C", "0", "-g", "1"]
-        words = [
-            program,
-            "-ni",
-            "-q",
-            *effects,
-            "-r",
-            str(RATE_HZ),
-            "-O",
-            "float",
-            "-T",
-            "wav",
-            "-F",
-            out,
-            path,
-            song,
-        ]
-        subprocess.run(words, check=True, capture_output=True)
-        return soundfile.read(out)[0].T
-
-    return played
-
-
-BLOCK = 64
+    song, out = path.with_name("song.mid"), path.with_name("song.wav")
+    timed = [TimedEvent(0.0, Controller(7, 127))]
+    timed += [TimedEvent(at, NoteOn(key, velocity) if velocity else NoteOff(key)) for at, key, velocity in events]
+    song.write_bytes(midi_bytes([*timed, TimedEvent(seconds, Controller(7, 127))]))
+    effects = "-R 0 -C 0 -g 1 -ni -q -O float -T wav"
+    words = [program, *effects.split(), "-r", str(RATE_HZ), "-F", out, path, song]
+    subprocess.run(words, check=True, capture_output=True)
+    return soundfile.read(out)[0].T[:, : round(seconds * RATE_HZ)]
 
 
 class Sfizz:
@@ -133,22 +106,33 @@ class Sfizz:
 
     def __init__(self, path: Path) -> None:
         pysfizz = pytest.importorskip("pysfizz")
-        self._synth = pysfizz.Synth(RATE_HZ, BLOCK)
-        assert self._synth.load_sfz_file(path, quiet=False)
-        self.voices: Callable[[], int] = self._synth._synth.get_num_active_voices
+        synth = pysfizz.Synth(RATE_HZ, BLOCK)
+        assert synth.load_sfz_file(path, quiet=False)
+        self.whole, self.synth = synth, vars(synth)["_synth"]  # the compiled player, which has its notes in real time
 
     def press(self, key: int, velocity: int) -> None:
-        self._synth._synth.note_on(0, key, velocity)
+        self.synth.note_on(0, key, velocity)
 
     def release(self, key: int) -> None:
-        self._synth._synth.note_off(0, key, 0)
+        self.synth.note_off(0, key, 0)
+
+    def voices(self) -> int:
+        return int(self.synth.get_num_active_voices())
 
     def play(self, seconds: float) -> NDArray[np.float32]:
         """(2, frames)."""
         blocks = round(seconds * RATE_HZ / BLOCK)
-        return np.concatenate([np.stack(self._synth._synth.render_block()) for _ in range(blocks)], axis=1)
+        return np.concatenate([np.stack(self.synth.render_block()) for _ in range(blocks)], axis=1)
 
 
-@pytest.fixture
-def sfizz() -> type[Sfizz]:
-    return Sfizz
+def by_sfizz(path: Path, events: Events, seconds: float) -> Sound:
+    player, parts, now = Sfizz(path), [], 0.0
+    for at, key, velocity in events:
+        if at > now:
+            parts.append(player.play(at - now))
+            now = at
+        player.press(key, velocity) if velocity else player.release(key)
+    return np.concatenate([*parts, player.play(seconds - now)], axis=1)
+
+
+PLAYERS: dict[str, Play] = {"sfz": by_sfizz, "sf2": by_fluidsynth}

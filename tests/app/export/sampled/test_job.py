@@ -61,11 +61,6 @@ def test_progress_has_the_note_and_the_time_left(patch: Patch, render: Render, t
     assert [left_s is None for _, _, left_s in reported[:4]] == [True, True, False, False]  # the first also compiles
 
 
-def test_a_soundfont_leaves_no_folder(patch: Patch, render: Render, tmp_path: Path) -> None:
-    export_sampled(small(patch), tmp_path / "a.sf2", render)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.sf2"]
-
-
 @KINDS
 def test_what_a_killed_export_left_goes_with_the_next(
     kind: str, patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -84,14 +79,7 @@ def test_what_a_killed_export_left_goes_with_the_next(
     assert not left.exists()
 
 
-@KINDS
-def test_a_cancelled_export_leaves_nothing(kind: str, patch: Patch, render: Render, tmp_path: Path) -> None:
-    with pytest.raises(Cancelled):
-        export_sampled(small(patch), tmp_path / f"a.{kind}", render, progress=cancelled(lambda: True))
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_cancelling_ends_within_a_note(patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_cancelling_ends_within_a_note_and_leaves_nothing(patch: Patch, render: Render, tmp_path: Path) -> None:
     reached_s: list[float] = []
 
     def slow(*note: object, advanced: Callable[[float], None]) -> np.ndarray:
@@ -107,7 +95,7 @@ def test_cancelling_ends_within_a_note(patch: Patch, render: Render, tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
-def test_cancelling_ends_while_a_soundfont_is_written(
+def test_cancelling_ends_while_a_soundfont_is_written_and_leaves_nothing(
     patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written: list[object] = []
@@ -157,8 +145,6 @@ def test_a_note_that_is_not_finite_is_reported(patch: Patch, tmp_path: Path) -> 
         export_sampled(small(patch), tmp_path / "a.sfz", lambda *_, advanced: np.full((100, 1), np.inf))
     assert not (tmp_path / "a.sfz").exists()
 
-
-def test_a_key_without_a_note_is_reported(patch: Patch, tmp_path: Path) -> None:
     def none(*_: object, **more: object) -> np.ndarray:
         raise ValueError("key 50 has no string")
 
@@ -166,18 +152,14 @@ def test_a_key_without_a_note_is_reported(patch: Patch, tmp_path: Path) -> None:
         export_sampled(small(patch), tmp_path / "a.sfz", none)
 
 
-def test_a_place_that_cannot_be_written_is_reported(patch: Patch, render: Render, tmp_path: Path) -> None:
+@KINDS
+def test_a_place_that_cannot_be_written_is_reported_before_the_work(kind: str, patch: Patch, tmp_path: Path) -> None:
+    (tmp_path / f"a.{kind}").mkdir()
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(WriteError, match="choose another"):
-        export_sampled(small(patch), tmp_path / "file" / "a.sfz", render)
-
-
-@pytest.mark.parametrize("name", ["a.sfz", "a.sf2"])
-def test_a_folder_of_that_name_is_reported_before_the_work(name: str, patch: Patch, tmp_path: Path) -> None:
-    (tmp_path / name).mkdir()
-    with pytest.raises(WriteError, match="not a file that can be replaced"):
-        export_sampled(small(patch), tmp_path / name, lambda *_, advanced: pytest.fail("it was rendered"))
-    assert [path.name for path in tmp_path.iterdir()] == [name]
+    for out, reported in ((f"a.{kind}", "not a file that can be replaced"), (f"file/a.{kind}", "choose another")):
+        with pytest.raises(WriteError, match=reported):
+            export_sampled(small(patch), tmp_path / out, lambda *_, advanced: pytest.fail("it was rendered"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"a.{kind}", "file"]
 
 
 def test_where_the_text_cannot_be_written_earlier_samples_stay(

@@ -1,19 +1,16 @@
-"""The attack: damaged files to every reader. Each is refused in one line by its own error, or does no harm."""
+"""Every reader of files: a whole file of its kind, how it is damaged, and the error that is the reader's own."""
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import random
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import soundfile
 import torch
 
@@ -21,14 +18,11 @@ from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
 from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
-from app.instrument.bodies import own_bodies
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi, read_song
 from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import PatchError, list_patches, read_patch
+from app.patches.library import PatchError, read_patch
 from app.patches.tuning import Tuning, TuningChoice, read_scala
-from app.presets.library import Library, list_presets
-from app.window.dropped_files import receive
 from app.window.settings import Settings, load_settings
 from engine.effects import Body, Effects
 from engine.pluck import Pluck
@@ -42,12 +36,11 @@ from engine.presets import (
     read_string,
 )
 from engine.resonators.sine_transform import project
-from engine.schema import SchemaError, write
+from engine.schema import SchemaError
 from engine.sources import ModelSource, Runaway, TruthSource
 from engine.values.ear import Ear
 from engine.voices import model_program, render_voice, truth_program
-from tests.fuzz.costs import MOST_MB, Costs
-from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
+from tests.fuzz.mutations import damaged_bytes, damaged_preset, damaged_text
 from training.cell import load
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
@@ -55,6 +48,9 @@ from training.results import Row, add_rows, read_results
 from training.sweeping.plan import load_plan
 
 FRAMES = 32
+ONE_STRING = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+MANY_STRINGS = SHIPPED / "studio_any_string.safetensors"
+DMD = SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors"
 
 
 def in_one_line(error: Exception, path: Path) -> None:
@@ -62,10 +58,9 @@ def in_one_line(error: Exception, path: Path) -> None:
     assert len(reported) <= 500 and reported.isprintable() and str(path) in reported, reported[:700]
 
 
-def use(path: Path, costs: Costs) -> None:
-    """Loads a preset and plays it: its model, its physics, and both as they are heard."""
-    with costs.reading():
-        preset = load_preset(path)
+def play(path: Path) -> None:
+    """Load a preset and play it: its model, its physics, and both as they are heard."""
+    preset = load_preset(path)
     info = preset.info
     initial_m = project(Pluck().displacement(info.grid_points), info.modes)
     outside_training(info, Pluck())
@@ -86,53 +81,6 @@ def use(path: Path, costs: Costs) -> None:
             assert bool(np.isfinite(sound).all())
     except Runaway:
         return
-
-
-@pytest.mark.parametrize("name", ["small", "nylon_nonlinear_4k", "dmd", "any_string"])
-def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
-    shipped = {
-        "nylon_nonlinear_4k": SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors",
-        "any_string": SHIPPED / "studio_any_string.safetensors",
-        "dmd": SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors",
-    }
-    whole = shipped.get(name, small_preset).read_bytes()
-    path = tmp_path / "stranger.safetensors"
-    shutil.copy(small_preset, tmp_path / "good.safetensors")
-    path.write_bytes(whole)
-    use(path, Costs())  # what is loaded once costs no later reading
-    costs = Costs()
-
-    def attack(draw: random.Random) -> None:
-        path.write_bytes(damaged_preset(whole, draw))
-        try:
-            use(path, costs)
-        except PresetError as error:
-            in_one_line(error, path)
-        with costs.reading():
-            entries, problems = list_presets(tmp_path)
-        assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
-
-    attacked(f"presets ({name})", rounds // 4, seed, attack, costs)
-
-
-def test_patches(tmp_path: Path, rounds: int, seed: int) -> None:
-    """A stranger's patch, with a scale and a mapping, is listed or reported, and hides no other."""
-    tuning = {"scale": SCALE.decode(), "keymap": "0\n0\n127\n60\n69\n440.0\n5\n"}
-    facts = {**json.loads(PATCH.read_bytes()), "tuning": tuning}
-    whole, path = json.dumps(facts).encode(), tmp_path / "stranger.json"
-    (tmp_path / "good.json").write_bytes(whole)
-    list_patches(tmp_path)
-    costs = Costs()
-
-    def attack(draw: random.Random) -> None:
-        path.write_bytes(json_or_bytes(whole, draw))
-        with costs.reading():
-            entries, problems = list_patches(tmp_path)
-        assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
-        for problem in problems:
-            in_one_line(ValueError(problem), path)
-
-    attacked("patches", rounds // 4, seed, attack, costs)
 
 
 @dataclass(frozen=True)
@@ -210,7 +158,7 @@ def impulse(folder: Path, kind: str, subtype: str) -> bytes:
 
 
 def sounded(path: Path) -> None:
-    """Reads an impulse response and makes it what the mixer would be given."""
+    """Read an impulse response and make it what the mixer would be given."""
     found = Effects(Body(impulse=read_impulse(path))).impulse(48_000)
     assert bool(np.isfinite(found).all()) and len(found) <= 3 * 48_000
 
@@ -247,7 +195,7 @@ def settings(path: Path) -> None:
 
 
 def scala(path: Path) -> None:
-    """Reads a .scl or .kbm, and asks for every pitch."""
+    """Read a .scl or .kbm, and ask for every pitch."""
     text = read_scala(path)
     tuning = Tuning(TuningChoice.model_validate({"keymap" if path.suffix == ".kbm" else "scale": text}))
     assert all(0 < tuning.hz(key) < np.inf for key in range(128))
@@ -269,7 +217,7 @@ MPE = read_patch(PATCHES / "long_wire.json").model_copy(update={"mode": "mpe"})
 
 
 def song(path: Path) -> None:
-    """Reads a MIDI file, and writes what it says."""
+    """Read a MIDI file, and write what it says."""
     events = read_midi(path)
     assert read_song(path, MPE).events == events
     assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
@@ -321,7 +269,32 @@ multiplier_widths = [8]
 HEARD = f"{','.join(COLUMNS)}\na,{'0' * 64},4,0.5,-1,0,0.1,,,1\n".encode()
 
 
+def recipe(preset: Path) -> Callable[[Path], None]:
+    def read(path: Path) -> None:
+        found = read_recipe(path)
+        request_of(found, load_preset(preset), path)
+        assert found.settings.fade_out_s <= 600
+
+    return read
+
+
 TARGETS = (
+    *(
+        Target(
+            f"{path.stem}.safetensors", lambda p, path=path: path.read_bytes(), play, (PresetError,), damaged_preset
+        )
+        for path in (ONE_STRING, MANY_STRINGS, DMD)
+    ),
+    *(
+        Target(
+            f"{path.stem}.wav",
+            lambda p, path=path: wav(p, recipe_text(path)),
+            recipe(path),
+            (RecipeError,),
+            damaged_wav,
+        )
+        for path in (ONE_STRING, MANY_STRINGS)
+    ),
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
     Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),
@@ -339,119 +312,3 @@ TARGETS = (
     Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
     Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
 )
-
-
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_readers(target: Target, tmp_path: Path, rounds: int, seed: int) -> None:
-    folder = tmp_path / "there"
-    folder.mkdir()
-    whole, path = target.whole(tmp_path), folder / target.name
-    path.write_bytes(whole)
-    with contextlib.suppress(*target.errors):  # what is loaded once costs no later reading
-        target.read(path)
-    costs = Costs()
-
-    def attack(draw: random.Random) -> None:
-        path.write_bytes(target.damaged(whole, draw))
-        try:
-            with costs.reading():
-                target.read(path)
-        except target.errors as error:
-            in_one_line(error, path)
-        assert {each.name for each in folder.iterdir()} <= {target.name}
-
-    attacked(target.name, rounds // len(TARGETS), seed, attack, costs)
-
-
-@pytest.mark.parametrize("of", ["one string", "many strings"])
-def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
-    file = small_preset if of == "one string" else SHIPPED / "studio_any_string.safetensors"
-    preset = load_preset(file)
-    whole, path = wav(tmp_path, recipe_text(file)), tmp_path / "stranger.wav"
-    path.write_bytes(whole)
-    read_recipe(path)
-    costs = Costs()
-
-    def attack(draw: random.Random) -> None:
-        path.write_bytes(damaged_wav(whole, draw))
-        try:
-            with costs.reading():
-                recipe = read_recipe(path)
-            request_of(recipe, preset, path)
-            assert recipe.settings.fade_out_s <= 600
-        except RecipeError as error:
-            in_one_line(error, path)
-
-    attacked(f"recipes of {of}", rounds // 4, seed, attack, costs)
-
-
-def test_what_is_dropped(
-    small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A sound is a recipe's, a recording, a body, or refused: its reader is chosen by what is in it."""
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
-    library = Library([])
-    recorded = wav(tmp_path, played_text())
-    wholes = (wav(tmp_path, recipe_text(small_preset)), recorded, impulse(tmp_path, "WAV", "PCM_16"))
-    path = tmp_path / "recorded.wav"
-    path.write_bytes(recorded)
-    assert "is a recording of Classical guitar" in receive(path, library).notice
-    path = tmp_path / "dropped.wav"
-
-    def attack(draw: random.Random) -> None:
-        path.write_bytes(damaged_wav(draw.choice(wholes), draw))
-        dropped = receive(path, library)
-        assert dropped.notice.isprintable() and len(dropped.notice) <= 600
-        assert dropped.body in ("", "dropped") or dropped.body.startswith("dropped_")
-        for body in own_bodies().glob("*"):
-            body.unlink()
-
-    attacked("dropped sounds", rounds // 16, seed, attack)
-
-
-def test_damage_depends_on_its_seed_alone() -> None:
-    """Or a failure could not be repeated: values that were put into one file were damaged for the next."""
-    before = repr(HOSTILE)
-    for number in range(400):
-        damaged_value({"a": [1, 2], "b": {"c": 3}}, random.Random(number))
-        assert repr(HOSTILE) == before, number
-
-
-def test_a_whole_file_of_each_kind_is_read(small_preset: Path, tmp_path: Path) -> None:
-    """Or the attack would show nothing."""
-    for target in TARGETS[:-1]:
-        path = tmp_path / target.name
-        path.write_bytes(target.whole(tmp_path))
-        target.read(path)
-    (tmp_path / "whole.wav").write_bytes(wav(tmp_path, recipe_text(small_preset)))
-    read_recipe(tmp_path / "whole.wav")
-    use(small_preset, Costs())
-    assert write(load(str(tmp_path / "run.toml")).data)["modes"] == 10
-
-
-HUGE_BYTES = 3 * 2**30
-
-
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_a_huge_file_costs_little(target: Target, tmp_path: Path) -> None:
-    """Its first bytes are those of a whole one; the rest, which takes no place on the disk, is zero."""
-    folder = tmp_path / "there"
-    folder.mkdir()
-    path = folder / target.name
-    path.write_bytes(target.whole(tmp_path))
-    with contextlib.suppress(*target.errors):
-        target.read(path)
-    with path.open("r+b") as file:
-        file.truncate(HUGE_BYTES)
-    costs = Costs()
-    with contextlib.suppress(*target.errors), costs.reading():
-        target.read(path)
-    assert (costs.largest_mb or 0) <= MOST_MB, costs
-
-
-def test_what_a_reading_costs_is_measured() -> None:
-    """Or the attack would show nothing of it."""
-    costs = Costs()
-    with costs.reading():
-        np.ones(10_000_000)
-    assert costs.largest_mb is None or 70 <= costs.largest_mb <= 100

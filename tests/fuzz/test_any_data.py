@@ -1,4 +1,4 @@
-"""Any bytes, and any data, to any reader: a value, or that reader's own error."""
+"""Any data to any reader: a value, or that reader's own error."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
 from engine import bounds
 from engine.plain_text import LONGEST_MESSAGE, one_line
-from engine.presets import PresetError, PresetInfo, load_preset
+from engine.presets import PresetInfo
 from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, explained, parse_json, read, write
 from engine.truth import SplittingSolver
 from engine.values.string import StringParameters
-from tests.fuzz.test_attack import TARGETS, Target
 from training.configuration import TrainingConfiguration
 
 NUMBERS = st.integers() | st.floats() | st.sampled_from([10**400, 2**63, -(2**64)])
@@ -30,26 +29,6 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=5) | st.dictionaries(st.text(max_size=10), inner, max_size=5),
     max_leaves=20,
 )
-
-
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-@given(data=st.binary(max_size=400))
-def test_any_bytes(target: Target, tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
-    path = tmp_path_factory.getbasetemp() / "any" / target.name
-    path.parent.mkdir(exist_ok=True)
-    path.write_bytes(data)
-    try:
-        target.read(path)
-    except target.errors as error:
-        assert str(error).isprintable() and len(str(error)) <= LONGEST_MESSAGE
-
-
-@given(data=st.binary(max_size=400))
-def test_any_bytes_are_no_preset(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
-    path = tmp_path_factory.getbasetemp() / "any.safetensors"
-    path.write_bytes(data)
-    with pytest.raises(PresetError):
-        load_preset(path)
 
 
 def fields_of(kind: type, *more: str) -> st.SearchStrategy[dict[str, Any]]:

@@ -1,0 +1,296 @@
+"""Hostile files to every reader: each is refused in one line by its own error, or does no harm, at little cost."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.export.recipe import Recipe
+from app.instrument.bodies import own_bodies
+from app.instrument.midi_file import MOST_EVENTS, read_midi
+from app.patches.library import list_patches
+from app.patches.tuning import Tuning, TuningChoice
+from app.presets.library import Library, list_presets
+from app.window.dropped_files import receive
+from app.window.settings import Settings, load_settings
+from engine.folders import usable_files
+from engine.plain_text import LONGEST_MESSAGE
+from engine.presets import preset_digest
+from engine.read_file import UnusableFile, read_bounded
+from engine.schema import read_toml
+from tests.fuzz.costs import MOST_MB, Costs
+from tests.fuzz.mutations import HOSTILE, attacked, damaged_preset, damaged_value
+from tests.fuzz.readers import (
+    KEYMAP,
+    PATCH,
+    SCALE,
+    TARGETS,
+    Target,
+    damaged_wav,
+    impulse,
+    in_one_line,
+    json_or_bytes,
+    played_text,
+    recipe_text,
+    wav,
+)
+from training.heard_file import read_heard
+
+EVERY = pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+OF_NAME = {target.name: target for target in TARGETS}
+HUGE_BYTES = 3 * 2**30
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    path = tmp_path / "there"
+    path.mkdir()
+    return path
+
+
+def cost_of(target: Target, path: Path, costs: Costs | None = None) -> Costs:
+    """The cost of a reading, which is refused by the reader's own error, or does no harm."""
+    costs = costs or Costs()
+    try:
+        with costs.reading():
+            target.read(path)
+    except target.errors as error:
+        in_one_line(error, path)
+    return costs
+
+
+@EVERY
+def test_a_whole_file_is_read_and_a_damaged_or_huge_one_does_no_harm(
+    target: Target, folder: Path, tmp_path: Path, rounds: int, seed: int
+) -> None:
+    """Only the first reading pays what is loaded once. The rest of a huge file takes no place on the disk."""
+    whole, path = target.whole(tmp_path), folder / target.name
+    path.write_bytes(whole)
+    target.read(path)
+    costs = Costs()
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(target.damaged(whole, draw))
+        cost_of(target, path, costs)
+        assert {each.name for each in folder.iterdir()} <= {target.name}
+
+    attacked(target.name, rounds // 10, seed, attack, costs)
+    path.write_bytes(whole)
+    with path.open("r+b") as file:
+        file.truncate(HUGE_BYTES)
+    costs = cost_of(target, path)
+    assert (costs.largest_mb or 0) <= MOST_MB, costs
+
+
+@EVERY
+@given(data=st.binary(max_size=400))
+def test_any_bytes_are_read_or_refused(target: Target, tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+    path = tmp_path_factory.getbasetemp() / "any" / target.name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(data)
+    try:
+        target.read(path)
+        assert target.errors == () or path.suffix not in (".safetensors", ".wav", ".flac", ".mid")
+    except target.errors as error:
+        assert str(error).isprintable() and len(str(error)) <= LONGEST_MESSAGE
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+@EVERY
+def test_a_pipe_keeps_nobody_waiting(target: Target, folder: Path) -> None:
+    os.mkfifo(folder / target.name)
+    reported: list[BaseException | None] = []
+
+    def attempt() -> None:
+        try:
+            reported.append(target.read(folder / target.name))  # type: ignore[func-returns-value, arg-type]
+        except BaseException as caught:
+            reported.append(caught)
+
+    thread = threading.Thread(target=attempt, daemon=True)
+    thread.start()
+    thread.join(20)
+    assert reported and isinstance(reported[0], target.errors or type(None)), reported
+
+
+def midi(track: bytes) -> bytes:
+    head = b"MThd" + (6).to_bytes(4, "big") + b"\x00\x00\x00\x01\x01\xe0"
+    return head + b"MTrk" + len(track).to_bytes(4, "big") + track
+
+
+BOMBS: dict[str, tuple[str, bytes | str]] = {  # small files that would cost gigabytes or minutes
+    "a key of bare parts": ("string.toml", "a." * 30_000 + "a=1"),
+    "a key of quoted parts": ("string.toml", '"=".' * 15_000 + "a=1"),
+    "a key of literal parts": ("string.toml", "'='." * 15_000 + "a=1"),
+    "a key of escaped parts": ("string.toml", r'"\"".' * 12_000 + "a=1"),
+    "a key of spaced parts": ("string.toml", "a . " * 15_000 + "a=1"),
+    "a key of parts inline": ("string.toml", "x={" + "a." * 30_000 + "a=1}"),
+    "a table of many parts": ("string.toml", "[" + "a." * 30_000 + "a]"),
+    "quotes without end": ("string.toml", '"\\"' + '\\"' * 30_000),
+    "quotes of both kinds": ("string.toml", "\"'" * 30_000),
+    "words": ("string.toml", "a" * 60_000),
+    "a time without end": ("song.mid", midi(b"\xff" * (2**20 - 40))),
+    "a length without end": ("song.mid", midi(b"\x00\xff\x01" + b"\xff" * (2**20 - 40))),
+    "a time within a chunk of another name": ("song.mid", midi(b"\x00\x90\x3c\x40" + b"\x80" * 9)),
+    "too many messages": ("song.mid", midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * MOST_EVENTS)),
+    "a system message that never ends": ("song.mid", midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000)),
+    "empty lines": ("rows.csv", "\n" * 2**21),
+    "empty rows": ("rows.csv", ",\n" * 2**20),
+    "rows of one column": ("rows.csv", "digest\n" + "a\n" * 2**20),
+}
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_a_small_file_that_would_cost_much_is_refused(kind: str, folder: Path) -> None:
+    name, content = BOMBS[kind]
+    path, target, costs = folder / name, OF_NAME[name], Costs()
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(target.errors) as caught, costs.reading():
+        target.read(path)
+    in_one_line(caught.value, path)
+    assert (costs.largest_mb or 0) <= MOST_MB, costs
+
+
+def test_ordinary_dots_and_the_largest_song_are_read(folder: Path) -> None:
+    path = folder / "a.toml"
+    path.write_text(f'a.b."c.d".e = [{", ".join(["0.5"] * 900)}]\nversion = "1.2.3.4.5.6.7.8"\n[x.y.z]\nk = 1e-3\n')
+    assert read_toml(path)["a"]["b"]["c.d"]["e"] == [0.5] * 900
+    path, costs = folder / "song.mid", Costs()
+    path.write_bytes(midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * (MOST_EVENTS - 2) + b"\x00\xff\x2f\x00"))
+    with costs.reading():
+        read_midi(path)
+    assert (costs.largest_mb or 0) <= MOST_MB, costs
+
+
+SETTINGS: dict[str, dict[str, object]] = {
+    "favourites": {"favourites": [1] * 150_000},
+    "favourites of instruments": {"patch_favourites": [{}] * 150_000},
+    "choices": {"choices": {f"{n}": 1 for n in range(80_000)}},
+    "some": {"favourites": [1] * 30_000, "window_geometry": "kept"},
+}
+
+
+@pytest.mark.parametrize("kind", SETTINGS)
+def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(kind: str, folder: Path) -> None:
+    path, costs = folder / "settings.json", Costs()
+    path.write_text(json.dumps(SETTINGS[kind]))
+    with costs.reading():
+        settings, notice = load_settings(path)
+    assert settings.model_copy(update={"window_geometry": ""}) == Settings() and len(notice) <= 500
+    assert (settings.window_geometry == "kept") if kind == "some" else ("set aside" in notice)
+    assert (costs.largest_mb or 0) <= MOST_MB, costs
+
+
+def test_numbers_of_many_digits_are_bounded_before_any_arithmetic() -> None:
+    assert Recipe.model_fields["preset_rate_hz"].metadata
+    with pytest.raises(ValueError, match="preset_rate_hz"):
+        Recipe.model_validate({"preset_rate_hz": 10**400})
+    for first in ("610000.", "-610000."):  # pitches that cannot be squared
+        with pytest.raises(ValueError, match="scale"):
+            Tuning(TuningChoice.model_validate({"scale": f"! a\na\n 2\n {first}\n 2/1\n"}))
+
+
+# Folders: a stranger's file is listed or reported, and hides no other
+
+
+def lists_good(lister: Callable[[Path], tuple[list, list[str]]], folder: Path, path: Path, costs: Costs) -> None:
+    with costs.reading():
+        entries, problems = lister(folder)
+    assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
+    for problem in problems:
+        in_one_line(ValueError(problem), path)
+
+
+@pytest.mark.parametrize("kind", ["presets", "patches"])
+def test_a_strangers_file_hides_no_other(kind: str, folder: Path, small_preset: Path, rounds: int, seed: int) -> None:
+    facts = {**json.loads(PATCH.read_bytes()), "tuning": {"scale": SCALE.decode(), "keymap": KEYMAP.decode()}}
+    whole, damage, lister, ending = {
+        "presets": (small_preset.read_bytes(), damaged_preset, list_presets, "safetensors"),
+        "patches": (json.dumps(facts).encode(), json_or_bytes, list_patches, "json"),
+    }[kind]
+    (folder / f"good.{ending}").write_bytes(whole)
+    path, costs = folder / f"stranger.{ending}", Costs()
+    lister(folder)
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(damage(whole, draw))
+        lists_good(lister, folder, path, costs)
+
+    attacked(kind, rounds // 4, seed, attack, costs)
+
+
+def test_a_dropped_sound_is_a_recipe_a_recording_a_body_or_refused(
+    small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its reader is chosen by what is in it."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    library = Library([])
+    recorded = wav(tmp_path, played_text())
+    wholes = (wav(tmp_path, recipe_text(small_preset)), recorded, impulse(tmp_path, "WAV", "PCM_16"))
+    (tmp_path / "recorded.wav").write_bytes(recorded)
+    assert "is a recording of Classical guitar" in receive(tmp_path / "recorded.wav", library).notice
+    path = tmp_path / "dropped.wav"
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(damaged_wav(draw.choice(wholes), draw))
+        dropped = receive(path, library)
+        assert dropped.notice.isprintable() and len(dropped.notice) <= 600
+        assert dropped.body in ("", "dropped") or dropped.body.startswith("dropped_")
+        for body in own_bodies().glob("*"):
+            body.unlink()
+
+    attacked("dropped sounds", rounds // 16, seed, attack)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_pipes_and_folders_that_cannot_be_looked_into_hide_nothing(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, small_preset: Path
+) -> None:
+    for name in ("settings.json", "heard.csv", "x.safetensors"):
+        os.mkfifo(folder / name)
+    assert load_settings(folder / "settings.json")[0] == Settings()
+    assert read_heard(folder)[0] == {}
+    with contextlib.suppress(ValueError):
+        preset_digest(folder / "x.safetensors")
+    entries, problems = list_presets(folder)
+    assert entries == [] and len(problems) == 2
+    unreadable = folder / ("x" * 300)  # its name is too long for any disk
+    entries, problems = list_presets(small_preset.parent, unreadable)
+    assert small_preset.stem in [entry.name for entry in entries]
+    assert any("cannot be looked into" in problem for problem in problems)
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(unreadable))
+    assert usable_files()
+
+
+def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path: Path) -> None:
+    for path, reported in ((tmp_path, "ordinary"), (Path("a\0b"), "name")):
+        with pytest.raises(UnusableFile, match=reported):
+            read_bounded(path, 10)
+    (tmp_path / "a").write_bytes(b"12345678901")
+    with pytest.raises(UnusableFile, match="larger than"):
+        read_bounded(tmp_path / "a", 10)
+    assert read_bounded(tmp_path / "a", 11) == b"12345678901"
+
+
+# The attack itself: or it would show nothing
+
+
+def test_damage_depends_on_its_seed_alone_and_a_readings_cost_is_measured() -> None:
+    before = repr(HOSTILE)
+    for number in range(400):
+        damaged_value({"a": [1, 2], "b": {"c": 3}}, random.Random(number))
+        assert repr(HOSTILE) == before, number
+    costs = Costs()
+    with costs.reading():
+        np.ones(10_000_000)
+    assert costs.largest_mb is None or 70 <= costs.largest_mb <= 100
