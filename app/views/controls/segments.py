@@ -28,7 +28,6 @@ class Segments(QWidget):
         super().__init__()
         self.setAccessibleName(name)
         self._group = QButtonGroup(self)
-        self._group.setExclusive(not switches)
         self._keys: list[str] = []
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
@@ -39,7 +38,11 @@ class Segments(QWidget):
             button.setCheckable(True)
             button.setStyleSheet(SMALL)
             button.setChecked(not switches and not self._keys)
-            self._group.addButton(button, len(self._keys))
+            if switches:  # in a group, Tab and the arrow keys would reach the first alone
+                button.toggled.connect(lambda down, row=len(self._keys): self._toggled(row, down))
+                button.clicked.connect(lambda _=False, key=key: self.clicked.emit(key))
+            else:
+                self._group.addButton(button, len(self._keys))
             self._keys.append(key)
             row.addWidget(button)
         self._group.idToggled.connect(self._toggled)

@@ -13,7 +13,6 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
-import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QAccessible, QColor, QImage
@@ -24,12 +23,13 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDialog,
+    QFileDialog,
     QLabel,
     QLineEdit,
     QMenu,
+    QPushButton,
     QScrollArea,
     QTabBar,
-    QTextEdit,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -107,8 +107,26 @@ def made_deck() -> QWidget:
     return made
 
 
+def filtered() -> QWidget:
+    made = filter_button.FilterButton("presets")
+    made.show_listed(2, 3)
+    return made
+
+
+def with_ring() -> QWidget:
+    plot = time_plot.TimePlot("A plot", "A tip")
+    focus_ring.FocusRing(plot)
+    return plot
+
+
+def notice() -> QWidget:
+    made = notice_bar.NoticeBar()
+    made.report("No sound.", "device 3")
+    return made
+
+
 def made_legend() -> QWidget:
-    plot = pg.PlotWidget()
+    plot = time_plot.TimePlot("A plot", "A tip")
     plot.legend = legend.Legend(plot)
     return plot
 
@@ -123,13 +141,26 @@ def export_at(kind: export_pages.Kind) -> Callable[[], QWidget]:
 
 
 def learn() -> QWidget:
-    return learn_dialog.LearnDialog(Path(__file__), make_sound())
+    sound = make_sound()
+    made = learn_dialog.LearnDialog(Path(__file__), sound)
+    made.finished.connect(sound.close)
+    return made
 
 
 def abx() -> QWidget:
     rendered: Future[dict[str, np.ndarray]] = Future()
     rendered.set_result({name: np.ones((480, 1), np.float32) for name in ("model", "truth")})
-    return abx_dialog.AbxDialog(make_sound(), MATERIAL, AbxChoices(), lambda rate_hz: rendered)
+    sound = make_sound()
+    made = abx_dialog.AbxDialog(sound, MATERIAL, AbxChoices(), lambda rate_hz: rendered)
+    made.finished.connect(sound.close)
+    return made
+
+
+def with_name(part: QWidget) -> QWidget:
+    """A part, named as by its owner."""
+    part.setAccessibleName("A part")
+    part.setToolTip("A tip")
+    return part
 
 
 def with_text(label: QLabel) -> QLabel:
@@ -140,19 +171,19 @@ def with_text(label: QLabel) -> QLabel:
 MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     app_menu.AppMenu: app_menu.AppMenu,
     browser.Browser: patch_card.patch_browser,
-    browser_rows.RowList: lambda: browser_rows.RowList((browser_rows.Column("Instrument"),)),
+    browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.Column("Name"),))),
     deck.Deck: made_deck,
     drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
     elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
-    filter_button.FilterButton: lambda: filter_button.FilterButton("presets"),
-    focus_ring.FocusRing: lambda: focus_ring.FocusRing(QWidget()),
+    filter_button.FilterButton: filtered,
+    focus_ring.FocusRing: with_ring,
     form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
     knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
     meter.Meter: meter.Meter,
-    name_button.NameButton: lambda: name_button.NameButton("A name"),
+    name_button.NameButton: lambda: with_name(name_button.NameButton("A name")),
     note_box.NoteBox: lambda: note_box.NoteBox("Lowest key", "The lowest"),
     notice_bar.Bell: notice_bar.Bell,
-    notice_bar.NoticeBar: notice_bar.NoticeBar,
+    notice_bar.NoticeBar: notice,
     notice_list.NoticeList: notice_list.NoticeList,
     number_box.NumberBox: lambda: form.spin_box("Length", (0, 5), 1, "The length", " m", 2),
     number_box.CountBox: lambda: form.count_box("Trials", 50, 16, "How many"),
@@ -170,7 +201,7 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     figures_table.FiguresTable: lambda: figures_table.FiguresTable(
         "Figures", [figures_table.Column("name", "name", "a name")]
     ),
-    kept_plot.KeptPlot: kept_plot.KeptPlot,
+    kept_plot.KeptPlot: lambda: with_name(kept_plot.KeptPlot()),
     legend.Legend: made_legend,
     pointed_plot.PointedPlot: lambda: pointed_plot.PointedPlot("A plot", "A tip"),
     time_plot.TimePlot: lambda: time_plot.TimePlot("A plot", "A tip"),
@@ -210,10 +241,11 @@ def test_every_view_has_a_maker() -> None:
     assert found - {None} == set(MAKERS)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def themes(qapp: QApplication) -> Iterator[None]:
     """Plots follow the theme; afterwards all is as it was."""
     style, palette, font = qapp.styleSheet(), qapp.palette(), qapp.font()
+    theme.apply_theme(qapp, "dark")
     theme.changes.theme_changed.connect(plots.recolour)
     yield
     theme.changes.theme_changed.disconnect(plots.recolour)
@@ -229,7 +261,10 @@ def view(
     request: pytest.FixtureRequest, themes: None, qtbot: QtBot, qapp: QApplication, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[QWidget]:
     """An empty one, shown: a dialog alone, another in the column of a window."""
-    theme.apply_theme(qapp, "dark")
+    for name in ("getSaveFileName", "getOpenFileName", "getExistingDirectory"):
+        monkeypatch.setattr(QFileDialog, name, lambda *_: ("", ""))
+    if theme.present != theme.DARK:
+        theme.apply_theme(qapp, "dark")
     made = MAKERS[request.param]()
     window = made if isinstance(made, QDialog) else QWidget()
     qtbot.addWidget(window)
@@ -271,17 +306,24 @@ def name_of(widget: QWidget) -> str:
 def test_each_control_has_a_name_and_what_is_pressed_or_chosen_a_tip(view: QWidget) -> None:
     for each in controls(view):
         assert name_of(each), each
-        plain_button = isinstance(each, QAbstractButton) and name_of(each) in ("Close", "Cancel", "Continue")
-        if isinstance(each, QAbstractButton | QComboBox | QAbstractSpinBox) and not plain_button:
+        ends = isinstance(each, QPushButton) and (each.isDefault() or name_of(each) in ("Close", "Cancel"))
+        if isinstance(each, QAbstractButton | QComboBox | QAbstractSpinBox) and not ends:
             assert each.toolTip() or isinstance(each.parent(), QTabBar), name_of(each)
 
 
 def test_the_keyboard_alone_reaches_and_works_each_control(qtbot: QtBot, view: QWidget) -> None:
-    wanted, reached = set(controls(view)), set()
+    wanted, reached = set(controls(view)), set[QWidget]()
     for _ in range(2 * len(wanted) + 4):
         here = QApplication.focusWidget() or view.window()
         reached.add(here)
-        QTest.keyClick(here, Qt.Key.Key_Backtab if isinstance(here, QTextEdit) else Qt.Key.Key_Tab)
+        if isinstance(here, QAbstractButton) and here.group():
+            for key in (Qt.Key.Key_Right, Qt.Key.Key_Down) * len(
+                here.group().buttons()
+            ):  # arrows pass through a group
+                QTest.keyClick(QApplication.focusWidget(), key)
+                reached.add(QApplication.focusWidget())
+        QTest.keyClick(QApplication.focusWidget() or here, Qt.Key.Key_Tab)
+    wanted &= {each for each in wanted if each.isVisible()}  # a choice may have hidden what it is not of
     assert wanted <= reached, [name_of(each) for each in wanted - reached]
     arrows = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Home, Qt.Key.Key_End)
     for each in wanted:
