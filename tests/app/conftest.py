@@ -64,7 +64,16 @@ def threads_begun() -> Iterator[Callable[[], list[str]]]:
     assert not begun()
 
 
-COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
+COLLECT_ALL_EVERY = 50  # tests
+
+
+@pytest.fixture(scope="session", autouse=True)
+def imports_are_frozen() -> Iterator[None]:
+    """A look at all of torch takes a quarter of a second: what modules hold is no garbage."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)
