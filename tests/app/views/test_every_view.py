@@ -10,6 +10,7 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -256,15 +257,26 @@ def themes(qapp: QApplication) -> Iterator[None]:
     qapp.setFont(font)
 
 
+@pytest.fixture
+def size_percent() -> int:
+    """The size of the text."""
+    return 100
+
+
 @pytest.fixture(params=MAKERS, ids=lambda kind: kind.__name__)
 def view(
-    request: pytest.FixtureRequest, themes: None, qtbot: QtBot, qapp: QApplication, monkeypatch: pytest.MonkeyPatch
+    request: pytest.FixtureRequest,
+    themes: None,
+    size_percent: int,
+    qtbot: QtBot,
+    qapp: QApplication,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[QWidget]:
     """An empty one, shown: a dialog alone, another in the column of a window."""
     for name in ("getSaveFileName", "getOpenFileName", "getExistingDirectory"):
         monkeypatch.setattr(QFileDialog, name, lambda *_: ("", ""))
-    if theme.present != theme.DARK:
-        theme.apply_theme(qapp, "dark")
+    if theme.present != replace(theme.DARK, scale=size_percent / 100):
+        theme.apply_theme(qapp, "dark", size_percent)
     made = MAKERS[request.param]()
     window = made if isinstance(made, QDialog) else QWidget()
     qtbot.addWidget(window)
@@ -347,21 +359,21 @@ def share_of(image: QImage, *colours: str) -> float:
 
 def test_each_has_the_colours_of_the_theme_and_comes_back(view: QWidget, qapp: QApplication) -> None:
     view.window().setFocus()
-    seen = []
+    QApplication.processEvents()
+    seen = [picture(view)]
     for choice in ("light", "dark"):
-        theme.apply_theme(qapp, choice)
+        theme.apply_theme(qapp, choice)  # type: ignore[arg-type]
         QApplication.processEvents()
         seen.append(picture(view))
-    theme.apply_theme(qapp, "light")
-    QApplication.processEvents()
-    assert picture(view) == seen[0]
-    for image, other in zip(seen, (theme.DARK, theme.LIGHT), strict=True):
+    dark, light, again = seen
+    assert again == dark
+    for image, other in ((dark, theme.LIGHT), (light, theme.DARK)):
         assert share_of(image, other.background, other.panel, other.raised, other.text) < 0.01
-    assert seen[0] != seen[1] or share_of(seen[0], theme.LIGHT.text) == 0
+    assert light != dark or share_of(light, theme.LIGHT.text) == 0
 
 
-def test_each_has_room_at_150_percent(view: QWidget, qapp: QApplication) -> None:
-    theme.apply_theme(qapp, "dark", 150)
+@pytest.mark.parametrize("size_percent", [150])
+def test_each_has_room_with_larger_text(view: QWidget) -> None:
     window = view.window()
     window.adjustSize() if isinstance(view, QDialog) else window.resize(*SCREEN)
     QApplication.processEvents()
