@@ -42,6 +42,15 @@ def test_extremes_keep_every_peak_and_a_steep_flank_has_no_gaps() -> None:
     assert highest[-1] == 1
 
 
+def test_a_period_of_a_few_columns_does_not_beat_with_them() -> None:
+    signal = np.sin(2 * np.pi * np.arange(48_000) * 480 / 2.1 / 48_000).astype(np.float32)
+    edges = np.linspace(0, 48_000, 481).astype(np.int64)
+    values = extremes(signal, edges, around=3)
+    assert values[2:-2:2] == pytest.approx(-1, abs=0.01)
+    assert values[3:-2:2] == pytest.approx(1, abs=0.01)
+    assert np.ptp(extremes(signal, edges)[3:-2:2]) > 0.1, "or the test tests nothing"
+
+
 @pytest.fixture
 def waveform(qtbot: QtBot) -> WaveformPanel:
     """A second of the model alone."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pyqtgraph as pg
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QImage
+from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -15,7 +17,7 @@ from app.presets.library import Library
 from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
-from app.views.plots.axis_label import UprightLabel, UprightTicks, sparse
+from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
 from app.views.plots.figures_table import Column, FiguresTable, TableRow
 from app.views.plots.legend import SHARE, Legend
 from app.views.plots.time_plot import TimePlot
@@ -149,14 +151,14 @@ def test_numbers_that_would_touch_are_left_out_the_ends_last() -> None:
     assert sparse([], 1) == []
 
 
-def numbers(axis: pg.AxisItem) -> list[tuple[float, str]]:
-    """The numbers that an axis would draw, with their places."""
-    levels = axis.tickValues(*axis.range, axis.height())
-    return [
-        (place, text)
-        for spacing, places in levels
-        for place, text in zip(places, axis.tickStrings(places, 1, spacing), strict=True)
-    ]
+def numbers(axis: pg.AxisItem) -> dict[str, float]:
+    """The heights in pixels at which an axis writes its numbers, from below."""
+    image = QImage(10, 10, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    specs = axis.generateDrawSpecs(painter)
+    painter.end()
+    written = sorted(((rect.center().y(), text) for rect, _, text in (specs[2] if specs else [])), reverse=True)
+    return {text: y for y, text in written}
 
 
 def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot: QtBot) -> None:
@@ -177,12 +179,15 @@ def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbo
     assert not axis.label.isVisible()
     plot.resize(300, 400)
     qtbot.waitUntil(axis.label.isVisible)
-    drawn = plot.grab().toImage()
-    item.setYRange(0, 10, padding=0)
     ticks = UprightTicks(axis, item.vb)
+    item.setYRange(0, 10, padding=0)
     ticks.set(TICKS, between=(0.5,))
-    qtbot.waitUntil(lambda: plot.grab().toImage() != drawn)
-    ticks.set(None)
+    for height, highest, most in ((400, 10, 11), (90, 10, 6), (90, 3, 4)):
+        plot.resize(300, height)
+        item.setYRange(0, highest, padding=0)
+        qtbot.waitUntil(lambda most=most: 2 <= len(numbers(axis)) <= most)
+        assert list(numbers(axis))[0] == "0" and list(numbers(axis))[-1] == str(highest)
+        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
 
 
 def test_a_low_error_map_has_no_clipped_words(qtbot: QtBot) -> None:
@@ -194,6 +199,9 @@ def test_a_low_error_map_has_no_clipped_words(qtbot: QtBot) -> None:
         item = view.map.getPlotItem()
         qtbot.waitUntil(lambda item=item, label=label: item.getAxis("left").labelText == label)
         assert item.getAxis("bottom").label.isVisible() == foot
+        shown = numbers(item.getAxis("left"))
+        assert len(shown) >= 2
+        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(shown.values()))
 
 
 def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot) -> None:
