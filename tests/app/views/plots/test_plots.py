@@ -186,7 +186,8 @@ def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbo
         plot.resize(300, height)
         item.setYRange(0, highest, padding=0)
         qtbot.waitUntil(lambda most=most: 2 <= len(numbers(axis)) <= most)
-        assert list(numbers(axis))[0] == "0" and list(numbers(axis))[-1] == str(highest)
+        first, *_, last = numbers(axis)
+        assert (first, last) == ("0", str(highest))
         assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
 
 
