@@ -1,4 +1,4 @@
-"""Gestures on widgets, what signals report of them, and what is seen."""
+"""Gestures on widgets, what signals report of them, and pictures of them."""
 
 from __future__ import annotations
 
