@@ -66,6 +66,11 @@ def test_a_mark_is_dragged_and_reset(qtbot: QtBot, view: DrumView) -> None:
     places = [QPoint(x, foot) for x in (round(axes.x(0, 0.8)), round(axes.x(0, 0.6)), 5_000)]
     drag(view, *places)
     assert moved == [("right", pytest.approx(0.6, abs=0.01)), ("right", 1.0)]
+    cursors = set()
+    for at in (places[0], axes.at(0, (0.4, -0.5)).toPoint(), QPoint(3, 3)):
+        qtbot.mouseMove(view, at)
+        cursors.add(view.cursor().shape())
+    assert len(cursors) == 3, "the pointer shows what a press would do"
     qtbot.mouseDClick(view, LEFT, pos=QPoint(round(axes.x(0, 0.3)), foot))
     assert (reset, struck) == (["left"], [])
 
