@@ -64,7 +64,13 @@ def threads_begun() -> Iterator[Callable[[], list[str]]]:
     assert not begun()
 
 
-COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
+@pytest.fixture(scope="session", autouse=True)
+def imports_are_frozen() -> Iterator[None]:
+    """A look at all of torch takes a quarter of a second: what modules hold is no garbage."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)
@@ -78,7 +84,7 @@ def collected_here() -> Iterator[None]:
     """Garbage is deleted in this thread alone, as in the app (`app.shared.heap.collect_between_events`)."""
     gc.disable()
     yield
-    gc.collect(2 if gc.get_count()[2] >= COLLECT_ALL_EVERY else 1)
+    gc.collect()
     gc.enable()
 
 

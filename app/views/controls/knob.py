@@ -265,8 +265,8 @@ class Knob(QWidget):
 
     def _give_up(self) -> None:
         if self._editor is not None:
+            self._close_editor()  # first: a change of the focus hides every tip
             say_above(self, f"{self._figure or self.text} is kept")
-            self._close_editor()
 
     def _close_editor(self) -> None:
         """End typing. The focus returns to playing, or to the knob where keys had brought it there."""

@@ -37,6 +37,7 @@ class PresetBar(QWidget):
         self.name = NameButton("Reading presets …")
         self.name.setMinimumWidth(100)
         self.name.setMaximumWidth(560)
+        self.name.setToolTip("Browse the presets (Ctrl+P)")
         self.name.clicked.connect(self.browse_asked)
         self.filtered = FilterButton("presets")
         self.filtered.clicked.connect(self.all_asked)
@@ -61,6 +62,5 @@ class PresetBar(QWidget):
         title = entry.title if entry else "No preset found"
         self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Preset: {title}")
-        self.name.setToolTip("Browse the presets (Ctrl+P)")
         self.card.say(*(preset_summary(entry) if entry else [""]))
         self.card.setToolTip(preset_card(entry) if entry else "")

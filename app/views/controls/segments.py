@@ -28,18 +28,21 @@ class Segments(QWidget):
         super().__init__()
         self.setAccessibleName(name)
         self._group = QButtonGroup(self)
-        self._group.setExclusive(not switches)
         self._keys: list[str] = []
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(2)
-        for key, text, tip in choices:
+        for place, (key, text, tip) in enumerate(choices):
             button = tool_button(text, f"{name}: {text}", tip)
             button.setObjectName(key)
             button.setCheckable(True)
             button.setStyleSheet(SMALL)
             button.setChecked(not switches and not self._keys)
-            self._group.addButton(button, len(self._keys))
+            if switches:  # in a group, Tab and the arrow keys would reach the first alone
+                button.toggled.connect(lambda down, place=place: self._toggled(place, down))
+                button.clicked.connect(lambda _=False, key=key: self.clicked.emit(key))
+            else:
+                self._group.addButton(button, place)
             self._keys.append(key)
             row.addWidget(button)
         self._group.idToggled.connect(self._toggled)

@@ -99,6 +99,7 @@ class LearnDialog(GrowingDialog):
         self.heard = {key: QPushButton(text) for key, text in HEARD}
         self.start = QPushButton("Continue", default=True)
         self.start.setObjectName("primary")
+        self.start.setToolTip("Learn the string, keep the instrument, or use the sound as a body")
         self.close_button = QPushButton("Cancel")
         self._pages = QStackedWidget()
         self._lay_out()

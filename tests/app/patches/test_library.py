@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +12,6 @@ import pytest
 from app.patches import library
 from app.patches.library import (
     SHIPPED,
-    PatchEntry,
     PatchError,
     file_stem,
     find_patch,
@@ -184,15 +181,3 @@ def test_an_unknown_name_lists_the_known_ones(make_patch: Make) -> None:
         find_patch("other")
     with pytest.raises(PatchError, match="absent"):
         find_patch("absent.json")
-
-
-def test_the_users_folder_lies_among_presets(own: Path) -> None:
-    assert own_patches() == own
-    assert not PatchEntry(SHIPPED / "a.json", list_patches(SHIPPED)[0][0].patch).own
-
-
-def test_patches_are_listed_without_the_engine() -> None:
-    code = (
-        "import sys; from app.patches.library import list_patches; list_patches(); assert 'torch' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -151,19 +151,19 @@ def held_to(choice: TuningChoice, expected: dict[int, float | None]) -> None:
             assert 1200 * math.log2(tuning.hz(key) / 440) == pytest.approx(cents, abs=1e-5), key
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_random_scales(seed: int) -> None:
     draw = random.Random(seed)
-    for _ in range(60):
+    for _ in range(40):
         text, cents = made_scale(draw)
         base = cents_of_degree(9, cents)
         held_to(TuningChoice(scale=text), {key: cents_of_degree(key - 60, cents) - base for key in range(128)})
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_random_mappings(seed: int) -> None:
     draw = random.Random(1000 + seed)
-    for _ in range(60):
+    for _ in range(40):
         made, (text, cents) = made_mapping(draw), made_scale(draw)
         if draw.random() < 0.3:
             text, cents = "", [100.0 * step for step in range(1, 13)]
@@ -216,40 +216,9 @@ def test_lines_that_are_no_pitch(line: str, tmp_path: Path) -> None:
     assert str(caught.value).isprintable() and len(str(caught.value)) < 300
 
 
-def test_a_formal_octave_other_than_the_scales() -> None:
-    """Four keys to a fifth: the pattern repeats by the fifth."""
-    tuning = Tuning(TuningChoice(scale=TWELVE, keymap="4 0 127 60 60 261.625565 7 0 2 4 5".replace(" ", "\n")))
-    steps = [round(12 * math.log2(tuning.hz(key) / tuning.hz(60)), 6) for key in range(60, 69)]
-    assert steps == [0, 2, 4, 5, 7, 9, 11, 12, 14]
-
-
-@pytest.mark.parametrize("reference", [24, 36, 48, 60, 72, 84])
-def test_a_reference_patterns_away_from_the_middle(reference: int) -> None:
-    keymap = "\n".join(map(str, (12, 0, 127, 48, reference, 261.625565, 12, *range(12))))
-    tuning = Tuning(TuningChoice(keymap=keymap))
-    for key in (reference - 13, reference - 1, reference, reference + 1, reference + 12):
-        hz = 261.625565 * 2 ** ((key - reference) / 12)
-        assert tuning.hz(key) == pytest.approx(hz, rel=1e-9)
-
-
-def test_keys_outside_the_retuned_range_keep_equal_steps() -> None:
-    choice = TuningChoice(scale=JUST, keymap="0\n50\n70\n60\n60\n300.\n0\n", a4_hz=430)
-    tuning = Tuning(choice)
-    assert not choice.has_reference
-    assert tuning.hz(49) == pytest.approx(430 * 2 ** (-20 / 12)) and tuning.hz(71) == pytest.approx(
-        430 * 2 ** (2 / 12)
-    )
-    assert tuning.hz(61) == pytest.approx(300 * 9 / 8) and tuning.hz(53) == pytest.approx(150)
-
-
 def test_beyond_the_keyboard_pitches_go_on() -> None:
     tuning = Tuning(TuningChoice(scale=JUST, keymap="0\n0\n127\n60\n60\n300.\n0\n", transpose=48))
     assert tuning.hz(88) == pytest.approx(300 * 2**10 * 15 / 8)  # key 136, degree 76
-
-
-def test_a_scale_of_no_notes_is_one_pitch() -> None:
-    tuning = Tuning(TuningChoice(scale="unison\n0\n"))
-    assert tuning.hz(20) == tuning.hz(100) == pytest.approx(440)
 
 
 def test_pitches_that_no_string_has_do_not_spoil_the_others() -> None:

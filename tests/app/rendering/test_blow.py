@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
@@ -70,8 +71,8 @@ def request_of(modes: DrumModes, strike: Strike = HARD, seconds: float = 0.25) -
 
 
 def rendered(request: BlowRequest, helper: Executor) -> BlowTake:
-    job, log = BlowJob(request, lambda _: LOADED, Log(), helper), Log()
-    job._listener = log
+    log = Log()
+    job = BlowJob(request, lambda _: LOADED, log, helper)
     while not job.idle:
         job.advance()
     assert log.calls == ["started", "finished"]
@@ -204,17 +205,12 @@ def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
 
 
 def test_the_worker_renders_blows() -> None:
-    import threading
-
     done, takes = threading.Event(), []
 
     class Listener(Log):
         def take_finished(self, take: Take | BlowTake) -> None:
             takes.append(take)
             done.set()
-
-        def render_failed(self, message: str, detail: str) -> None:
-            raise AssertionError(message + detail)
 
     worker = RenderWorker(Listener(), lambda _: LOADED)
     try:

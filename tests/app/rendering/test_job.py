@@ -198,7 +198,7 @@ def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources:
     every = ErrorSums(model.shape[1])
     every.add(model, truth)
     assert every.total().rel_mse < 2e-7
-    reported = made._listener.finished.errors.total()  # type: ignore[attr-defined]
+    reported = take.errors.total()
     assert reported.rel_mse == pytest.approx(every.total().rel_mse, rel=0.06)
     assert reported.rel_mae == pytest.approx(every.total().rel_mae, rel=0.03)
 

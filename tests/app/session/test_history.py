@@ -1,198 +1,183 @@
-"""Steps of undo are gestures; what is only looked at is none."""
+"""Steps of undo are gestures, in plain words; what is only looked at is none."""
 
 from __future__ import annotations
 
 import pytest
 
 from app.patches.library import SHIPPED, read_patch
+from app.patches.patch import Patch
 from app.session.choices import Choices, Session
 from app.session.history import GATHER_S, LARGEST_STEPS, RECORDED, History
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.now_s = 10.0
+class Hand:
+    """A session with its history, and the time in s at which its changes come."""
 
-    def __call__(self) -> float:
-        return self.now_s
+    def __init__(self) -> None:
+        self.session, self.now_s = Session(), 10.0
+        self.history = History(self.session, lambda: self.now_s)
+
+    def change(self, after_s: float = 0.0, **choices: object) -> None:
+        self.now_s += after_s
+        self.session.update(**choices)
+
+    def undone(self, field: str) -> list[object]:
+        """The values of a field after each step back, until there is none."""
+        values = []
+        while self.history.undo_words:
+            self.history.undo()
+            values.append(getattr(self.session.choices, field))
+        return values
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
+def hand() -> Hand:
+    return Hand()
 
 
-def positions_back(history: History, session: Session) -> list[float]:
-    seen = []
-    while history.undo_words:
-        history.undo()
-        seen.append(session.choices.position)
-    return seen
+@pytest.fixture(scope="module")
+def guitar() -> Patch:
+    return read_patch(SHIPPED / "classical_guitar.json")
 
 
-def test_back_and_forth_to_the_very_choices(clock: Clock) -> None:
-    session = Session()
-    history, start = History(session, clock), session.choices
-    assert not history.undo_words
-    session.update(position=0.5, amplitude_mm=2)
-    clock.now_s += 1
-    session.update(shape="triangular")
-    end = session.choices
-    history.undo()
-    assert (session.choices.shape, session.choices.position) == ("gaussian", 0.5)
-    history.undo()
-    assert session.choices == start
-    history.undo()  # nothing more
-    assert session.choices == start
-    history.redo()
-    history.redo()
-    assert session.choices == end
-    history.redo()
-    assert session.choices == end
+def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
+    start = hand.session.choices
+    hand.change(position=0.5, amplitude_mm=2)
+    middle = hand.session.choices
+    hand.change(1, shape="triangular")
+    end = hand.session.choices
+    for act, states in ((hand.history.undo, (middle, start, start)), (hand.history.redo, (middle, end, end))):
+        for state in states:
+            act()
+            assert hand.session.choices == state
 
 
-def test_notches_of_one_field_are_one_step_until_half_a_second_passes(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
+def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand) -> None:
     for position in (0.4, 0.41, 0.42):
-        session.update(position=position)
-        clock.now_s += 0.9 * GATHER_S
-    clock.now_s += GATHER_S
-    session.update(position=0.6)
-    session.update(width=0.2)  # another field: another step
-    session.update(position=0.7)
-    assert positions_back(history, session) == [0.6, 0.6, 0.42, 0.35]
+        hand.change(0.9 * GATHER_S, position=position)
+    hand.change(2 * GATHER_S, position=0.6)
+    hand.change(width=0.2)  # another field: another step
+    hand.change(position=0.7)
+    assert hand.undone("position") == [0.6, 0.6, 0.42, 0.35]
 
 
-def test_a_drag_is_one_step_however_long_and_whatever_it_changes(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
-    for start in (0.4, 0.6):
-        history.hold()
-        for moved in range(5):
-            session.update(position=start + moved / 100, amplitude_mm=4 + moved % 2)
-            clock.now_s += 3
-        history.release()
-    assert positions_back(history, session) == [pytest.approx(0.44), 0.35]
+def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand: Hand) -> None:
+    for positions in ((0.4, 0.41, 0.44), (0.6, 0.5), (0.7, 0.5)):
+        hand.history.hold()
+        for moved, position in enumerate(positions):
+            hand.change(3, position=position, amplitude_mm=4 + moved % 2)
+        hand.change(amplitude_mm=4)
+        hand.history.release()
+    assert hand.undone("position") == [0.44, 0.35]
 
 
-def test_a_drag_back_to_its_start_is_no_step(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
-    session.update(seconds=2)
-    history.hold()
-    session.update(position=0.6)
-    session.update(position=0.35)
-    history.release()
-    history.undo()
-    assert session.choices.seconds == 4
-
-
-def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
-    session.update(volume_db=-6, heard="b", loop=True, speed=1, left_view="x", motion=False, envelope=False)
-    assert not history.undo_words
-    session.update(position=0.6)
-    session.update(volume_db=-9)
-    history.undo()
-    assert session.choices == Choices(
-        volume_db=-9, heard="b", loop=True, speed=1, left_view="x", motion=False, envelope=False
-    )
+def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Hand) -> None:
+    seen = {"heard": "b", "loop": True, "speed": 1, "left_view": "x", "motion": False, "envelope": False}
+    hand.change(volume_db=-6, **seen)
+    assert not hand.history.undo_words
+    hand.change(position=0.6)
+    hand.change(volume_db=-9)
+    hand.history.undo()
+    assert hand.session.choices == Choices(volume_db=-9, **seen)  # type: ignore[arg-type]
     assert set(Choices.model_fields) > RECORDED
 
 
-def test_a_new_change_forgets_what_was_undone(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
-    session.update(position=0.6)
-    history.undo()
-    session.update(width=0.3)
-    assert not history.redo_words
-    history.undo()
-    assert (session.choices.width, session.choices.position) == (0.06, 0.35)
+def test_a_new_change_forgets_what_was_undone(hand: Hand) -> None:
+    hand.change(position=0.6)
+    hand.history.undo()
+    hand.change(width=0.3)
+    assert not hand.history.redo_words
+    assert hand.undone("width") == [0.06]
+    assert hand.session.choices.position == 0.35
 
 
-def test_it_is_bounded(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
+def test_it_is_bounded(hand: Hand) -> None:
     for step in range(LARGEST_STEPS + 50):
-        clock.now_s += 1
-        session.update(position=0.3 + step / 1000)
-    assert len(positions_back(history, session)) == LARGEST_STEPS
+        hand.change(1, position=0.3 + step / 1000)
+    assert len(hand.undone("position")) == LARGEST_STEPS
 
 
-def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
+def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:
+    session, history = hand.session, hand.history
     session.play(position=0.2, amplitude_mm=6)
     assert not history.undo_words
-    session.update(width=0.2)
+    hand.change(width=0.2)
     session.play(position=0.7, amplitude_mm=2)
     history.undo()
-    choices = session.choices
-    assert (choices.width, choices.position, choices.amplitude_mm) == (0.06, 0.7, 2)
+    assert (session.choices.width, session.choices.position, session.choices.amplitude_mm) == (0.06, 0.7, 2)
     assert not history.undo_words
     session.play(position=0.3)
     history.redo()  # a note forgets nothing of what was undone
     assert (session.choices.width, session.choices.position) == (0.2, 0.3)
 
 
-def test_a_drag_after_a_note_goes_back_to_where_the_note_was(clock: Clock) -> None:
-    session = Session()
-    history = History(session, clock)
+def test_a_drag_after_a_note_goes_back_to_where_the_note_was(hand: Hand) -> None:
+    session, history = hand.session, hand.history
     session.play(position=0.7)
     history.hold()
-    session.update(position=0.6)
-    session.update(position=0.5, amplitude_mm=2)
+    hand.change(position=0.5, amplitude_mm=2)
     session.play(position=0.3)  # played while the knob is in the other hand
-    session.update(amplitude_mm=3)
+    hand.change(amplitude_mm=3)
     history.release()
     history.undo()
     assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)
 
 
-def heard(session: Session) -> tuple[bool, str, float, object]:
+def pickup_of(session: Session) -> tuple[object, ...]:
     choices = session.choices
-    assert choices.patch is not None
-    return choices.stereo, choices.pickup, choices.listen, choices.patch.pickup
+    return choices.stereo, choices.pickup, choices.listen, choices.patch and choices.patch.pickup
 
 
-def test_where_a_patch_is_heard_is_one_step_of_undo(clock: Clock) -> None:
-    session = Session()
-    session.update(instrument=read_patch(SHIPPED / "classical_guitar.json"))
-    history, states, words = History(session, clock), [heard(session)], []
-    for change in ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11}):
-        clock.now_s += 1
-        session.update(**change)
-        states.append(heard(session))
-        words.append(history.undo_words)
+def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -> None:
+    hand.session.update(instrument=guitar)
+    states, words = [pickup_of(hand.session)], []
+    for change in ({"pickup": "velocity"}, {"stereo": not hand.session.choices.stereo}, {"listen": 0.11}):
+        hand.change(1, **change)
+        states.append(pickup_of(hand.session))
+        words.append(hand.history.undo_words)
     assert words == ["pick-up", "stereo", "listening point"]
-    for there, back in ((states[:-1][::-1], history.undo), (states[1:], history.redo)):
+    for there, back in ((states[:-1][::-1], hand.history.undo), (states[1:], hand.history.redo)):
         for state in there:
             back()
-            assert heard(session) == state
-    assert not history.redo_words
+            assert pickup_of(hand.session) == state
+    assert not hand.history.redo_words
 
 
-def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(clock: Clock) -> None:
-    session = Session()
-    session.update(instrument=read_patch(SHIPPED / "classical_guitar.json"))
-    history = History(session, clock)
-    own = heard(session)
+def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Patch) -> None:
+    session, history = hand.session, hand.history
+    session.update(instrument=guitar)
+    own = pickup_of(session)
+    hand.now_s += 1
     session.play_string()
-    clock.now_s += 1
-    session.update(listen=0.9)
-    clock.now_s += 1
+    hand.change(1, listen=0.9)
+    hand.now_s += 1
     session.play_patch()
-    assert heard(session) == own
-    words = []
+    assert pickup_of(session) == own
+    steps = []
     for plays_patch, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
-        words.append(history.undo_words)
+        steps.append(history.undo_words)
         history.undo()
         assert (session.choices.plays_patch, session.choices.listen) == (plays_patch, listen)
-    assert words == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
-    assert heard(session) == own
-    for _ in words:
+    assert steps == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
+    assert pickup_of(session) == own
+    for _ in steps:
         history.redo()
-    assert (session.choices.plays_patch, heard(session)) == (True, own)
+    assert (session.choices.plays_patch, pickup_of(session)) == (True, own)
+
+
+def test_each_way_the_next_step_is_named_and_two_knobs_of_a_patch_are_two_however_quick(
+    hand: Hand, guitar: Patch
+) -> None:
+    hand.change(instrument=guitar)
+    for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
+        patch = hand.session.choices.patch
+        assert patch is not None
+        hand.change(patch=patch.with_value(field, value))
+    hand.session.play(position=0.2)
+    hand.change(position=0.5)
+    words = []
+    while hand.history.undo_words:
+        words.append(hand.history.undo_words)
+        hand.history.undo()
+        assert hand.history.redo_words == words[-1]
+    assert words == ["pluck position", "stiffness", "decay", "instrument Classical guitar"]

@@ -10,8 +10,7 @@ from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import ASSIGNABLE, Body, Patch
 from app.patches.tuning import TuningChoice
-from app.session.choices import Session
-from app.session.history import RECORDED, History
+from app.session.history import RECORDED
 from app.session.step_words import SEVERAL, step_words
 from app.shared.parameters import OF_PATCHES
 
@@ -86,49 +85,3 @@ def test_choices_of_the_pluck() -> None:
     assert step_words(start, {**start, "instrument": SingleString(preset="b")}) == "preset b"
     every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"instrument", "kept"}}
     assert all(reported and "_" not in reported for reported in every.values()), every
-
-
-def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> None:
-    session = Session()
-    clock = iter(range(1000))
-    history = History(session, lambda: float(next(clock)))
-    assert (history.undo_words, history.redo_words) == ("", "")
-    session.update(instrument=guitar)
-    session.update(instrument=harp)
-    session.update(patch=harp.with_value("knobs.decay", 3.0))
-    session.play(position=0.2)
-    session.update(position=0.5)
-    found = []
-    while history.undo_words:
-        found.append(history.undo_words)
-        history.undo()
-        assert history.redo_words == found[-1]
-    assert found == ["pluck position", "decay", f"instrument {harp.name}", "instrument Classical guitar"]
-    history.redo()
-    assert (history.undo_words, history.redo_words) == ("instrument Classical guitar", f"instrument {harp.name}")
-
-
-def test_a_drag_that_came_back_is_not_reported(guitar: Patch) -> None:
-    session = Session()
-    history = History(session)
-    session.update(seconds=2.0)
-    history.hold()
-    session.update(position=0.6)
-    session.update(position=0.35)
-    history.release()
-    assert history.undo_words == "duration"
-
-
-def test_two_knobs_of_a_patch_are_two_steps_however_quick_and_notches_of_one_are_one(guitar: Patch) -> None:
-    session = Session()
-    history = History(session, lambda: 0.0)
-    session.update(patch=guitar)
-    for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
-        patch = session.choices.patch
-        assert patch is not None
-        session.update(patch=patch.with_value(field, value))
-    found = []
-    while history.undo_words:
-        found.append(history.undo_words)
-        history.undo()
-    assert found == ["stiffness", "decay", "instrument Classical guitar"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.shared.parameters import OF_CHOICES, OF_PATCHES, Parameter
+from app.shared.parameters import OF_CHOICES, OF_PATCHES, PARAMETERS, Parameter
 
 
 @pytest.mark.parametrize("id", [id for id, each in OF_PATCHES.items() if each.words])
@@ -29,11 +29,15 @@ def test_help_explains_each_parameter(parameter: Parameter) -> None:
     assert parameter.tip
 
 
-@pytest.mark.parametrize("parameter", OF_PATCHES.values(), ids=lambda parameter: parameter.id)
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda parameter: parameter.id)
 def test_a_knob_goes_through_its_whole_range_and_back(parameter: Parameter) -> None:
     low, high = parameter.limits
     values = [parameter.value(share / 10) for share in range(11)]
     assert (values[0], values[-1]) == (low, pytest.approx(high))
     assert values == sorted(set(values))
     assert [parameter.share(value) for value in values] == pytest.approx([share / 10 for share in range(11)])
+    assert (parameter.value(-1), parameter.value(2)) == (pytest.approx(low), pytest.approx(high))
     assert parameter.stepped(values[5], -1) < values[5] < parameter.stepped(values[5], 1)
+    assert parameter.stepped(high, 5) == high
+    step = parameter.stepped(parameter.default, -1)
+    assert parameter.default == low or parameter.stepped(step, 1) == pytest.approx(parameter.default)

@@ -13,22 +13,37 @@ from app.shared import worker
 from app.shared.worker import Cancelled, Job
 from app.views.background import Background
 from engine.presets import PresetError
+from tests.app.gestures import reported
 
-NAME = "a thread of tests"
+
+class Endless:
+    """A job that ends when it is cancelled."""
+
+    def __init__(self) -> None:
+        self.under_way, self.gave_up = threading.Event(), threading.Event()
+
+    def __call__(self, job: Job) -> None:
+        self.under_way.set()
+        try:
+            while True:
+                job.report(0.1)
+        except Cancelled:
+            self.gave_up.set()
+            raise
 
 
 @pytest.fixture
 def background(qtbot: QtBot, threads_begun: Callable[[], list[str]]) -> Iterator[Background]:
-    made = Background(NAME)
+    made = Background("a thread of tests")
     yield made
     made.close()
     made.close()
     assert threads_begun() == []
 
 
-def test_a_job_reports_and_returns(qtbot: QtBot, background: Background) -> None:
+def test_a_job_reports_and_returns_here(qtbot: QtBot, background: Background) -> None:
     here, seen = threading.get_ident(), []
-    background.progressed.connect(lambda *reported: seen.append((*reported, threading.get_ident())))
+    background.progressed.connect(lambda *values: seen.append((*values, threading.get_ident())))
 
     def work(job: Job) -> str:
         assert threading.get_ident() != here
@@ -47,8 +62,7 @@ def test_shares_are_reported_now_and_then_and_each_result_at_once(
     qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker, "REPORT_EVERY_S", 60.0)  # each takes a breath, which may be long
-    seen: list[object] = []
-    background.progressed.connect(lambda share, text, so_far: seen.append(so_far))
+    progress = reported(background.progressed)
 
     def work(job: Job) -> None:
         for count in range(20):
@@ -56,34 +70,18 @@ def test_shares_are_reported_now_and_then_and_each_result_at_once(
 
     with qtbot.waitSignal(background.finished):
         background.start(work)
-    assert seen == [None, 18, 19]
+    assert [so_far for _, _, so_far in progress] == [None, 18, 19]
 
 
-def endless(job: Job, under_way: threading.Event, gave_up: threading.Event) -> None:
-    under_way.set()
-    try:
-        while True:
-            job.report(0.1)
-    except Cancelled:
-        gave_up.set()
-        raise
-
-
-def test_the_latest_job_alone_is_heard(qtbot: QtBot, background: Background) -> None:
-    under_way, gave_up, heard = threading.Event(), threading.Event(), []
-    background.finished.connect(heard.append)
-    background.start(lambda job: endless(job, under_way, gave_up))
-    assert under_way.wait(10)
+def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot: QtBot, background: Background) -> None:
+    endless, said, results = Endless(), threading.Event(), reported(background.finished)
+    background.start(endless)
+    assert endless.under_way.wait(10)
     background.start(lambda job: "skipped")
     background.start(lambda job: "last")
-    qtbot.waitUntil(lambda: heard == ["last"])
-    assert gave_up.is_set()
-
-
-def test_what_was_said_before_a_cancel_does_not_arrive(qtbot: QtBot, background: Background) -> None:
-    said, heard = threading.Event(), []
-    background.finished.connect(heard.append)
-    background.progressed.connect(lambda *reported: heard.append(reported))
+    qtbot.waitUntil(lambda: results == ["last"])
+    assert endless.gave_up.is_set()
+    progress = reported(background.progressed)
 
     def work(job: Job) -> str:
         job.report(0.5, so_far="half")
@@ -94,20 +92,19 @@ def test_what_was_said_before_a_cancel_does_not_arrive(qtbot: QtBot, background:
     assert said.wait(10)
     background.cancel()  # the signals wait in the window's queue
     background.start(lambda job: "another")
-    qtbot.waitUntil(lambda: heard == ["another"])
+    qtbot.waitUntil(lambda: results == ["last", "another"])
+    assert progress == []
 
 
-def test_the_end_of_a_job_that_is_stopped_is_reported(qtbot: QtBot, background: Background) -> None:
-    under_way, gave_up = threading.Event(), threading.Event()
-    background.start(lambda job: endless(job, under_way, gave_up))
-    assert under_way.wait(10)
+def test_a_job_that_is_stopped_reports_its_end_and_one_may_be_waited_for(
+    qtbot: QtBot, background: Background
+) -> None:
+    endless, under_way, done = Endless(), threading.Event(), []
+    background.start(endless)
+    assert endless.under_way.wait(10)
     with qtbot.waitSignal(background.cancelled):
         background.stop()
     assert not background.busy
-
-
-def test_a_job_can_be_finished_before_the_end(qtbot: QtBot, background: Background) -> None:
-    under_way, done = threading.Event(), []
 
     def work(job: Job) -> None:
         under_way.set()
@@ -133,8 +130,7 @@ def test_errors_are_reported_and_the_thread_lives_on(
 
     with qtbot.waitSignal(background.failed) as failed:
         background.start(fail)
-    assert failed.args[0] == message
-    assert bool(failed.args[1]) == has_details
+    assert (failed.args[0], bool(failed.args[1])) == (message, has_details)
     with qtbot.waitSignal(background.finished):
         background.start(lambda job: None)
 
@@ -142,7 +138,7 @@ def test_errors_are_reported_and_the_thread_lives_on(
 class Counting:
     """Ten results, of which `allowed` can be computed."""
 
-    def __init__(self, allowed: int = 10) -> None:
+    def __init__(self, allowed: int) -> None:
         self.done, self.allowed = 0, allowed
 
     @property
@@ -158,11 +154,10 @@ class Counting:
 
 def test_what_grows_is_kept_up_with_and_only_the_latest(qtbot: QtBot, background: Background) -> None:
     old, new = Counting(allowed=3), Counting(allowed=4)
-    background.start(lambda job: keep_up(old, job))
-    qtbot.waitUntil(lambda: old.done == 3)
-    background.start(lambda job: keep_up(new, job))
-    qtbot.waitUntil(lambda: new.done == 4)
+    for growing in (old, new):
+        background.start(lambda job, growing=growing: keep_up(growing, job))
+        qtbot.waitUntil(lambda growing=growing: growing.done == growing.allowed)
     old.allowed = new.allowed = 10
-    qtbot.waitUntil(lambda: new.complete)
-    qtbot.wait(100)
-    assert old.done == 3
+    with qtbot.waitSignal(background.finished):  # of `new`: `old` was given up before it began
+        pass
+    assert (old.done, new.done) == (3, 10)

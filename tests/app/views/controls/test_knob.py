@@ -1,239 +1,169 @@
-"""A knob asks for what the hand wants, and shows what became of it."""
+"""A knob asks for what a gesture wants, and shows what became of it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QApplication, QPushButton, QToolTip, QWidget
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolTip, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.shared.parameters import Parameter, Taper
 from app.views.controls.knob import DRAG_PIXELS, Knob
 from app.views.controls.playing_keys import PlayingKeys
+from tests.app.gestures import LEFT, NONE, SHIFT, keeps, move, picture, press_keys, reported, turn_wheel
 
-LEFT = Qt.MouseButton.LeftButton
-SHIFT, NONE = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.NoModifier
+PRESSED = QPoint(30, 40)
+Key = Qt.Key
 
 
 @pytest.fixture
-def knob(qtbot: QtBot) -> Knob:
-    """From 0 to 20 by 0.25, at 4; it follows what is asked."""
-    made = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")))
-    qtbot.addWidget(made)
+def knob(qtbot: QtBot) -> Iterator[Knob]:
+    """From 0 to 20 by 0.25, at 4, in an active window; it follows what is asked."""
+    window = QWidget()
+    qtbot.addWidget(window)
+    made = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
+    made.resize(made.sizeHint())
     made.value_asked.connect(made.set_value)
-    made.show()
-    return made
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    yield made
 
 
-def move(knob: Knob, up: float, held: Qt.KeyboardModifier) -> None:
-    """The pointer goes up from where it was pressed or was last."""
-    at = QPointF(30, 40 - up)
-    event = QMouseEvent(QEvent.Type.MouseMove, at, knob.mapToGlobal(at), LEFT, LEFT, held)
-    QApplication.sendEvent(knob, event)
+def type_in(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key) -> None:
+    """Type with the knob's editor, which is gone after the last key."""
+    qtbot.keyClicks(knob, text[0])
+    editor = knob.findChild(QLineEdit)
+    assert editor.hasFocus()
+    qtbot.keyClicks(editor, text[1:])
+    qtbot.keyClick(editor, end)
+    qtbot.waitUntil(lambda: knob.findChild(QLineEdit) is None)
 
 
-def test_a_drag_goes_with_the_pointer_and_shows_the_value(qtbot: QtBot, knob: Knob) -> None:
-    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
-    move(knob, DRAG_PIXELS / 4, NONE)
-    assert knob.value == pytest.approx(9)
-    assert QToolTip.text() == "9.00 mm"
-    move(knob, -2 * DRAG_PIXELS, NONE)
-    assert knob.value == 0
+def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot: QtBot, knob: Knob) -> None:
+    drags = reported(knob.drag_started, knob.drag_ended)
+    qtbot.mousePress(knob, LEFT, pos=PRESSED)
+    up = 0
+    for pixels, held, value in (
+        (DRAG_PIXELS // 4, NONE, 9),
+        (0, SHIFT, 9),
+        (9, SHIFT, 9.1),
+        (9, NONE, 10.1),
+        (-2 * DRAG_PIXELS, NONE, 0),
+    ):
+        up += pixels
+        move(knob, PRESSED - QPoint(0, up), held=held)
+        assert knob.value == pytest.approx(value)
+        assert QToolTip.text() == f"{value:.2f} mm"
     qtbot.mouseRelease(knob, LEFT)
-    move(knob, 0, NONE)
+    move(knob, PRESSED)
     assert knob.value == 0
-
-
-def test_shift_in_the_middle_of_a_drag_is_finer_and_does_not_leap(qtbot: QtBot, knob: Knob) -> None:
-    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
-    move(knob, 45, NONE)
-    assert knob.value == pytest.approx(9)
-    move(knob, 45, SHIFT)
-    assert knob.value == pytest.approx(9)
-    move(knob, 54, SHIFT)
-    assert knob.value == pytest.approx(9.1)
-    move(knob, 63, NONE)
-    assert knob.value == pytest.approx(10.1)
-    qtbot.mouseRelease(knob, LEFT)
-
-
-def test_a_drag_reports_its_begin_and_its_end(qtbot: QtBot, knob: Knob) -> None:
-    with qtbot.waitSignals([knob.drag_started, knob.drag_ended], order="strict"):
-        qtbot.mousePress(knob, LEFT)
-        qtbot.mouseRelease(knob, LEFT)
+    assert drags == [(), ()]
 
 
 @pytest.mark.parametrize(
-    ("delta", "held", "value"),
+    ("turned", "held", "value"),
     [((0, 120), NONE, 4.25), ((0, -240), NONE, 3.5), ((0, 120), SHIFT, 4.025), ((120, 0), SHIFT, 4.025)],
 )
-def test_the_wheel(knob: Knob, delta: tuple[int, int], held: Qt.KeyboardModifier, value: float) -> None:
-    at = QPointF(30, 40)
-    event = QWheelEvent(
-        at, at, QPoint(), QPoint(*delta), Qt.MouseButton.NoButton, held, Qt.ScrollPhase.NoScrollPhase, False
-    )
-    QApplication.sendEvent(knob, event)
+def test_the_wheel(knob: Knob, turned: tuple[int, int], held: Qt.KeyboardModifier, value: float) -> None:
+    assert turn_wheel(knob, PRESSED, QPoint(*turned), held)
     assert knob.value == pytest.approx(value)
-    assert event.isAccepted()
 
 
 @pytest.mark.parametrize(
     ("key", "held", "value"),
     [
-        (Qt.Key.Key_Up, NONE, 4.25),
-        (Qt.Key.Key_Left, NONE, 3.75),
-        (Qt.Key.Key_Right, SHIFT, 4.025),
-        (Qt.Key.Key_PageUp, NONE, 6.5),
-        (Qt.Key.Key_PageDown, NONE, 1.5),
-        (Qt.Key.Key_Home, NONE, 0),
-        (Qt.Key.Key_End, NONE, 20),
+        (Key.Key_Up, NONE, 4.25),
+        (Key.Key_Left, NONE, 3.75),
+        (Key.Key_Right, SHIFT, 4.025),
+        (Key.Key_PageUp, NONE, 6.5),
+        (Key.Key_PageDown, NONE, 1.5),
+        (Key.Key_Home, NONE, 0),
+        (Key.Key_End, NONE, 20),
+        (Key.Key_Delete, NONE, 4),
     ],
 )
-def test_keys(qtbot: QtBot, knob: Knob, key: Qt.Key, held: Qt.KeyboardModifier, value: float) -> None:
-    qtbot.keyClick(knob, key, held)
+def test_keys(knob: Knob, key: Qt.Key, held: Qt.KeyboardModifier, value: float) -> None:
+    if key == Key.Key_Delete:
+        knob.set_value(12)
+    press_keys(knob, key, held=held)
     assert knob.value == pytest.approx(value)
+    assert keeps(knob, key) == (key in (Key.Key_PageUp, Key.Key_PageDown))  # shortcuts of the window
 
 
-def test_page_keys_are_the_knobs_and_not_the_windows(knob: Knob) -> None:
-    for key, accepted in ((Qt.Key.Key_PageUp, True), (Qt.Key.Key_Space, False)):
-        event = QKeyEvent(QEvent.Type.ShortcutOverride, key, NONE)
-        event.ignore()
-        QApplication.sendEvent(knob, event)
-        assert event.isAccepted() == accepted
+def test_a_double_click_resets(qtbot: QtBot, knob: Knob) -> None:
+    knob.set_value(12)
+    qtbot.mouseDClick(knob, LEFT)
+    assert knob.value == 4.0
 
 
 @pytest.mark.parametrize(
-    ("typed", "value", "reported"),
+    ("text", "end", "value", "words"),
     [
-        ("7,5", 7.5, ""),
-        ("7.5 mm", 7.5, ""),
-        ("1,000.5e-2", 10.005, ""),
-        ("99", 20, "At most 20.00 mm"),
-        ("-1", 0, "At least 0.00 mm"),
-        ("3-", 4.0, "“3-” is no number here, as 4.00 mm is, which is kept"),
-        ("3 m", 4.0, "“3 m” is no number here, as 4.00 mm is, which is kept"),
+        ("7,5", Key.Key_Return, 7.5, ""),
+        ("7.5 mm", Key.Key_Return, 7.5, ""),
+        ("1,000.5e-2", Key.Key_Return, 10.005, ""),
+        ("99", Key.Key_Return, 20, "At most 20.00 mm"),
+        ("-1", Key.Key_Return, 0, "At least 0.00 mm"),
+        ("3-", Key.Key_Return, 4.0, "“3-” is no number here, as 4.00 mm is, which is kept"),
+        ("9", Key.Key_Escape, 4.0, "4.00 mm is kept"),
+        ("7 m", Key.Key_A, 4.0, "4.00 mm is kept"),  # no number has it: it plays
     ],
 )
-def test_a_typed_number_is_taken_within_the_range(
-    qtbot: QtBot, knob: Knob, typed: str, value: float, reported: str
-) -> None:
+def test_a_number_is_typed(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key, value: float, words: str) -> None:
     QToolTip.hideText()
     qtbot.waitUntil(lambda: not QToolTip.isVisible())
-    qtbot.keyClicks(knob, typed[0])
-    assert knob._editor is not None
-    qtbot.keyClicks(knob._editor, typed[1:])
-    qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
+    letters: list[str] = []
+    PlayingKeys(knob.window()).pressed.connect(lambda press: letters.append(press.letter))
+    type_in(qtbot, knob, text, end)
     assert knob.value == value
-    assert knob._editor is None
-    assert (QToolTip.text() if QToolTip.isVisible() else "") == reported
+    assert (QToolTip.text() if QToolTip.isVisible() else "") == words
+    assert letters == (["A"] if end == Key.Key_A else [])
 
 
-def test_escape_gives_typing_up(qtbot: QtBot, knob: Knob) -> None:
-    qtbot.keyClicks(knob, "9")
-    assert knob._editor is not None
-    qtbot.keyClick(knob._editor, Qt.Key.Key_Escape)
-    assert (knob.value, knob._editor) == (4.0, None)
+@pytest.mark.parametrize("end", [Key.Key_Return, Key.Key_Escape])
+@pytest.mark.parametrize("reason", [Qt.FocusReason.MouseFocusReason, Qt.FocusReason.TabFocusReason])
+def test_the_focus_returns_to_playing_or_where_keys_had_brought_it(
+    qtbot: QtBot, knob: Knob, reason: Qt.FocusReason, end: Qt.Key
+) -> None:
+    knob.window().setFocus()
+    knob.setFocus(reason)
+    type_in(qtbot, knob, "7", end)
+    assert QApplication.focusWidget() is (knob if reason == Qt.FocusReason.TabFocusReason else knob.window())
 
 
-def test_double_click_and_delete_reset(qtbot: QtBot, knob: Knob) -> None:
-    for reset in (lambda: qtbot.mouseDClick(knob, LEFT), lambda: qtbot.keyClick(knob, Qt.Key.Key_Delete)):
-        knob.set_value(12)
-        reset()
-        assert knob.value == 4.0
+def test_another_widget_that_is_clicked_takes_the_number_and_keeps_the_focus(qtbot: QtBot, knob: Knob) -> None:
+    other = QPushButton("other", knob.window())
+    other.show()
+    qtbot.keyClicks(knob, "7")
+    other.setFocus(Qt.FocusReason.MouseFocusReason)
+    assert knob.value == 7.0
+    assert other.hasFocus()
 
 
-def test_what_became_of_it_is_seen_and_said(knob: Knob) -> None:
-    assert knob.accessibleDescription() == "4.00 mm"
-    before = knob.grab().toImage()
+def test_value_figure_and_bar_are_seen_and_said(qtbot: QtBot, knob: Knob) -> None:
+    figures, pictures = reported(knob.figure_asked), [picture(knob)]
+
+    def changed() -> str:
+        pictures.append(picture(knob))
+        assert pictures[-1] != pictures[-2]
+        return knob.accessibleDescription()
+
     knob.set_value(11)
-    assert knob.grab().toImage() != before
-    assert knob.accessibleDescription() == "11.00 mm"
-    knob.setEnabled(False)
-    assert knob.grab().toImage() != before
-
-
-def test_a_figure_is_shown_instead_of_the_value_and_typed(qtbot: QtBot, knob: Knob) -> None:
-    figures: list[float] = []
-    knob.figure_asked.connect(figures.append)
-    before = knob.grab().toImage()
+    assert changed() == "11.00 mm"
     knob.show_figure("72.3 N")
-    assert knob.grab().toImage() != before
-    assert knob.accessibleDescription() == "72.3 N (4.00 mm)"
-    assert "72.3 N (4.00 mm)" in knob.toolTip()
-    qtbot.keyClicks(knob, "8")
-    assert knob._editor is not None
-    qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
-    assert (figures, knob.value) == ([8.0], 4.0)
+    assert changed() == "72.3 N (11.00 mm)"
+    assert "72.3 N (11.00 mm)" in knob.toolTip()
+    type_in(qtbot, knob, "8", Key.Key_Return)
+    assert (figures, knob.value) == ([8.0], 11.0)
     knob.show_figure("")
-    assert knob.accessibleDescription() == "4.00 mm"
-
-
-def test_a_barred_knob_says_why(knob: Knob) -> None:
+    assert changed() == "11.00 mm"
     knob.set_barred("A triangle has no width")
+    changed()
     assert not knob.isEnabled()
     assert knob.toolTip() == "amplitude\nA triangle has no width"
     knob.set_barred("")
     assert knob.isEnabled()
     assert "no width" not in knob.toolTip()
-
-
-def test_a_letter_that_no_number_has_gives_typing_up_and_goes_on(qtbot: QtBot) -> None:
-    """Else keys that play would be caught by a digit that was meant for the velocity."""
-    window, heard = QWidget(), []
-    qtbot.addWidget(window)
-    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
-    PlayingKeys(window).pressed.connect(lambda press: heard.append(press.letter))
-    window.show()
-    window.activateWindow()
-    qtbot.mouseClick(knob, LEFT, pos=QPoint(30, 40))
-    qtbot.keyClicks(knob, "7")
-    editor = knob._editor
-    assert editor is not None
-    qtbot.keyClicks(editor, " m")
-    assert (knob._editor, heard) == (editor, [])
-    qtbot.keyClick(editor, Qt.Key.Key_A, SHIFT)
-    assert (knob._editor, knob.value) == (None, 4.0)
-    assert "4.00 mm is kept" in QToolTip.text()
-
-
-@pytest.mark.parametrize("end", [Qt.Key.Key_Return, Qt.Key.Key_Escape, Qt.Key.Key_A])
-@pytest.mark.parametrize("reason", [Qt.FocusReason.MouseFocusReason, Qt.FocusReason.TabFocusReason])
-def test_the_focus_returns_to_playing_or_where_keys_had_brought_it(
-    qtbot: QtBot, reason: Qt.FocusReason, end: Qt.Key
-) -> None:
-    window, heard = QWidget(), []
-    qtbot.addWidget(window)
-    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
-    PlayingKeys(window).pressed.connect(lambda press: heard.append(press.letter))
-    window.show()
-    window.activateWindow()
-    qtbot.waitUntil(window.isActiveWindow)
-    window.setFocus()
-    knob.setFocus(reason)
-    qtbot.keyClicks(knob, "7")
-    assert knob._editor is not None and knob._editor.hasFocus()
-    qtbot.keyClick(knob._editor, end)
-    assert knob._editor is None
-    by_keys = reason == Qt.FocusReason.TabFocusReason
-    assert QApplication.focusWidget() is (knob if by_keys else window)
-    assert heard == (["A"] if end == Qt.Key.Key_A else [])
-    qtbot.keyClicks(QApplication.focusWidget(), "8")
-    assert (knob._editor is not None) == by_keys
-    assert heard[-1:] == ([] if by_keys and end != Qt.Key.Key_A else ["A"] if by_keys else ["8"])
-
-
-def test_another_widget_that_is_clicked_keeps_the_focus(qtbot: QtBot) -> None:
-    window = QWidget()
-    qtbot.addWidget(window)
-    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
-    other = QPushButton("other", window)
-    knob.value_asked.connect(knob.set_value)
-    window.show()
-    window.activateWindow()
-    qtbot.waitUntil(window.isActiveWindow)
-    qtbot.keyClicks(knob, "7")
-    assert knob._editor is not None and knob._editor.hasFocus()
-    other.setFocus(Qt.FocusReason.MouseFocusReason)
-    assert (knob.value, knob._editor) == (7.0, None)
-    assert other.hasFocus()

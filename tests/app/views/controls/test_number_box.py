@@ -9,12 +9,14 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QLocale, Qt
-from PySide6.QtWidgets import QDialog, QPushButton, QToolTip, QVBoxLayout
+from PySide6.QtWidgets import QAbstractSpinBox, QDialog, QPushButton, QToolTip, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 import app
 from app.views.controls.form import count_box, spin_box
-from app.views.controls.number_box import CountBox, NumberBox
+from app.views.controls.note_box import NoteBox
+from app.views.controls.number_box import NumberBox
+from tests.app.gestures import reported
 
 KINDS = {  # as in the dialogs
     "length": ((0, 5), " m", 3, ""),
@@ -24,7 +26,7 @@ KINDS = {  # as in the dialogs
 }
 
 
-@pytest.fixture(params=["de_DE", "fr_FR", "C", "en_US", "ar_EG"])
+@pytest.fixture(params=["de_DE", "fr_FR", "C", "ar_EG"])
 def locale(request: pytest.FixtureRequest) -> Iterator[str]:
     before = QLocale()
     QLocale.setDefault(QLocale(request.param))
@@ -40,12 +42,9 @@ def made(qtbot: QtBot, kind: str, value: float) -> NumberBox:
     return box
 
 
-def type_in(qtbot: QtBot, box: NumberBox | CountBox, text: str, whole: bool = False) -> None:
+def type_in(qtbot: QtBot, box: QAbstractSpinBox, text: str, whole: bool = False) -> None:
     """Types over the number, or over all of the field, and Enter."""
-    if whole:
-        box.lineEdit().selectAll()
-    else:
-        box.selectAll()
+    (box.lineEdit() if whole else box).selectAll()
     qtbot.keyClicks(box, text)
     qtbot.keyClick(box, Qt.Key.Key_Return)
 
@@ -54,12 +53,11 @@ def type_in(qtbot: QtBot, box: NumberBox | CountBox, text: str, whole: bool = Fa
 def test_what_is_shown_is_read(qtbot: QtBot, locale: str, kind: str) -> None:
     draw, (limits, suffix, decimals, _) = random.Random(0), KINDS[kind]
     box = made(qtbot, kind, limits[0])
-    for _ in range(10):
+    for _ in range(3):
         value = round(draw.uniform(*limits), decimals)
         box.setValue(value)
-        shown = box.text()
-        assert f"{value:.{decimals}f}" in shown, "a point, as on knobs"
-        number = f"{value:.{decimals}f}"
+        shown, number = box.text(), f"{value:.{decimals}f}"
+        assert number in shown, "a point, as on knobs"
         for text in (shown, number, number.replace(".", ","), number + suffix, number + suffix.strip()):
             for whole in (False, True):
                 if text == shown and not whole:
@@ -70,32 +68,23 @@ def test_what_is_shown_is_read(qtbot: QtBot, locale: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "x", "2.5.1", "0.3 cm", "1e", "65", "-1", "nan"])
-def test_a_refused_text_leaves_the_value_and_says_so(qtbot: QtBot, locale: str, text: str) -> None:
+def test_a_refused_text_leaves_the_value_says_so_and_presses_no_button(qtbot: QtBot, locale: str, text: str) -> None:
     QToolTip.hideText()
     qtbot.waitUntil(lambda: not QToolTip.isVisible())
-    box = made(qtbot, "length", 0.65)
-    changes: list[float] = []
-    box.valueChanged.connect(changes.append)
-    box.selectAll()
-    qtbot.keyClick(box, Qt.Key.Key_Delete)
-    type_in(qtbot, box, text)
-    assert (box.value(), box.text(), changes) == (0.65, "0.650 m", [])
-    assert QToolTip.isVisible() and "0.650 m is" in QToolTip.text()
-
-
-def test_a_refused_text_does_not_press_the_dialogs_button(qtbot: QtBot) -> None:
-    dialog, box, button = QDialog(), spin_box("number", (0, 5), 1, "", " m", 2), QPushButton("Do it", default=True)
+    dialog, box, button = QDialog(), made(qtbot, "length", 0.65), QPushButton("Do it", default=True)
     qtbot.addWidget(dialog)
     column = QVBoxLayout(dialog)
     for part in (box, button):
         column.addWidget(part)
-    pressed: list[bool] = []
-    button.clicked.connect(lambda: pressed.append(True))
+    pressed, changes = reported(button.clicked), reported(box.valueChanged)
     dialog.show()
-    type_in(qtbot, box, "1.2.3")
-    assert pressed == []
+    box.selectAll()
+    qtbot.keyClick(box, Qt.Key.Key_Delete)
+    type_in(qtbot, box, text)
+    assert (box.value(), box.text(), changes, pressed) == (0.65, "0.650 m", [], [])
+    assert QToolTip.isVisible() and "0.650 m is" in QToolTip.text()
     type_in(qtbot, box, "1,2")
-    assert pressed == [True] and box.value() == 1.2
+    assert len(pressed) == 1 and box.value() == 1.2
 
 
 def test_a_word_for_no_value(qtbot: QtBot, locale: str) -> None:
@@ -119,6 +108,22 @@ def test_counts_are_whole(qtbot: QtBot, locale: str) -> None:
         assert (box.value(), box.text()) == (value, str(value)), text
     qtbot.keyClick(box, Qt.Key.Key_Up)
     assert box.value() == 9
+
+
+def test_a_note_is_typed_by_its_name_and_one_out_of_range_is_not_taken(qtbot: QtBot) -> None:
+    box = NoteBox("Lowest key", "")
+    qtbot.addWidget(box)
+    box.setRange(40, 76)
+    box.setValue(52)
+    assert box.text() == "E3"
+    box.selectAll()
+    qtbot.keyClicks(box, "bb2")
+    assert box.value() == 52  # only when it is whole
+    for text in ("bb2", "C9", "x"):
+        type_in(qtbot, box, text)
+        assert (box.value(), box.text()) == (46, "A♯2")
+    qtbot.keyClick(box, Qt.Key.Key_Up)
+    assert box.text() == "B2"
 
 
 def test_every_number_field_of_the_app_is_one_of_these() -> None:

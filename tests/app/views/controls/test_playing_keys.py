@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
@@ -10,10 +12,15 @@ from pytestqt.qtbot import QtBot
 
 from app.views.controls.playing_keys import X11, PlayingKeys
 from app.views.instrument.patch_card import patch_browser
+from tests.app.gestures import CONTROL, NONE
+
+DOWN, UP = QEvent.Type.KeyPress, QEvent.Type.KeyRelease
+Hear = Callable[[str], list[str]]
 
 
 @pytest.fixture
 def window(qtbot: QtBot) -> QWidget:
+    """A line, and a list of which the second entry begins with an A."""
     made = QWidget()
     qtbot.addWidget(made)
     column = QVBoxLayout(made)
@@ -25,114 +32,93 @@ def window(qtbot: QtBot) -> QWidget:
 
 
 @pytest.fixture
-def heard(window: QWidget) -> list[str]:
-    seen: list[str] = []
-    PlayingKeys(window).pressed.connect(lambda press: seen.append(press.letter))
-    return seen
+def hear(window: QWidget) -> Hear:
+    """The letters from now on: S as it is pressed, s as it is released."""
+
+    def begin(platform: str) -> list[str]:
+        letters: list[str] = []
+        keys = PlayingKeys(window, platform)
+        keys.pressed.connect(lambda press: letters.append(press.letter))
+        keys.released.connect(lambda press: letters.append(press.letter.lower()))
+        return letters
+
+    return begin
 
 
-def test_a_list_does_not_take_the_notes(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
-    box = window.findChild(QComboBox)
-    QApplication.instance().focusChanged.emit(None, box)  # type: ignore[union-attr]
-    qtbot.keyClick(box, Qt.Key.Key_A)
-    assert heard == ["A"]
-    assert box.currentText() == "first"
-    QApplication.instance().focusChanged.emit(box, None)  # type: ignore[union-attr]
-    qtbot.keyClick(box, Qt.Key.Key_A)
-    assert box.currentText() == "a song"
+def focus(widget: QWidget | None) -> None:
+    QApplication.instance().focusChanged.emit(None, widget)  # type: ignore[union-attr]
 
 
-def test_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
-    line = window.findChild(QLineEdit)
-    QApplication.instance().focusChanged.emit(None, line)  # type: ignore[union-attr]
-    qtbot.keyClicks(line, "asdc1")
-    assert (line.text(), heard) == ("asdc1", [])
+def test_a_list_does_not_take_the_notes_and_who_writes_is_left_alone(
+    qtbot: QtBot, window: QWidget, hear: Hear
+) -> None:
+    letters, box, line = hear("windows"), window.findChild(QComboBox), window.findChild(QLineEdit)
+    for focused, heard, text, chosen in (
+        (box, ["A", "a"], "", "first"),
+        (line, [], "a", "first"),
+        (None, [], "a", "a song"),
+    ):
+        letters.clear()
+        focus(focused)
+        qtbot.keyClicks(focused or box, "a")
+        assert (letters, line.text(), box.currentText()) == (heard, text, chosen)
 
 
-def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
-    browser = patch_browser(window)
+def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+    letters, browser, box = hear("windows"), patch_browser(window), window.findChild(QComboBox)
     browser.show_over()
-    box = window.findChild(QComboBox)
     for focused in (browser.list, browser, box, window):
         browser.search.clear()
-        QApplication.instance().focusChanged.emit(None, focused)  # type: ignore[union-attr]
+        focus(focused)
         qtbot.keyClicks(focused, "ah")
-        assert (browser.search.text(), heard) == ("ah", [])
+        assert (browser.search.text(), letters) == ("ah", [])
     assert box.currentText() == "first"
     browser.dismiss()
     qtbot.keyClicks(window, "a")
-    assert heard == ["A"]
+    assert letters == ["A", "a"]
 
 
 def test_a_key_that_is_held_down_is_reported_once_and_shortcuts_are_not_notes(
-    qtbot: QtBot, window: QWidget, heard: list[str]
+    qtbot: QtBot, window: QWidget, hear: Hear
 ) -> None:
+    letters = hear("windows")
     qtbot.keyPress(window, Qt.Key.Key_S)
     for _ in range(5):
-        repeated = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_S, Qt.KeyboardModifier.NoModifier, "s", True)
-        QApplication.sendEvent(window, repeated)
-    qtbot.keyClick(window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
-    assert heard == ["S"]
+        QApplication.sendEvent(window, QKeyEvent(DOWN, Qt.Key.Key_S, NONE, "s", True))
+    qtbot.keyClick(window, Qt.Key.Key_D, CONTROL)
+    assert letters == ["S"]
 
 
-def native(kind: QEvent.Type, time_ms: int) -> QKeyEvent:
-    """As X11 gives it: with the key's code and the server's time."""
-    event = QKeyEvent(kind, Qt.Key.Key_S, Qt.KeyboardModifier.NoModifier, 39, 0, 0, "s")
-    event.setTimestamp(time_ms)
-    return event
-
-
-def test_a_repetition_that_looks_like_a_release_and_a_press_is_neither(qtbot: QtBot, window: QWidget) -> None:
-    keys, reported = PlayingKeys(window, X11), list[str]()
-    keys.pressed.connect(lambda press: reported.append("down"))
-    keys.released.connect(lambda press: reported.append("up"))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
-    for time_ms in (1_660, 1_700, 1_740):
-        QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, time_ms))
-        QApplication.sendEvent(window, native(QEvent.Type.KeyPress, time_ms))
-    qtbot.wait(60)
-    assert reported == ["down"]
-    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 2_000))
-    qtbot.waitUntil(lambda: reported == ["down", "up"])
-
-
-@pytest.mark.parametrize("platform", [X11, "windows"])
-def test_a_key_struck_fast_again_is_let_go_first(window: QWidget, platform: str) -> None:
-    keys, reported = PlayingKeys(window, platform), list[str]()
-    keys.pressed.connect(lambda press: reported.append("down"))
-    keys.released.connect(lambda press: reported.append("up"))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_030))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_042))
-    assert reported == ["down", "up", "down"]
-
-
-@pytest.mark.parametrize("platform", [X11, "windows"])
-def test_a_key_whose_release_was_lost_is_let_go_before_it_is_pressed_again(window: QWidget, platform: str) -> None:
-    keys, reported = PlayingKeys(window, platform), list[str]()
-    keys.pressed.connect(lambda press: reported.append("down"))
-    keys.released.connect(lambda press: reported.append("up"))
-    for time_ms in (1_000, 3_000):  # a menu has taken the release between them
-        QApplication.sendEvent(window, native(QEvent.Type.KeyPress, time_ms))
-    assert reported == ["down", "up", "down"]
-
-
-@pytest.mark.parametrize("platform", ["windows", "cocoa", "wayland"])
-def test_a_release_is_not_held_back_where_qt_marks_repetitions(window: QWidget, platform: str) -> None:
-    keys, reported = PlayingKeys(window, platform), list[str]()
-    keys.pressed.connect(lambda press: reported.append("down"))
-    keys.released.connect(lambda press: reported.append("up"))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
-    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_500))
-    assert reported == ["down", "up"]
-
-
-def test_keys_let_go_together_are_all_released(qtbot: QtBot, window: QWidget) -> None:
-    keys, reported = PlayingKeys(window, X11), list[str]()
-    keys.released.connect(lambda press: reported.append(press.letter))
-    for key, code in ((Qt.Key.Key_S, 39), (Qt.Key.Key_D, 40)):
-        for kind, time_ms in ((QEvent.Type.KeyPress, 1_000), (QEvent.Type.KeyRelease, 1_500)):
-            event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, code, 0, 0, chr(key))
-            event.setTimestamp(time_ms)
-            QApplication.sendEvent(window, event)
-    qtbot.waitUntil(lambda: sorted(reported) == ["D", "S"])
+@pytest.mark.parametrize(
+    ("platforms", "events", "letters"),
+    [
+        # on X11 a repetition looks like a release and a press
+        ([X11], [(DOWN, 1_000), (UP, 1_660), (DOWN, 1_660), (UP, 1_700), (DOWN, 1_700), (UP, 2_000)], "Ss"),
+        # struck fast again, it is released first
+        ([X11, "windows"], [(DOWN, 1_000), (UP, 1_030), (DOWN, 1_042)], "SsS"),
+        # a menu has taken the release
+        ([X11, "windows"], [(DOWN, 1_000), (DOWN, 3_000)], "SsS"),
+        (["windows", "cocoa", "wayland", X11], [(DOWN, 1_000), (UP, 1_500)], "Ss"),
+    ],
+)
+def test_releases_and_repetitions(
+    qtbot: QtBot,
+    window: QWidget,
+    hear: Hear,
+    platforms: list[str],
+    events: list[tuple[QEvent.Type, int]],
+    letters: str,
+) -> None:
+    """Of two keys together, as the platform gives them: with the key's code and the server's time."""
+    for platform in platforms:
+        heard = hear(platform)
+        for kind, time_ms in events:
+            for key, code in ((Qt.Key.Key_S, 39), (Qt.Key.Key_D, 40)):
+                event = QKeyEvent(kind, key, NONE, code, 0, 0, chr(key).lower())
+                event.setTimestamp(time_ms)
+                QApplication.sendEvent(window, event)
+        if platform == X11:
+            qtbot.waitUntil(lambda heard=heard: len(heard) >= 2 * len(letters))
+        of_s = [letter for letter in heard if letter in "Ss"]
+        of_d = [letter.replace("D", "S").replace("d", "s") for letter in heard if letter in "Dd"]
+        assert of_s == of_d == list(letters)

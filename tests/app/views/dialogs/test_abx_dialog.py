@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QLabel, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.analysis.abx.record import AbxRecord, Candidate
@@ -18,8 +18,11 @@ from app.analysis.abx.trials import AbxChoices, draw_order
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
+from app.playing.pair import Pair
+from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
 from engine.voices import Mixer
+from tests.app.gestures import LEFT, named
 from tests.app.questions import answered
 
 RATE_HZ = 48_000
@@ -33,8 +36,16 @@ Sounds = Mapping[str, NDArray[np.float32]]
 
 
 @pytest.fixture
-def sound(numb_output: Callable[[AudioDevice, float, Mixer], Output], qtbot: QtBot) -> Iterator[Sound]:
-    with Sound(look_up=lambda *_: HEADPHONES, open_output=numb_output) as made:
+def devices() -> list[AudioDevice]:
+    """What is connected; sound goes to the last."""
+    return [HEADPHONES]
+
+
+@pytest.fixture
+def sound(
+    numb_output: Callable[[AudioDevice, float, Mixer], Output], devices: list[AudioDevice], qtbot: QtBot
+) -> Iterator[Sound]:
+    with Sound(look_up=lambda *_: devices[-1], open_output=numb_output) as made:
         made.open()
         qtbot.waitUntil(lambda: made.status().device is not None)
         yield made
@@ -64,7 +75,7 @@ def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
         with qtbot.waitExposed(dialog):
             dialog.open()
         if rendered is None and through is sound:
-            qtbot.waitUntil(dialog._setup.start.isEnabled)
+            qtbot.waitUntil(start_button(dialog).isEnabled)
         return dialog
 
     return open_dialog
@@ -76,8 +87,12 @@ def press(qtbot: QtBot, dialog: AbxDialog, *keys: str) -> None:
         qtbot.keyClick(dialog.focusWidget() or dialog, codes.get(key) or Qt.Key(ord(key.upper())))
 
 
+def start_button(dialog: AbxDialog) -> QPushButton:
+    return named(dialog, "Start the test", QPushButton)
+
+
 def start(dialog: AbxDialog) -> None:
-    dialog._setup.start.click()
+    start_button(dialog).click()
     assert dialog.testing
 
 
@@ -94,8 +109,7 @@ def saved(tmp_path: Path) -> AbxRecord:
 
 def test_enter_starts_the_test_from_the_number_of_trials(qtbot: QtBot, open_dialog: Open) -> None:
     dialog = open_dialog()
-    dialog._setup.trials.setFocus()
-    qtbot.keyClick(dialog._setup.trials, Qt.Key.Key_Return)
+    qtbot.keyClick(dialog.findChild(CountBox), Qt.Key.Key_Return)
     assert dialog.testing
 
 
@@ -121,19 +135,20 @@ def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Pat
     assert record.b.gain_db == pytest.approx(-3.52, abs=0.02)
 
 
-@pytest.mark.parametrize("key", ["a", "b", "x"])
-def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, sound: Sound, key: str) -> None:
+def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[str] = []
+
+    class Heard(Pair):
+        def select(self, name: str) -> None:
+            heard.append(name)
+            super().select(name)
+
+    monkeypatch.setattr("app.views.dialogs.abx_dialog.Pair", Heard)
     dialog = open_dialog(seed=2)
     start(dialog)
     assert draw_order(2, 3)[0] == "B"
-    press(qtbot, dialog, "a" if key != "a" else "b", key)
-    assert dialog._pair is not None
-    voices = dialog._pair._voices
-    qtbot.waitUntil(lambda: all(voice.sounding for voice in voices.values()))
-    assert {name: voice.record["wanted_gain"] for name, voice in voices.items()} == (
-        {"A": 1.0, "B": 0.0} if key == "a" else {"A": 0.0, "B": 1.0}
-    )
-    assert len({voice.began_frame for voice in voices.values()}) == 1
+    press(qtbot, dialog, "a", "b", "x", "a", "x")
+    assert heard == ["A", "B", "B", "A", "B"]
 
 
 def test_x_must_be_heard_before_it_is_judged(qtbot: QtBot, open_dialog: Open) -> None:
@@ -188,13 +203,14 @@ def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, t
     assert not dialog.isVisible()
 
 
-def test_a_device_that_vanishes_ends_the_test(qtbot: QtBot, open_dialog: Open, sound: Sound, tmp_path: Path) -> None:
+def test_a_device_that_vanishes_ends_the_test(
+    qtbot: QtBot, open_dialog: Open, sound: Sound, devices: list[AudioDevice], tmp_path: Path
+) -> None:
     dialog = open_dialog()
     start(dialog)
     press(qtbot, dialog, "x", "1", "x")
-    other = AudioDevice("Loudspeaker", "Test API", RATE_HZ)
-    sound._look_up = lambda *_: other
-    sound.open(other)
+    devices.append(AudioDevice("Loudspeaker", "Test API", RATE_HZ))
+    sound.open(devices[-1])
     qtbot.waitUntil(lambda: not dialog.testing)
     assert saved(tmp_path).remark == DEVICE_CHANGED
     assert saved(tmp_path).through["device"] == "Headphones"
@@ -204,7 +220,7 @@ def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> No
     with Sound() as silent:
         dialog = open_dialog(through=silent)
         qtbot.waitUntil(lambda: NO_DEVICE in texts(dialog))
-        assert not dialog._setup.start.isEnabled()
+        assert not start_button(dialog).isEnabled()
 
 
 @pytest.mark.parametrize(("model_hz", "message", "can_start"), [(400.0, SAME, False), (900.0, TRIVIAL, True)])
@@ -216,26 +232,26 @@ def test_a_test_without_a_point_is_reported(
         sounds = dict.fromkeys(sounds, sounds["truth"])
     dialog = open_dialog(rendered=done(sounds))
     qtbot.waitUntil(lambda: message in texts(dialog))
-    assert dialog._setup.start.isEnabled() == can_start
+    assert start_button(dialog).isEnabled() == can_start
 
 
-def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open) -> None:
+@pytest.mark.parametrize("runs_away", [False, True])
+def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open, runs_away: bool) -> None:
     rendered: Future[Sounds] = Future()
     dialog = open_dialog(rendered=rendered)
     qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
-    rendered.set_result(sounds_of())
-    qtbot.waitUntil(dialog._setup.start.isEnabled)
+    if runs_away:
+        rendered.set_exception(RuntimeError("the model's output diverges 0.1 s after the pluck"))
+        qtbot.waitUntil(lambda: "diverges" in texts(dialog))
+    else:
+        rendered.set_result(sounds_of())
+        qtbot.waitUntil(start_button(dialog).isEnabled)
+    assert start_button(dialog).isEnabled() != runs_away
 
 
-def test_a_sound_that_cannot_be_rendered_is_reported(qtbot: QtBot, open_dialog: Open) -> None:
-    rendered: Future[Sounds] = Future()
-    rendered.set_exception(RuntimeError("the model's output diverges 0.1 s after the pluck"))
-    dialog = open_dialog(rendered=rendered)
-    qtbot.waitUntil(lambda: "diverges" in texts(dialog))
-    assert not dialog._setup.start.isEnabled()
-
-
-def test_at_another_rate_of_the_device_it_is_rendered_again(qtbot: QtBot, sound: Sound, tmp_path: Path) -> None:
+def test_at_another_rate_of_the_device_it_is_rendered_again(
+    qtbot: QtBot, sound: Sound, devices: list[AudioDevice], tmp_path: Path
+) -> None:
     asked: list[int] = []
 
     def render(rate_hz: int) -> Future[Sounds]:
@@ -246,11 +262,10 @@ def test_at_another_rate_of_the_device_it_is_rendered_again(qtbot: QtBot, sound:
     qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
     dialog.open()
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):
-        other = AudioDevice("Loudspeaker", "Test API", rate_hz, channels)
-        sound._look_up = lambda *_, other=other: other  # type: ignore[misc]
-        sound.open(other)
+        devices.append(AudioDevice("Loudspeaker", "Test API", rate_hz, channels))
+        sound.open(devices[-1])
         qtbot.waitUntil(lambda channels=channels: sound.mixer.channels == channels and sound.rate_hz == 44_100)
-        qtbot.waitUntil(lambda: dialog._pair is not None and dialog._pair.mixer is sound.mixer)
+        qtbot.waitUntil(lambda: len(asked) == 2 and start_button(dialog).isEnabled())
     assert asked == [RATE_HZ, 44_100]
 
 
@@ -265,7 +280,7 @@ def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
     monkeypatch.setattr(
         "app.views.dialogs.abx_dialog.QFileDialog.getExistingDirectory", lambda *_: str(tmp_path / "other")
     )
-    dialog._result.save.click()
+    named(dialog, "Save elsewhere …", QPushButton).click()
     assert len(list((tmp_path / "other").iterdir())) == 1
     assert "cannot be written" not in texts(dialog)
 
@@ -273,10 +288,10 @@ def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
 def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
     dialog = open_dialog(trials=16)
     assert "12 right of 16" in texts(dialog)
-    setup = dialog._setup
-    setup.trials.setValue(25)
+    trials = dialog.findChild(CountBox)
+    trials.setValue(25)
     assert "18 right of 25" in texts(dialog)
-    setup.trials.setValue(4)
+    trials.setValue(4)
     assert "Too few" in texts(dialog)
     assert dialog.choices().trials == 4
 
@@ -284,6 +299,6 @@ def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
 def test_clicks_hear_and_answer(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
     dialog = open_dialog(trials=1)
     start(dialog)
-    for button in (dialog._trial._sounds["X"], dialog._trial._answers["A"]):
-        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    for name in ("Hear X", "←  X is A"):
+        qtbot.mouseClick(named(dialog, name, QPushButton), LEFT)
     assert saved(tmp_path).trials[0].answer == "A"

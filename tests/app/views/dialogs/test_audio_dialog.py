@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.views.dialogs.audio_dialog import AudioDialog, AudioState
+from tests.app.gestures import named, reported
 
 LOUD, SOFT = DeviceChoice(name="Loud", host_api="ALSA"), DeviceChoice(name="Soft", host_api="JACK")
 GAPS = ("1.2 s: device", "3.4 s: rendering", "5.6 s: runaway")
@@ -26,55 +27,38 @@ def dialog(qtbot: QtBot) -> AudioDialog:
     return made
 
 
-def button(dialog: AudioDialog, text: str) -> QPushButton:
-    return next(found for found in dialog.findChildren(QPushButton) if found.text() == text)
+def shown(dialog: AudioDialog) -> str:
+    """The words that can be read now."""
+    return "\n".join(each.text() for each in dialog.findChildren(QLabel) if each.isVisible())
 
 
 def test_what_is_chosen_is_shown_and_asked_for(qtbot: QtBot, dialog: AudioDialog) -> None:
-    assert (dialog.device, dialog.sound) == (LOUD, SoundChoice(rate_hz=48_000, buffer=512))
+    chosen = SoundChoice(rate_hz=48_000, buffer=512)
+    assert (dialog.device, dialog.sound) == (LOUD, chosen)
+    box = named(dialog, "Output", QComboBox)
+    qtbot.keyClick(box, Qt.Key.Key_Down)
     with qtbot.waitSignal(dialog.choice_made) as asked:
-        qtbot.keyClick(dialog._device, Qt.Key.Key_Down)
-        dialog._device.activated.emit(dialog._device.currentIndex())
-    assert asked.args == [SOFT, SoundChoice(rate_hz=48_000, buffer=512)]
-    dialog._buffer.setCurrentIndex(dialog._buffer.findData("high"))
-    assert dialog.sound.buffer == "high"
-
-
-def test_a_device_that_is_away_stays_in_the_list(dialog: AudioDialog) -> None:
+        box.activated.emit(box.currentIndex())
+    assert asked.args == [SOFT, chosen]
     dialog.show_devices([SOFT], LOUD)
     assert dialog.device == LOUD
-    assert "not connected" in dialog._device.currentText()
+    assert "not connected" in box.currentText(), "a device that is away stays in the list"
     dialog.show_devices([], None)
     assert dialog.device is None
 
 
-def test_a_fault_is_reported_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDialog) -> None:
+def test_the_state_is_shown_with_a_way_to_try_again_and_tones_and_counters(qtbot: QtBot, dialog: AudioDialog) -> None:
     dialog.show_state(PLAYING)
-    assert dialog._problem.isHidden()
-    assert "Loud" in dialog._state_label.text()
+    for words in ("“Loud” (ALSA)", "buffer 12 ms", "3, the last at 5.6 s: runaway", "25 %"):
+        assert words in shown(dialog)
+    gaps = next(each for each in dialog.findChildren(QLabel) if each.text().startswith("3, the last"))
+    assert all(gap in gaps.toolTip() for gap in GAPS)
+    asked = reported(dialog.tone_asked, dialog.gaps_reset, dialog.rescan_asked)
+    for text in ("Right", "Reset", "Rescan"):
+        named(dialog, text, QPushButton).click()
+    assert asked == ["right", (), ()]
     dialog.show_state(SILENT)
-    assert not dialog._problem.isHidden()
-    assert "No audio output" in dialog._state_label.text()
-    assert not button(dialog, "Left").isEnabled()
-    with qtbot.waitSignal(dialog.rescan_asked):
-        button(dialog, "Rescan").click()
-
-
-def test_gaps_are_reported_with_time_and_cause_and_the_load_as_a_share(dialog: AudioDialog) -> None:
-    dialog.show_state(PLAYING)
-    assert dialog._gaps.text() == "3, the last at 5.6 s: runaway"
-    assert all(gap in dialog._gaps.toolTip() for gap in GAPS)
-    assert dialog._load.text() == "25 %"
-    assert "buffer 12 ms" in dialog._state_label.text()
-    dialog.show_state(SILENT)
-    assert dialog._gaps.text() == "0"
-    assert GAPS[0] not in dialog._gaps.toolTip()
-
-
-def test_the_tone_and_the_counter(qtbot: QtBot, dialog: AudioDialog) -> None:
-    dialog.show_state(PLAYING)
-    with qtbot.waitSignal(dialog.tone_asked) as asked:
-        button(dialog, "Right").click()
-    assert asked.args == ["right"]
-    with qtbot.waitSignal(dialog.gaps_reset):
-        button(dialog, "Reset").click()
+    for words in ("No audio output", "in use by another program"):
+        assert words in shown(dialog)
+    assert (gaps.text(), GAPS[0] in gaps.toolTip()) == ("0", False)
+    assert not named(dialog, "Left", QPushButton).isEnabled()

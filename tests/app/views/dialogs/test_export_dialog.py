@@ -12,7 +12,7 @@ import soundfile
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDoubleSpinBox, QTabBar
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
@@ -34,6 +34,7 @@ from engine.presets import SHIPPED
 from tests.app.questions import answered
 
 Make = Callable[..., ExportDialog]
+GUITAR = read_patch(PATCHES / "classical_guitar.json")
 
 
 @pytest.fixture
@@ -62,6 +63,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
         dialog.open_at("note")
         return dialog
 
+    make.note = note  # type: ignore[attr-defined]
     yield make
     for dialog in dialogs:
         dialog.accept()
@@ -99,18 +101,17 @@ def test_it_writes_the_file_that_it_named(
     assert opened == [str(tmp_path)]
 
 
-def test_both_become_two_files(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog = made({"source": "files"})
+def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made, tmp_path: Path) -> None:
+    dialog = made({"source": "files"}, {"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
+    names = ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
+    assert dialog.note.names.text() == "\n".join(names)
     run(qtbot, dialog, "Saved")
-    assert wavs(tmp_path) == ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
-
-
-def test_stereo_and_the_pick_up_reach_the_file(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog = made(heard={"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
-    run(qtbot, dialog, "Saved")
-    with soundfile.SoundFile(tmp_path / "A small string B3 medium.wav") as file:
+    assert wavs(tmp_path) == names
+    with soundfile.SoundFile(tmp_path / names[0]) as file:
         recipe = json.loads(file.comment)
         assert (file.channels, recipe["listen_right"], recipe["pickup"]) == (2, 0.7, "velocity")
+    dialog.note.source.setCurrentIndex(0)
+    assert dialog.note.names.isHidden()
 
 
 def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> None:
@@ -160,29 +161,27 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
     assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices() == choices
 
 
-def test_what_is_heard_is_offered_first(qtbot: QtBot, made, tmp_path: Path) -> None:
-    assert made({"source": "difference"}).note.source.currentData() == "model"
-    dialog = made({"source": "model"}, {"heard": "b"})
-    assert dialog.note.source.currentData() == "truth"
-    run(qtbot, dialog, "Saved")
-    assert wavs(tmp_path) == ["A small string B3 medium truth.wav"]
-    dialog = made({}, {"a": "difference", "difference_gain_db": 36.0, "solo": 2})
-    assert dialog.note.source.currentData() == "difference"
-    assert (dialog.note.gain.isVisible(), dialog.note.gain.value()) == (True, 36)
-    assert "All modes" in dialog.note.what.text()
-
-
-def test_another_preset_that_is_heard_is_the_one_that_is_saved(made) -> None:
-    dialog = made({"source": "files"}, {"b": "preset:other", "heard": "b"})
-    assert dialog.note.source.currentData() == "model"
-    assert dialog.note.job().note.preset.stem == "other"
-    gone = made({}, {"a": "preset:gone"})
-    assert gone.note.job().note.preset.stem == "small"
-
-
-def test_both_stay_chosen_while_one_of_them_is_heard(made) -> None:
-    assert made({"source": "files"}, {"heard": "b"}).note.source.currentData() == "files"
-    assert made({"source": "files"}, {"a": "difference"}).note.source.currentData() == "difference"
+@pytest.mark.parametrize(
+    ("remembered", "heard", "source", "preset"),
+    [
+        ({"source": "difference"}, {}, "model", "small"),
+        ({"source": "model"}, {"heard": "b"}, "truth", "small"),
+        ({}, {"a": "difference", "difference_gain_db": 36.0, "solo": 2}, "difference", "small"),
+        ({"source": "files"}, {"heard": "b"}, "files", "small"),
+        ({"source": "files"}, {"a": "difference"}, "difference", "small"),
+        ({"source": "files"}, {"b": "preset:other", "heard": "b"}, "model", "other"),
+        ({}, {"a": "preset:gone"}, "model", "small"),
+    ],
+)
+def test_what_is_heard_is_offered_first(
+    made, remembered: dict[str, object], heard: dict[str, object], source: str, preset: str
+) -> None:
+    page = made(remembered, heard).note
+    assert page.source.currentData() == source
+    assert page.job().note.preset.stem == preset
+    if "solo" in heard:
+        assert (page.gain.isVisible(), page.gain.value()) == (True, 36)
+        assert "All modes" in page.what.text()
 
 
 def test_a_name_without_its_suffix_gets_it(made) -> None:
@@ -198,8 +197,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot: QtBot, made, tmp_path: Path
 ) -> None:
     """One line says which, with words and not in small print."""
-    guitar = read_patch(PATCHES / "classical_guitar.json")
-    dialog = made({}, {"instrument": guitar})
+    dialog = made({}, {"instrument": GUITAR})
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
     words = "Classical guitar with body, room, sympathetic strings and level, as it is heard"
@@ -207,7 +205,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     run(qtbot, dialog, "Saved")
     path = tmp_path / "Classical guitar B3 hard.wav"
     struck = read_recipe(path).struck
-    assert struck is not None and (struck.instrument, struck.key) == (guitar.name, 59)
+    assert struck is not None and (struck.instrument, struck.key) == (GUITAR.name, 59)
     assert soundfile.info(path).channels == 2
     heard = path.read_bytes()
     page.through.setChecked(False)
@@ -216,57 +214,35 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices().model_dump(), {"instrument": guitar})
+    again = made(dialog.choices().model_dump(), {"instrument": GUITAR})
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
-def test_a_preset_has_no_instrument_whatever_was_played_before(made) -> None:
-    guitar = read_patch(PATCHES / "classical_guitar.json")
-    choices = {"instrument": SingleString(preset="small"), "kept": guitar}
-    dialog = made({}, choices)  # kept, as is its page then
-    page = dialog.note
-    assert not page.through.isVisible()
-    assert page.through_words.text() == "None: the string alone, as it is heard"
-    assert page.job().note.struck is None
+@pytest.mark.parametrize(
+    ("heard", "words"),
+    [
+        # the instrument is kept, as is its page then
+        ({"instrument": SingleString(preset="small"), "kept": GUITAR}, "None: the string alone, as it is heard"),
+        ({"instrument": GUITAR, "a": "difference"}, "without amplifier, body and room, as a difference is heard"),
+    ],
+)
+def test_a_note_without_its_instrument_says_so(made, heard: dict[str, object], words: str) -> None:
+    page = made({}, heard).note
+    assert words in page.through_words.text()
+    assert page.through.isVisible() == (page.job().note.struck is not None) == ("a" in heard)
 
 
-def test_a_difference_says_what_it_is_heard_without(made) -> None:
-    dialog = made(
-        {}, {"instrument": read_patch(PATCHES / "classical_guitar.json"), "a": "difference"}
-    )  # kept, as is its page then
-    page = dialog.note
-    assert "without amplifier, body and room, as a difference is heard" in page.through_words.text()
-
-
-def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog, other = made(), made({}, {"amplitude_mm": 0.01, "heard": "b"})
-    dialog.show_subjects(other._subjects)
+def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made) -> None:
+    dialog, other = made(), made.note({"amplitude_mm": 0.01, "heard": "b"})
+    dialog.show_subjects({"note": other})
     assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
     dialog.note.seconds.setValue(600)
     dialog.save.click()
-    dialog.show_subjects(made()._subjects)
+    dialog.show_subjects({"note": made.note({})})
     dialog.close_button.click()
     assert "soft" in dialog.note.file.edit.text()
     qtbot.waitUntil(lambda: "Cancelled; no file was written" in dialog.state.text())
     assert "medium" in dialog.note.file.edit.text()
-
-
-def test_two_files_are_both_named(made) -> None:
-    dialog = made({"source": "files"})
-    first, second = (path.name for path in dialog.note.paths().values())
-    assert first != second
-    assert dialog.note.names.text() == f"{first}\n{second}"
-    dialog.note.source.setCurrentIndex(0)
-    assert dialog.note.names.isHidden()
-
-
-def test_every_control_of_the_dialog_has_a_name_and_a_tip(dialog: ExportDialog) -> None:
-    for kind in (QAbstractButton, QComboBox, QDoubleSpinBox, QTabBar):
-        for control in dialog.findChildren(kind):
-            if control.focusPolicy() != Qt.FocusPolicy.NoFocus and not isinstance(control.parent(), QTabBar):
-                assert control.accessibleName() or getattr(control, "text", lambda: "")(), control
-                assert control.toolTip(), control.accessibleName()
-    assert dialog.note.file.edit.accessibleName() and dialog.note.file.edit.toolTip()
 
 
 def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplication, made) -> None:

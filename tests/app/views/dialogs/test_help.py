@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from app.presets.words import model_word
 from app.shared.log import log_file
 from app.views.controls.app_menu import ENTRIES
-from app.views.dialogs.help_dialog import help_parts
+from app.views.dialogs.help_dialog import HelpDialog, help_parts
 from app.window.about import about_text, library_versions
 from app.window.controller import Controller
 from engine.models import MODELS as KNOWN_MODELS
@@ -19,8 +19,7 @@ from engine.models import MODELS as KNOWN_MODELS
 
 def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller) -> None:
     controller.window.action["help"].trigger()
-    dialog = controller._help
-    assert dialog is not None
+    dialog = controller.window.findChild(HelpDialog)
     assert dialog.isVisible()
     assert not dialog.isModal()
     texts = {dialog.tabs.tabText(row): dialog.tabs.widget(row).toPlainText() for row in range(dialog.tabs.count())}
@@ -44,15 +43,7 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
 def test_about_has_versions_files_and_the_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", "my/own")
     text = about_text(Path("here/settings.json"), Path("there"))
-    for part in (
-        "Learned Strings",
-        "MIT",
-        "DAFx24",
-        str(Path("here/settings.json")),
-        "there",
-        str(Path("my/own")),
-        "torch",
-        "PySide6",
-    ):
+    paths = [str(Path(path)) for path in ("here/settings.json", "there", "my/own")]
+    for part in ("Learned Strings", "MIT", "DAFx24", "torch", "PySide6", *paths):
         assert part in text
     assert "not installed" not in library_versions().values()

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.playing.keys import SoundingNote
 from app.views import theme
 from app.views.instrument.neck import Neck, fret_share
+from tests.app.gestures import CONTROL, LEFT, NONE, RIGHT, SHIFT, drag, picture, press_keys, reported
 
-LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
-SHIFT = Qt.KeyboardModifier.ShiftModifier
 GUITAR = (("E2", 40), ("A2", 45), ("D3", 50), ("G3", 55), ("B3", 59), ("E4", 64))
+NUMBERS = QPoint(500, 108)  # beneath the neck
+Key = Qt.Key
+Notes = list[tuple[str, int]]
 
 
 @pytest.fixture
@@ -28,120 +32,68 @@ def neck(qtbot: QtBot) -> Neck:
     return made
 
 
+@pytest.fixture
+def notes(neck: Neck, notes_of: Callable[[QWidget], Notes]) -> Notes:
+    return notes_of(neck)
+
+
 def on(neck: Neck, string: int, fret: int, share: float = 0.5) -> QPoint:
     cell = neck.cell(string, fret)
     return QPointF(cell.center().x(), cell.top() + share * cell.height()).toPoint()
 
 
 def test_frets_lie_where_those_of_a_string_do() -> None:
-    assert fret_share(0, 24) == 0
-    assert fret_share(24, 24) == 1
+    assert (fret_share(0, 24), fret_share(24, 24)) == (0, 1)
     assert fret_share(12, 24) == pytest.approx(0.5 / 0.75)  # half of the string, of three quarters
     gaps = [fret_share(n + 1, 24) - fret_share(n, 24) for n in range(24)]
     assert all(b / a == pytest.approx(2 ** (-1 / 12)) for a, b in itertools.pairwise(gaps))
 
 
-def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck) -> None:
-    pressed: list[tuple[int, int]] = []
-    released: list[int] = []
-    neck.pressed.connect(lambda key, velocity: pressed.append((key, velocity)))
-    neck.released.connect(lambda key: released.append(key))
+def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+    pressed, keys = reported(neck.pressed), []
     for string, fret in ((0, 0), (0, 5), (3, 2), (5, 12), (5, 22)):
         qtbot.mouseClick(neck, LEFT, pos=on(neck, string, fret))
-        assert pressed[-1][0] == GUITAR[string][1] + fret
-    assert released == [key for key, _ in pressed]
-    assert all(50 < velocity < 95 for _, velocity in pressed)
-
-
-def test_the_highest_string_is_above_and_lower_in_a_row_is_harder(qtbot: QtBot, neck: Neck) -> None:
-    assert neck.cell(5, 3).top() == 0 < neck.cell(0, 3).top()
-    velocities: list[int] = []
-    neck.pressed.connect(lambda _, velocity: velocities.append(velocity))
-    for share in (0.15, 0.85):
-        qtbot.mouseClick(neck, LEFT, pos=on(neck, 2, 3, share))
-    assert velocities[0] + 40 < velocities[1]
-
-
-def test_a_note_is_seen_on_the_highest_string_at_or_below_it(neck: Neck) -> None:
-    for key, string in ((40, 0), (44, 0), (45, 1), (58, 3), (59, 4), (86, 5), (30, 0)):
-        assert neck.string_of(key) == string
-    neck.show_notes([SoundingNote(52, 1.0)])  # the second fret of D
-    picture = neck.grab().toImage()
-    ratio = picture.devicePixelRatio()
-    rect = neck.cell(2, 2)
-    seen = {
-        picture.pixelColor(round(x * ratio), round(rect.center().y() * ratio)).name()
-        for x in range(int(rect.left()), int(rect.right()))
-    }
-    assert theme.MODEL in seen
-
-
-@pytest.mark.parametrize("strings", [(("E2", 40),), tuple((str(key), key) for key in range(40, 87, 3)), ()])
-def test_many_strings_or_one_are_a_fan_of_the_keys(
-    qtbot: QtBot, neck: Neck, strings: tuple[tuple[str, int], ...]
-) -> None:
-    neck.set_strings(strings)
-    assert not neck.in_rows
-    pressed: list[int] = []
-    neck.pressed.connect(lambda key, _: pressed.append(key))
-    for key in (40, 63, 86):
-        qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
-    assert pressed == [40, 63, 86]
-
-
-def test_beyond_the_range_nothing_is_played(qtbot: QtBot, neck: Neck) -> None:
+        keys.append(GUITAR[string][1] + fret)
+    assert notes == [(what, key) for key in keys for what in ("on", "off")]
+    assert all(50 < velocity < 95 for _, velocity, _ in pressed)
     neck.set_range(40, 70)
-    pressed: list[int] = []
-    neck.pressed.connect(lambda key, _: pressed.append(key))
     qtbot.mouseClick(neck, LEFT, pos=on(neck, 5, 7))
-    qtbot.mouseClick(neck, LEFT, pos=QPoint(500, 108))  # the numbers beneath
-    assert pressed == []
+    qtbot.mouseClick(neck, LEFT, pos=NUMBERS)
+    assert len(notes) == 10, "beyond the range nothing is played"
 
 
-def test_the_velocity_of_a_click_is_shown(qtbot: QtBot, neck: Neck) -> None:
-    heard: list[int] = []
-    neck.pressed.connect(lambda _, velocity: heard.append(velocity))
+def test_lower_in_a_row_is_harder_and_the_velocity_is_shown(qtbot: QtBot, neck: Neck) -> None:
+    assert neck.cell(5, 3).top() == 0 < neck.cell(0, 3).top(), "the highest string is above"
+    pressed = reported(neck.pressed)
     assert neck.figure == ""
-    for share in (0.2, 0.8):
-        before = neck.grab().toImage()
+    for share in (0.15, 0.85):
+        before = picture(neck)
         qtbot.mouseMove(neck, on(neck, 2, 4, share))
         hovered = neck.figure
-        assert neck.grab().toImage() != before
+        assert picture(neck) != before
         qtbot.mousePress(neck, LEFT, pos=on(neck, 2, 4, share))
-        assert neck.figure == hovered == f"velocity {heard[-1]}"
-        qtbot.mouseMove(neck, on(neck, 3, 4, 0.5))  # a strum keeps it
+        assert neck.figure == hovered == f"velocity {pressed[-1][1]}"
+        qtbot.mouseMove(neck, on(neck, 3, 4))  # a strum keeps it
         assert neck.figure == hovered
-        qtbot.mouseRelease(neck, LEFT, pos=on(neck, 3, 4, 0.5))
-    qtbot.mouseMove(neck, QPoint(500, 108))  # the numbers beneath
+        qtbot.mouseRelease(neck, LEFT, pos=on(neck, 3, 4))
+    assert pressed[0][1] + 40 < pressed[-1][1]
+    qtbot.mouseMove(neck, NUMBERS)
     assert neck.figure == ""
-
-
-def test_the_string_at_the_cursor_is_named(qtbot: QtBot, neck: Neck) -> None:
-    qtbot.mouseClick(neck, LEFT, pos=on(neck, 1, 3))
-    assert neck.accessibleDescription().startswith("C3, string A2, fret 3; ")
-    qtbot.keyClick(neck, Qt.Key.Key_Up)
-    assert neck.accessibleDescription().startswith("F3, string D3, fret 3; ")
-    assert "velocity 96" in neck.accessibleDescription()
-
-
-@pytest.mark.parametrize("levels", [{}, {20: 1.0, 127: 0.5}, {40: 0.2, 64: 2.0}])
-def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) -> None:
-    for strings in (GUITAR, ()):
-        neck.set_strings(strings)
-        neck.show_sounding(levels)
-        neck.show_notes([SoundingNote(key, level, key % 7 - 1, 0.3) for key, level in levels.items()])
-        assert not neck.grab().isNull()
 
 
 def lit_x(neck: Neck, string: int) -> float:
-    """Where the dot of a string begins: the share of the width left of it."""
-    picture = neck.grab().toImage()
-    y = round(neck.cell(string, 0).center().y() * picture.devicePixelRatio())
-    lit = [x for x in range(picture.width()) if picture.pixelColor(x, y).name() == theme.MODEL]
-    return lit[0] / picture.width() if lit else float("nan")
+    """The share of the width left of the dot of a string; not a number where there is none."""
+    image = picture(neck)
+    y = round(neck.cell(string, 0).center().y() * image.devicePixelRatio())
+    lit = [x for x in range(image.width()) if image.pixelColor(x, y).name() == theme.MODEL]
+    return lit[0] / image.width() if lit else float("nan")
 
 
-def test_a_note_that_slides_is_seen_on_its_own_string_between_two_frets(neck: Neck) -> None:
+def test_a_note_is_seen_on_the_highest_string_at_or_below_it_and_slides_on_its_own(neck: Neck) -> None:
+    for key, string in ((40, 0), (44, 0), (45, 1), (58, 3), (59, 4), (86, 5), (30, 0)):
+        assert neck.string_of(key) == string
+    neck.show_notes([SoundingNote(52, 1.0)])  # the second fret of D
+    assert lit_x(neck, 2) > 0
     neck.show_notes([SoundingNote(52, 1.0, string=5)])  # slid up the lowest string, far above the open D
     last = lit_x(neck, 0)
     assert last > 0 and lit_x(neck, 2) != lit_x(neck, 2)
@@ -152,108 +104,100 @@ def test_a_note_that_slides_is_seen_on_its_own_string_between_two_frets(neck: Ne
     assert on_the_way == sorted(on_the_way) and on_the_way[-1] < last
 
 
-def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck) -> None:
-    heard: list[tuple[str, int]] = []
-    velocities = set[int]()
-    neck.pressed.connect(lambda key, _: heard.append(("on", key)))
-    neck.pressed.connect(lambda _, velocity: velocities.add(velocity))
-    neck.released.connect(lambda key: heard.append(("off", key)))
+@pytest.mark.parametrize("strings", [(("E2", 40),), tuple((str(key), key) for key in range(40, 87, 3)), ()])
+def test_many_strings_or_one_are_a_fan_of_the_keys(
+    qtbot: QtBot, neck: Neck, notes: Notes, strings: tuple[tuple[str, int], ...]
+) -> None:
+    neck.set_strings(strings)
+    assert not neck.in_rows
+    for key in (40, 63, 86):
+        qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
+    assert [key for what, key in notes if what == "on"] == [40, 63, 86]
+
+
+@pytest.mark.parametrize("levels", [{}, {20: 1.0, 127: 0.5}, {40: 0.2, 64: 2.0}])
+def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) -> None:
+    for strings in (GUITAR, ()):
+        neck.set_strings(strings)
+        neck.show_sounding(levels)
+        neck.show_notes([SoundingNote(key, level, key % 7 - 1, 0.3) for key, level in levels.items()])
+        assert not picture(neck).isNull()
+
+
+def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+    pressed, chord = reported(neck.pressed), [42, 47, 52, 57, 61, 66]
     qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
     qtbot.mouseMove(neck, on(neck, 3, 2))  # a fast mouse is seen at few places
     qtbot.mouseMove(neck, on(neck, 5, 2) + QPoint(0, 5))  # lower on its string
-    assert heard == [("on", key) for key in (42, 47, 52, 57, 61, 66)]
-    assert all(neck.is_down(key) for _, key in heard)
-    assert len(velocities) == 1  # that of the click
+    assert notes == [("on", key) for key in chord]
+    assert all(neck.is_down(key) for key in chord)
+    assert len({velocity for _, velocity, _ in pressed}) == 1, "that of the click"
     qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 2))
-    assert {key for what, key in heard if what == "off"} == {42, 47, 52, 57, 61, 66}
-    assert not any(neck.is_down(key) for _, key in heard)
+    assert sorted(notes[6:]) == [("off", key) for key in chord]
+    assert not any(neck.is_down(key) for key in chord)
 
 
 @pytest.mark.parametrize("legato", [False, True])
 def test_a_drag_along_a_string_takes_its_note_over_where_keys_are_legato(
-    qtbot: QtBot, neck: Neck, legato: bool
+    neck: Neck, notes: Notes, legato: bool
 ) -> None:
-    heard: list[tuple[str, int]] = []
     neck.legato = legato
-    neck.pressed.connect(lambda key, _: heard.append(("on", key)))
-    neck.released.connect(lambda key: heard.append(("off", key)))
-    qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 1))
-    qtbot.mouseMove(neck, on(neck, 0, 3))
-    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 0, 3))
+    drag(neck, on(neck, 0, 1), on(neck, 0, 3))
     moved = [("on", 43), ("off", 41)]
-    assert heard == [("on", 41), *(moved if legato else moved[::-1]), ("off", 43)]
+    assert notes == [("on", 41), *(moved if legato else moved[::-1]), ("off", 43)]
 
 
-def test_a_click_gives_its_string_and_two_strings_have_one_pitch(qtbot: QtBot, neck: Neck) -> None:
-    heard: list[tuple[str, int, int]] = []
-    neck.pressed.connect(lambda key, _, string: heard.append(("on", key, string)))
-    neck.released.connect(lambda key, string: heard.append(("off", key, string)))
-    qtbot.mousePress(neck, LEFT, pos=on(neck, 4, 5))
-    qtbot.mouseMove(neck, on(neck, 5, 0))
-    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 0))
-    assert heard == [("on", 64, 1), ("on", 64, 0), ("off", 64, 1), ("off", 64, 0)]
+def test_a_click_gives_its_string_and_two_strings_have_one_pitch(neck: Neck) -> None:
+    pressed, released = reported(neck.pressed), reported(neck.released)
+    drag(neck, on(neck, 4, 5), on(neck, 5, 0))
+    assert [(key, string) for key, _, string in pressed] == released == [(64, 1), (64, 0)]
 
 
-@pytest.mark.parametrize(("button", "modifier"), [(RIGHT, Qt.KeyboardModifier.NoModifier), (LEFT, SHIFT)])
+@pytest.mark.parametrize(("button", "modifier"), [(RIGHT, NONE), (LEFT, SHIFT)])
 def test_a_chord_is_fingered_silently_then_strummed(
-    qtbot: QtBot, neck: Neck, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
+    qtbot: QtBot, neck: Neck, notes: Notes, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
 ) -> None:
-    heard: list[int] = []
-    neck.pressed.connect(lambda key, _: heard.append(key))
+    bare = picture(neck)
     for string, fret in ((1, 3), (2, 2), (3, 5), (4, 1)):  # C, and a wrong finger on G
         qtbot.mouseClick(neck, button, modifier, on(neck, string, fret))
     qtbot.mouseClick(neck, button, modifier, on(neck, 3, 5))  # lifted
-    assert heard == [] and neck.fingers == {1: 3, 2: 2, 4: 1}
-    qtbot.mousePress(neck, LEFT, pos=on(neck, 1, 9))  # wherever it is strummed
-    qtbot.mouseMove(neck, on(neck, 5, 10))
-    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 10))
-    assert heard == [48, 52, 55, 60, 64]
-    neck.setFocus()
-    qtbot.keyClick(neck, Qt.Key.Key_Delete)
+    assert notes == [] and neck.fingers == {1: 3, 2: 2, 4: 1}
+    assert picture(neck) != bare
+    drag(neck, on(neck, 1, 9), on(neck, 5, 10))  # wherever it is strummed
+    assert [key for what, key in notes if what == "on"] == [48, 52, 55, 60, 64]
+    press_keys(neck, Key.Key_Delete)
     assert neck.fingers == {}
-    qtbot.mouseClick(neck, LEFT, pos=on(neck, 1, 9))
-    assert heard[-1] == 54
-
-
-def test_fingers_are_seen_and_leave_with_their_strings(qtbot: QtBot, neck: Neck) -> None:
-    bare = neck.grab().toImage()
-    qtbot.mouseClick(neck, RIGHT, pos=on(neck, 2, 4))
-    assert neck.grab().toImage() != bare
+    qtbot.mouseClick(neck, button, modifier, on(neck, 2, 4))
     neck.set_strings(GUITAR[:4])
-    assert neck.fingers == {}
+    assert neck.fingers == {}, "fingers leave with their strings"
 
 
-def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Neck) -> None:
-    heard: list[tuple[str, int, int]] = []
-    neck.pressed.connect(lambda key, _, string: heard.append(("on", key, string)))
-    neck.released.connect(lambda key, string: heard.append(("off", key, string)))
-    up, down, left, right = Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right
-    for arrow in [down] * 9 + [left] * 30 + [right]:
-        qtbot.keyClick(neck, arrow)
+def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+    up, down, left, right = Key.Key_Up, Key.Key_Down, Key.Key_Left, Key.Key_Right
+    press_keys(neck, *[down] * 9, *[left] * 30, right)
     assert neck.chosen == (41, 5)  # F on the lowest string
-    qtbot.keyClick(neck, Qt.Key.Key_Return, SHIFT)
-    for arrow in (up, right, right):
-        qtbot.keyClick(neck, arrow)
-    qtbot.keyClick(neck, Qt.Key.Key_Return, SHIFT)
-    assert heard == [] and neck.fingers == {0: 1, 1: 3}
-    qtbot.keyClick(neck, Qt.Key.Key_Return)
-    assert heard == [("on", 48, 4), ("off", 48, 4)]
-    heard.clear()
-    qtbot.keyPress(neck, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert heard == [("on", key, 5 - string) for string, key in enumerate((41, 48, 50, 55, 59, 64))]
-    qtbot.keyRelease(neck, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert [what for what, _, _ in heard] == ["on"] * 6 + ["off"] * 6
-    qtbot.keyClick(neck, up)
-    qtbot.keyClick(neck, up)
+    assert neck.accessibleDescription().startswith("F2, string E2, fret 1; ")
+    press_keys(neck, Key.Key_Return, held=SHIFT)
+    press_keys(neck, up, right, right)
+    press_keys(neck, Key.Key_Return, held=SHIFT)
+    assert notes == [] and neck.fingers == {0: 1, 1: 3}
+    press_keys(neck, Key.Key_Return)
+    assert notes == [("on", 48), ("off", 48)]
+    notes.clear()
+    qtbot.keyPress(neck, Key.Key_Return, CONTROL)
+    assert notes == [("on", key) for key in (41, 48, 50, 55, 59, 64)]
+    qtbot.keyRelease(neck, Key.Key_Return, CONTROL)
+    assert [what for what, _ in notes] == ["on"] * 6 + ["off"] * 6
+    press_keys(neck, up, up)
     assert neck.chosen == (58, 2), "the same fret of another string"
 
 
-def test_the_cursor_on_the_neck_is_seen_on_its_string(
-    qtbot: QtBot, neck: Neck, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(neck, "hasFocus", lambda: True)  # a window without a desktop is never active
+def test_the_cursor_on_the_neck_is_seen_on_its_string(qtbot: QtBot, neck: Neck) -> None:
+    neck.activateWindow()
+    neck.setFocus()
+    qtbot.waitUntil(neck.hasFocus)
     seen = []
-    for arrow in (Qt.Key.Key_Down, Qt.Key.Key_Down, Qt.Key.Key_Right, Qt.Key.Key_Left):
-        qtbot.keyClick(neck, arrow)
-        seen.append(neck.grab().toImage())
+    for arrow in (Key.Key_Down, Key.Key_Down, Key.Key_Right, Key.Key_Left):
+        press_keys(neck, arrow)
+        seen.append(picture(neck))
     assert seen[0] != seen[1] != seen[2] and seen[3] == seen[1]

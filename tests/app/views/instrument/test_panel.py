@@ -3,93 +3,90 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton
+from PySide6.QtWidgets import QAbstractButton, QLabel, QStackedWidget
 from pytestqt.qtbot import QtBot
 
 from app.views.instrument.panel import InstrumentPanel
+from tests.app.gestures import LEFT, RIGHT, named, reported
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> InstrumentPanel:
     made = InstrumentPanel()
     qtbot.addWidget(made)
-    made.resize(1250, 300)
+    made.resize(1500, 300)
+    made.set_range(40, 86)
     made.show()
     return made
 
 
+def click(qtbot: QtBot, panel: InstrumentPanel, name: str) -> None:
+    qtbot.mouseClick(named(panel, name, QAbstractButton), LEFT)
+
+
+def hint_of(panel: InstrumentPanel) -> QLabel:
+    return panel.findChild(QLabel, "hint")
+
+
 def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    panel.set_range(40, 86)
-    for name, surface in (("keys", panel.keys), ("neck", panel.neck)):
-        panel.show_surface(name)
+    for name, words, surface in (("neck", "Surface: Strings", panel.neck), ("keys", "Surface: Keys", panel.keys)):
+        click(qtbot, panel, words)
         assert panel.surface == name
         assert surface.isVisible()
         with qtbot.waitSignals([panel.pressed, panel.released], order="strict"):
-            qtbot.mouseClick(surface, Qt.MouseButton.LeftButton, pos=surface.key_rect(60).center().toPoint())
+            qtbot.mouseClick(surface, LEFT, pos=surface.key_rect(60).center().toPoint())
     panel.show_sounding({62: 0.5})
     assert panel.keys.level(62) == panel.neck.level(62) > 0
-
-
-def test_the_hint_goes_with_the_first_note(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    assert panel._hint.isVisible()
-    panel.show_sounding({})
-    assert panel._hint.isVisible()
-    panel.show_sounding({60: 0.2})
-    assert not panel._hint.isVisible()
-
-
-def test_the_hint_is_not_cut_when_the_theme_changes(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    before = panel._hint.size()
-    panel.setStyleSheet("QLabel#hint { padding: 3px 30px; font-size: 20px; }")
-    qtbot.waitUntil(lambda: panel._hint.size() == panel._hint.sizeHint() != before)
-
-
-def test_a_note_of_the_other_surface_ends_when_it_is_hidden(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    qtbot.mouseClick(panel.keys, Qt.MouseButton.RightButton, pos=panel.keys.key_rect(60).center().toPoint())
-    with qtbot.waitSignal(panel.released):
+    qtbot.mouseClick(panel.keys, RIGHT, pos=panel.keys.key_rect(60).center().toPoint())
+    with qtbot.waitSignal(panel.released):  # of the surface that is hidden
         panel.show_surface("neck")
 
 
-def test_the_knobs_of_the_string_are_folded_at_first(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    assert not panel.knobs.isVisible()
-    qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
-    assert panel.unfolded
-    assert panel.knobs.isVisible()
-    facts = panel.knobs.facts
-    qtbot.waitUntil(lambda: facts.visibleRegion().boundingRect().height() == facts.height())  # and is not cut
+def test_the_hint_goes_with_the_first_note_and_is_not_cut_when_the_theme_changes(
+    qtbot: QtBot, panel: InstrumentPanel
+) -> None:
+    hint = hint_of(panel)
+    before = hint.size()
+    panel.setStyleSheet("QLabel#hint { padding: 3px 30px; font-size: 20px; }")
+    qtbot.waitUntil(lambda: hint.size() == hint.sizeHint() != before)
+    for sounding, visible in (({}, True), ({60: 0.2}, False)):
+        panel.show_sounding(sounding)
+        assert hint.isVisible() == visible
 
 
-def test_in_a_low_window_the_knobs_take_the_place_of_the_keys(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_in_a_low_window_the_knobs_of_the_string_take_the_place_of_the_keys(
+    qtbot: QtBot, panel: InstrumentPanel
+) -> None:
     def seen() -> tuple[bool, bool, bool]:
         return panel.bar.isVisible(), panel.knobs.isVisible(), panel.keys.isVisible()
 
-    panel.resize(1500, 300)  # without scroll bars
+    assert seen() == (True, False, True), "they are folded at first"
     panel.set_low(True)
-    assert seen() == (True, False, True)
     height = panel.sizeHint().height()
-    assert panel._hint.isVisible()
-    qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
-    assert seen() == (True, True, False)
-    assert not panel._hint.isVisible()
+    assert hint_of(panel).isVisible()
+    click(qtbot, panel, "String knobs")
+    assert panel.unfolded and seen() == (True, True, False)
+    assert not hint_of(panel).isVisible()
     assert panel.sizeHint().height() <= height, "the strip takes no more room"
     panel.set_low(False)
     assert seen() == (True, True, True)
     assert panel.sizeHint().height() > height
+    facts = panel.knobs.facts
+    qtbot.waitUntil(lambda: facts.visibleRegion().boundingRect().height() == facts.height())  # and is not cut
     panel.set_low(True)
-    for name in ("keys", "neck"):  # also the one that is checked already
+    for name, words in (("keys", "Surface: Keys"), ("neck", "Surface: Strings")):  # also the one checked already
         panel.set_unfolded(True)
-        button = next(each for each in panel._choice.findChildren(QAbstractButton) if each.objectName() == name)
-        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
-        assert (panel.unfolded, panel.knobs.isVisible(), panel._stack.isVisible()) == (False, False, True)
-        assert panel.surface == name
+        click(qtbot, panel, words)
+        assert (panel.unfolded, panel.knobs.isVisible(), panel.surface) == (False, False, name)
+        assert panel.findChild(QStackedWidget).isVisible()
 
 
-def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_what_keys_play_is_chosen_from_words(panel: InstrumentPanel) -> None:
+    asked = reported(panel.keys_play_asked)
+    for action in panel.plays.menu().actions():
+        action.trigger()
+    assert sorted(asked) == ["pitch", "place"]
     for plays, words in (("place", "Keys set pluck position"), ("pitch", "Keys play notes")):
-        with qtbot.waitSignal(panel.keys_play_asked) as reported:
-            panel._plays[plays].trigger()
-        assert reported.args == [plays]
         panel.show_keys_play(plays, possible=True)
         assert panel.plays.text().startswith(words)
         assert panel.bar.octave.isVisible() == panel.bar.velocity.isVisible() == (plays == "pitch")
@@ -99,28 +96,26 @@ def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPane
 
 
 def test_what_keys_do_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    chosen, switched = reported(panel.touch_chosen), reported(panel.technique_switched)
     for name in ("legato", "slide", "pluck"):
-        with qtbot.waitSignal(panel.touch_chosen, check_params_cb=lambda chosen, name=name: chosen == name):
-            qtbot.mouseClick(panel.touch.findChild(QAbstractButton, name), Qt.MouseButton.LeftButton)
-    for name, on in (("strum", True), ("tremolo", True), ("strum", False), ("harmonics", True)):
-        with qtbot.waitSignal(panel.technique_switched) as switched:
-            qtbot.mouseClick(panel.techniques.findChild(QAbstractButton, name), Qt.MouseButton.LeftButton)
-        assert switched.args == [name, on]
+        qtbot.mouseClick(panel.touch.findChild(QAbstractButton, name), LEFT)
+    assert chosen == ["legato", "slide", "pluck"]
+    for name in ("strum", "tremolo", "strum", "harmonics"):
+        qtbot.mouseClick(panel.techniques.findChild(QAbstractButton, name), LEFT)
+    assert switched == [("strum", True), ("tremolo", True), ("strum", False), ("harmonics", True)]
     panel.set_drums(True)
-    assert not panel.touch.isEnabled()
-    assert not panel.techniques.isEnabled()
+    assert not panel.touch.isEnabled() and not panel.techniques.isEnabled()
 
 
 def test_fingers_are_lifted_by_a_button_that_is_there_only_then(qtbot: QtBot, panel: InstrumentPanel) -> None:
     panel.neck.set_strings((("A2", 45), ("D3", 50)))
-    panel.set_range(45, 70)
     panel.show_surface("neck")
-    button = next(each for each in panel.findChildren(QAbstractButton) if each.text() == "Lift fingers")
+    button = named(panel, "Lift fingers", QAbstractButton)
     assert button.isHidden()
-    qtbot.mouseClick(panel.neck, Qt.MouseButton.RightButton, pos=panel.neck.cell(0, 3).center().toPoint())
-    assert panel.neck.fingers == {0: 3} and not button.isHidden()
-    panel.show_surface("keys")
-    assert button.isHidden()
-    panel.show_surface("neck")
-    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(panel.neck, RIGHT, pos=panel.neck.cell(0, 3).center().toPoint())
+    assert panel.neck.fingers == {0: 3}
+    for surface, hidden in (("neck", False), ("keys", True), ("neck", False)):
+        panel.show_surface(surface)
+        assert button.isHidden() == hidden
+    qtbot.mouseClick(button, LEFT)
     assert panel.neck.fingers == {} and button.isHidden()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QToolTip
+from PySide6.QtWidgets import QAbstractButton, QMenu, QToolTip
 from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Macro, Patch, Target
 from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
-
-LEFT = Qt.MouseButton.LeftButton
+from tests.app.gestures import LEFT, named, press_keys, reported
 
 
 @pytest.fixture
@@ -21,6 +20,7 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
     made.resize(1250, 64)
     made.set_bodies([("guitar", "Guitar")])
     made.show_patch(guitar, own=True, changed=True)
+    made.show_octave(3, 2, 6)
     made.show()
     return made
 
@@ -35,12 +35,13 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
         ("Rename the instrument", "rename_asked"),
         ("Revert the instrument", "revert_asked"),
         ("Record what is played", "record_asked"),
+        ("Octave up", "octave_asked"),
     ],
 )
 def test_each_button_asks(qtbot: QtBot, bar: PatchBar, name: str, signal: str) -> None:
-    (button,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == name)
-    with qtbot.waitSignal(getattr(bar, signal)):
-        qtbot.mouseClick(button, LEFT)
+    asked = reported(getattr(bar, signal))
+    qtbot.mouseClick(named(bar, name, QAbstractButton), LEFT)
+    assert asked == [1 if signal == "octave_asked" else ()]
 
 
 def test_it_says_whether_it_was_changed_and_whose_it_is(bar: PatchBar, guitar: Patch) -> None:
@@ -50,38 +51,33 @@ def test_it_says_whether_it_was_changed_and_whose_it_is(bar: PatchBar, guitar: P
     assert not (bar.save.isEnabled() or bar.revert.isEnabled() or bar.rename.isEnabled())
 
 
-def test_macros_are_those_of_the_patch(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, guitar: Patch) -> None:
     shown = [knob for knob in bar.macros if knob.isVisible()]
-    assert [knob.accessibleName() for knob in shown] == [macro.name for macro in guitar.macros]
-    assert [knob.value for knob in shown] == [macro.value for macro in guitar.macros]
-    with qtbot.waitSignal(bar.macro_turned) as reported:
-        qtbot.keyClick(shown[1], Qt.Key.Key_Home)
-    assert reported.args == [1, 0.0]
-    eight = tuple(Macro(name=f"m{n}", targets=(Target(field="room.mix", low=0, high=1),)) for n in range(8))
-    bar.show_patch(guitar.model_copy(update={"macros": eight}), own=True)
-    assert sum(knob.isVisible() for knob in bar.macros) == 8
-    bar.show_patch(guitar.model_copy(update={"macros": ()}), own=True)
-    assert not any(knob.isVisible() for knob in bar.macros)
-
-
-def test_the_tip_of_a_macro_says_in_words_what_it_changes(bar: PatchBar, guitar: Patch) -> None:
-    def tip(*fields: str) -> str:
+    assert [(knob.accessibleName(), knob.value) for knob in shown] == [
+        (each.name, each.value) for each in guitar.macros
+    ]
+    turned = reported(bar.macro_turned)
+    press_keys(shown[1], Qt.Key.Key_Home)
+    assert turned == [(1, 0.0)]
+    for count in (8, 0):
+        macros = tuple(Macro(name=f"m{n}", targets=(Target(field="room.mix", low=0, high=1),)) for n in range(count))
+        bar.show_patch(guitar.model_copy(update={"macros": macros}), own=True)
+        assert sum(knob.isVisible() for knob in bar.macros) == count
+    for fields, words in (
+        (("pluck.position", "knobs.brightness_decay"), "Tone: changes pluck position, HF loss"),
+        (("pickup.points.0",), "Tone: changes listening point"),  # of the same name, with other targets
+    ):
         macro = Macro(name="Tone", targets=tuple(Target(field=field, low=0.2, high=0.4) for field in fields))
         bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
-        return bar.macros[0].toolTip().splitlines()[0]
-
-    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, HF loss"
-    assert tip("pickup.points.0") == "Tone: changes listening point"  # of the same name, with other targets
+        assert bar.macros[0].toolTip().splitlines()[0] == words
 
 
-def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+def test_body_and_mixes(bar: PatchBar, guitar: Patch) -> None:
+    asked = reported(bar.body_chosen, bar.changed)
     assert bar.body.currentText() == "Guitar"
-    with qtbot.waitSignal(bar.body_chosen) as reported:
-        bar.body.activated.emit(0)
-    assert reported.args == [""]
-    with qtbot.waitSignal(bar.changed) as reported:
-        qtbot.keyClick(bar.knobs["room.mix"], Qt.Key.Key_End)
-    assert reported.args == ["room.mix", 1.0]
+    bar.body.activated.emit(0)
+    press_keys(bar.knobs["room.mix"], Qt.Key.Key_End)
+    assert asked == ["", ("room.mix", 1.0)]
     unknown = guitar.model_copy(update={"body": guitar.body.model_copy(update={"name": "a lost one"})})
     bar.show_patch(unknown, own=True)
     assert (bar.body.currentText(), bar.body.currentData()) == ("a lost one", "a lost one")
@@ -89,39 +85,34 @@ def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
     assert [bar.body.itemData(row) for row in range(bar.body.count())].count("") == 1
 
 
-def test_what_the_instrument_does_is_reported(qtbot: QtBot, bar: PatchBar) -> None:
-    bar.show_voices(1)
-    assert bar.voices.text() == "1 voice"
-    bar.show_voices(6, 64)
-    assert bar.voices.text() == "6 of 64 voices"
+def test_what_the_instrument_does_is_shown(bar: PatchBar) -> None:
+    for shown, words in (((1,), "1 voice"), ((6, 64), "6 of 64 voices")):
+        bar.show_voices(*shown)
+        assert bar.voices.text() == words
+    bar.show_octave(-1, -2, 3)
+    bar.show_velocity(17)
+    assert (bar.octave.text(), bar.velocity.text()) == ("octave C-1", "velocity 17")
+    bar.show_note("Choose an instrument")
+    assert bar.note.objectName() == "faint"
+
+
+def test_the_record_button_shows_its_time_and_saves_or_discards_what_is_not_saved(
+    qtbot: QtBot, bar: PatchBar
+) -> None:
     bar.show_recording(73.4)
     assert (bar.record.text(), bar.record.isChecked()) == ("■  1:13", True)
     bar.show_recording(None)
-    assert not bar.record.isChecked()
-    bar.show_octave(-1, -2, 3)
-    assert bar.octave.text() == "octave C-1"
-    bar.show_velocity(17)
-    assert bar.velocity.text() == "velocity 17"
-    bar.show_note("Choose an instrument")
-    assert bar.note.objectName() == "faint"
-    with qtbot.waitSignal(bar.octave_asked) as reported:
-        (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")
-        qtbot.mouseClick(higher, LEFT)
-    assert reported.args == [1]
-
-
-def test_the_record_button_saves_or_discards_what_is_not_saved(qtbot: QtBot, bar: PatchBar) -> None:
     bar.show_unsaved(1)
     assert bar.record.text().startswith("●  Unsaved")
-    for action, signal in zip(bar._unsaved_menu.actions(), ("save", "discard"), strict=True):
-        with qtbot.waitSignal(getattr(bar, f"recording_{signal}_asked")):
-            action.trigger()
+    asked = [reported(bar.recording_save_asked), reported(bar.recording_discard_asked)]
+    for action in bar.record.findChild(QMenu).actions():
+        action.trigger()
+    assert [len(each) for each in asked] == [1, 1]
     bar.show_recording(3.0)  # another was begun before the first turned out not to be written
-    assert bar.record.text() == "■  0:03"
-    assert bar.record.menu() is None
+    assert (bar.record.text(), bar.record.menu()) == ("■  0:03", None)
     bar.show_recording(None)
     bar.show_unsaved(0)
-    assert bar.record.text() == "●  Record"
+    assert (bar.record.text(), bar.record.isChecked()) == ("●  Record", False)
     with qtbot.waitSignal(bar.record_asked):
         qtbot.mouseClick(bar.record, LEFT)
 
@@ -142,10 +133,7 @@ def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, 
 
 
 def test_the_octave_buttons_stop_where_no_key_sounds_and_say_why(qtbot: QtBot, bar: PatchBar) -> None:
-    lower, higher = (
-        next(each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == name)
-        for name in ("Octave down", "Octave up")
-    )
+    lower, higher = (named(bar, name, QAbstractButton) for name in ("Octave down", "Octave up"))
     for octave, ends in ((2, (False, True)), (3, (True, True)), (6, (True, False))):
         bar.show_octave(octave, 2, 6)
         assert (lower.isEnabled(), higher.isEnabled()) == ends

@@ -15,9 +15,9 @@ from app.patches.patch import Patch
 from app.views.controls.browser import REALLY, Browser
 from app.views.controls.notice_bar import NoticeBar
 from app.views.instrument.patch_card import patch_browser, patch_row
+from tests.app.gestures import CONTROL, LEFT, press_keys, reported
 
-LEFT = Qt.MouseButton.LeftButton
-KEY = Qt.Key
+Key = Qt.Key
 
 
 def entry(guitar: Patch, name: str, own: bool = False, **changes: object) -> PatchEntry:
@@ -25,23 +25,22 @@ def entry(guitar: Patch, name: str, own: bool = False, **changes: object) -> Pat
     return PatchEntry(folder / f"{name}.json", guitar.model_copy(update={"name": name, **changes}))
 
 
-def lines(browser: Browser) -> list[str]:
-    """What stands in the list, from top to bottom."""
-    model = browser.list.model()
-    cells = ((model.index(row, column).data() for column in range(2)) for row in range(model.rowCount()))
-    return [" ".join(filter(None, texts)) for texts in cells]
+def show(browser: Browser, entries: list[PatchEntry], chosen: str) -> None:
+    browser.show_rows([patch_row(each) for each in entries], {"steel"}, chosen, "/own")
 
 
 def place(browser: Browser, row: int) -> QRect:
     return browser.list.visualRect(browser.list.model().index(row, 1))
 
 
-def current(browser: Browser) -> str:
-    return str(browser.list.currentIndex().data())
+def state(browser: Browser) -> tuple[str, str]:
+    """What is selected, and what the list has as its current row."""
+    return browser.selected, str(browser.list.currentIndex().data())
 
 
 @pytest.fixture
 def browser(qtbot: QtBot, guitar: Patch) -> Iterator[Browser]:
+    """Of nylon, steel, which is a favourite and loaded, one's own and a harp."""
     window = QWidget()
     qtbot.addWidget(window)
     window.resize(1280, 800)
@@ -52,78 +51,88 @@ def browser(qtbot: QtBot, guitar: Patch) -> Iterator[Browser]:
         entry(guitar, "mine", own=True),
         entry(guitar, "harp of brass", category="harp"),
     ]
-    made.show_rows([patch_row(each) for each in entries], {"steel"}, "steel", "/own")
+    show(made, entries, "steel")
     window.show()
     made.show_over()
     yield made
     made.dismiss()
 
 
-def test_all_are_listed_under_their_categories(browser: Browser) -> None:
-    """Favourites first in each."""
+@pytest.fixture
+def chosen(browser: Browser) -> list[str]:
+    return reported(browser.chosen)
+
+
+def test_all_are_listed_under_their_categories_favourites_first(browser: Browser) -> None:
     assert browser.listed == ["steel", "nylon", "mine", "harp of brass"]
-    assert lines(browser) == ["GUITAR", "★ steel", "☆ nylon", "☆ mine   (own)", "HARP", "☆ harp of brass"]
+    model = browser.list.model()
+    rows = [[model.index(row, column).data() for column in range(2)] for row in range(model.rowCount())]
+    lines = [" ".join(filter(None, texts)) for texts in rows]
+    assert lines == ["GUITAR", "★ steel", "☆ nylon", "☆ mine   (own)", "HARP", "☆ harp of brass"]
+    assert browser.accessibleName() == "Browser of instruments"
 
 
 @pytest.mark.parametrize(
-    ("words", "found"),
-    [("BRASS harp", ["harp of brass"]), ("long", ["steel"]), ("guitar mi", ["mine"]), ("tuba", [])],
+    ("words", "category", "bank", "starred", "listed"),
+    [
+        ("BRASS harp", "", "", False, ["harp of brass"]),
+        ("long", "", "", False, ["steel"]),
+        ("guitar mi", "", "", False, ["mine"]),
+        ("tuba", "", "", False, []),
+        ("", "harp", "", False, ["harp of brass"]),
+        ("", "", "user", False, ["mine"]),
+        ("", "", "", True, ["steel"]),
+    ],
 )
-def test_words_in_any_order_filter(qtbot: QtBot, browser: Browser, words: str, found: list[str]) -> None:
-    with qtbot.waitSignal(browser.listed_changed):
-        browser.search.setText(words)
-    assert browser.listed == found
+def test_words_in_any_order_category_owner_and_favourites_filter(
+    browser: Browser, words: str, category: str, bank: str, starred: bool, listed: list[str]
+) -> None:
+    browser.search.setText(words)
+    for name, key in (("Category", category), ("Bank", bank)):
+        if key:
+            browser.filters[name].setCurrentIndex(browser.filters[name].findData(key))
+    browser.starred.setChecked(starred)
+    assert browser.listed == listed
+    if listed:
+        browser.clear_filter()
+        assert len(browser.listed) == 4
     browser.dismiss()
     assert browser.listed, "closed without any, next and previous would lead nowhere"
 
 
-def test_category_owner_and_favourites_filter(qtbot: QtBot, browser: Browser) -> None:
-    browser.filters["Category"].setCurrentIndex(browser.filters["Category"].findData("harp"))
-    assert browser.listed == ["harp of brass"]
-    browser.clear_filter()
-    browser.filters["Bank"].setCurrentIndex(browser.filters["Bank"].findData("user"))
-    assert browser.listed == ["mine"]
-    browser.clear_filter()
-    browser.starred.setChecked(True)
-    assert browser.listed == ["steel"]
-
-
-def test_arrows_pass_headings_load_and_play_when_they_rest(qtbot: QtBot, browser: Browser) -> None:
-    chosen: list[str] = []
-    browser.chosen.connect(chosen.append)
+def test_arrows_pass_headings_load_and_play_when_they_rest(qtbot: QtBot, browser: Browser, chosen: list[str]) -> None:
     with qtbot.waitSignal(browser.played) as heard:
         for _ in range(3):
-            qtbot.keyClick(browser.search if not chosen else browser.list, KEY.Key_Down)
+            press_keys(browser.search if not chosen else browser.list, Key.Key_Down)
     assert chosen == ["nylon", "mine", "harp of brass"]
     assert heard.args == ["harp of brass"]
-    qtbot.keyClick(browser.list, KEY.Key_PageUp)
+    press_keys(browser.list, Key.Key_PageUp)
     assert chosen[-1] == "steel"
 
 
-def test_space_plays_and_is_a_blank_in_a_search(qtbot: QtBot, browser: Browser) -> None:
-    with qtbot.waitSignal(browser.played) as heard:
-        qtbot.keyClick(browser.search, KEY.Key_Space)
-    assert heard.args == ["steel"]
+def test_space_plays_and_is_a_blank_in_a_search_and_control_d_makes_a_favourite(
+    qtbot: QtBot, browser: Browser
+) -> None:
+    asked = reported(browser.played, browser.favourite_asked)
+    press_keys(browser.search, Key.Key_Space)
+    press_keys(browser.list, Key.Key_D, held=CONTROL)
+    assert asked == ["steel", "steel"]
     qtbot.keyClicks(browser.search, "of b")
     assert browser.search.text() == "of b"
 
 
-def test_the_first_hit_is_selected_shown_and_what_keys_are_for(qtbot: QtBot, browser: Browser) -> None:
-    chosen: list[str] = []
-    browser.chosen.connect(chosen.append)
+def test_the_first_hit_is_selected_shown_and_what_buttons_are_for(
+    qtbot: QtBot, browser: Browser, chosen: list[str]
+) -> None:
+    asked = reported(browser.favourite_asked, browser.played)
     browser.search.setText("guitar")
-    assert browser.listed == ["steel", "nylon", "mine"]
     assert browser.selected == "steel" and "<b>steel</b>" in browser.card.text(), "what is loaded, if it is listed"
     browser.search.setText("harp")
-    assert browser.selected == "harp of brass" and "<b>harp of brass</b>" in browser.card.text()
-    assert current(browser) == "harp of brass"
-    with qtbot.waitSignal(browser.favourite_asked) as reported:
-        qtbot.mouseClick(browser.star, LEFT)
-    assert reported.args == ["harp of brass"]
-    assert chosen == [], "it is shown, not loaded"
-    with qtbot.waitSignal(browser.played) as reported:
-        qtbot.mouseClick(browser.play_button, LEFT)
-    assert reported.args == chosen == ["harp of brass"]
+    assert state(browser) == ("harp of brass", "harp of brass") and "<b>harp of brass</b>" in browser.card.text()
+    qtbot.mouseClick(browser.star, LEFT)
+    assert (asked, chosen) == (["harp of brass"], []), "it is shown, not loaded"
+    qtbot.mouseClick(browser.play_button, LEFT)
+    assert asked[1:] == chosen == ["harp of brass"]
     browser.search.setText("tuba")
     assert browser.selected == "" and browser.card.text().startswith("No matching instrument")
     browser.search.clear()
@@ -133,31 +142,30 @@ def test_the_first_hit_is_selected_shown_and_what_keys_are_for(qtbot: QtBot, bro
 def test_a_hit_by_its_name_is_better_than_one_by_its_description(
     qtbot: QtBot, browser: Browser, guitar: Patch
 ) -> None:
-    sharp = entry(guitar, "bass", description="Starts sharp")
-    entries = [sharp, entry(guitar, "nylon"), entry(guitar, "brass harp")]
-    browser.show_rows([patch_row(each) for each in entries], (), "nylon", "/own")
-    browser.search.setText("harp")
-    assert (browser.listed, browser.selected) == (["bass", "brass harp"], "brass harp")
-    browser.search.setText("starts")
-    assert browser.selected == "bass"
+    entries = [entry(guitar, "bass", description="Starts sharp"), entry(guitar, "nylon"), entry(guitar, "brass harp")]
+    show(browser, entries, "nylon")
+    for words, selected in (("harp", "brass harp"), ("starts", "bass")):
+        browser.search.setText(words)
+        assert browser.selected == selected
     browser.set_chosen("bass")
     browser.search.setText("harp")
-    assert browser.selected == "brass harp", "although the loaded one is listed too"
+    assert (browser.listed, browser.selected) == (["bass", "brass harp"], "brass harp"), "although bass is loaded"
     qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place(browser, 1).center())
     assert browser.selected == "bass" and "<b>bass</b>" in browser.card.text()
 
 
 @pytest.mark.parametrize("loads", ["arrow", "click", "Enter"])
-def test_the_first_hit_is_loaded_although_it_is_selected_already(qtbot: QtBot, browser: Browser, loads: str) -> None:
-    chosen: list[str] = []
-    browser.chosen.connect(chosen.append)
-    browser.filters["Category"].setCurrentIndex(browser.filters["Category"].findData("harp"))
+def test_the_first_hit_is_loaded_although_it_is_selected_already(
+    qtbot: QtBot, browser: Browser, chosen: list[str], loads: str
+) -> None:
+    browser.search.setText("harp")
     if loads == "click":
         where = browser.list.visualRect(browser.list.currentIndex()).center()
         qtbot.mouseClick(browser.list.viewport(), LEFT, pos=where)
     else:
-        qtbot.keyClick(browser.search, KEY.Key_Down if loads == "arrow" else KEY.Key_Return)
+        press_keys(browser.search, Key.Key_Down if loads == "arrow" else Key.Key_Return)
     assert chosen == ["harp of brass"]
+    assert browser.isVisible() == (loads != "Enter")
 
 
 def test_typing_searches_wherever_the_focus_is(qtbot: QtBot, browser: Browser) -> None:
@@ -169,68 +177,41 @@ def test_typing_searches_wherever_the_focus_is(qtbot: QtBot, browser: Browser) -
         qtbot.keyClicks(browser.search, "arp")
         assert browser.search.text() == "harp"
         assert browser.filters["Category"].currentIndex() == 0
-    browser.filters["Category"].setFocus()
-    qtbot.keyClick(browser.filters["Category"], KEY.Key_Escape)
+    press_keys(browser.filters["Category"], Key.Key_Escape)
     assert not browser.isVisible()
 
 
-def test_a_heading_is_not_selected(qtbot: QtBot, browser: Browser) -> None:
-    chosen: list[str] = []
-    browser.chosen.connect(chosen.append)
+def test_headings_and_what_is_shown_do_not_load(
+    qtbot: QtBot, browser: Browser, guitar: Patch, chosen: list[str]
+) -> None:
     qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place(browser, 0).center())
-    assert (browser.selected, chosen) == ("steel", [])
-    assert current(browser) == "steel"
+    assert state(browser) == ("steel", "steel")
+    browser.set_chosen("nylon")
+    show(browser, [entry(guitar, name) for name in ("nylon", "new")], "new")
+    assert state(browser) == ("new", "new")
+    assert chosen == []
 
 
 def test_an_entry_that_a_search_hides_is_revealed(browser: Browser) -> None:
     browser.search.setText("harp")
-    browser.reveal("harp of brass")
-    assert browser.search.text() == "harp"
-    browser.reveal("mine")
-    assert browser.search.text() == ""
-    assert "mine" in browser.listed
-
-
-def test_control_d_makes_a_favourite(qtbot: QtBot, browser: Browser) -> None:
-    with qtbot.waitSignal(browser.favourite_asked) as reported:
-        qtbot.keyClick(browser.list, KEY.Key_D, Qt.KeyboardModifier.ControlModifier)
-    assert reported.args == ["steel"]
-
-
-def test_enter_takes_the_first_that_was_found_and_closes(qtbot: QtBot, browser: Browser) -> None:
-    browser.search.setText("harp")
-    with qtbot.waitSignal(browser.chosen) as reported:
-        qtbot.keyClick(browser.search, KEY.Key_Return)
-    assert reported.args == ["harp of brass"]
-    assert not browser.isVisible()
+    for name, words in (("harp of brass", "harp"), ("mine", "")):
+        browser.reveal(name)
+        assert browser.search.text() == words and name in browser.listed
 
 
 def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: QtBot, browser: Browser) -> None:
-    assert not browser.rename.isVisible()
-    assert not browser.delete.isVisible()
+    renamed, deleted = reported(browser.rename_asked), reported(browser.delete_asked)
+    assert not browser.rename.isVisible() and not browser.delete.isVisible()
     browser.set_chosen("mine")
-    with qtbot.waitSignal(browser.rename_asked) as reported:
-        qtbot.mouseClick(browser.rename, LEFT)
-    assert reported.args == ["mine"]
-    deleted: list[str] = []
-    browser.delete_asked.connect(deleted.append)
+    qtbot.mouseClick(browser.rename, LEFT)
+    assert renamed == ["mine"]
     qtbot.mouseClick(browser.delete, LEFT)
     assert (browser.delete.text(), deleted) == (REALLY, [])
     browser.set_chosen("steel")
     browser.set_chosen("mine")
-    qtbot.mouseClick(browser.delete, LEFT)
-    assert deleted == [], "another was looked at meanwhile"
-    qtbot.mouseClick(browser.delete, LEFT)
-    assert deleted == ["mine"]
-
-
-def test_what_is_shown_does_not_load(browser: Browser, guitar: Patch) -> None:
-    chosen: list[str] = []
-    browser.chosen.connect(chosen.append)
-    browser.set_chosen("nylon")
-    browser.show_rows([patch_row(entry(guitar, name)) for name in ("nylon", "new")], (), "new", "/own")
-    assert chosen == []
-    assert current(browser) == "new"
+    for asked in ([], ["mine"]):  # first: another was looked at meanwhile
+        qtbot.mouseClick(browser.delete, LEFT)
+        assert deleted == asked
 
 
 def test_a_notice_is_not_hidden_behind_it(browser: Browser) -> None:
@@ -242,8 +223,3 @@ def test_a_notice_is_not_hidden_behind_it(browser: Browser) -> None:
     assert browser.y() > notices.geometry().bottom()
     notices.hide()
     assert browser.y() == alone == notices.y()
-
-
-def test_it_is_named_after_what_it_lists(browser: Browser) -> None:
-    assert browser.accessibleName() == "Browser of instruments"
-    assert browser.search.placeholderText() == browser.search.accessibleName() == "Search instruments"

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.shared.key_names import note_name
 from app.views import theme
 from app.views.instrument.piano_keys import PianoKeys, is_black, shown_range
 from app.views.instrument.playable import HARDEST, SOFTEST
+from tests.app.gestures import LEFT, NONE, RIGHT, SHIFT, colour_at, keeps, picture, press_keys, reported
 
-LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
-SHIFT = Qt.KeyboardModifier.ShiftModifier
-
-
-class Heard:
-    """What was asked, in order: ("on", key) and ("off", key); the velocities beside."""
-
-    def __init__(self, keys: PianoKeys) -> None:
-        self.notes: list[tuple[str, int]] = []
-        self.velocities: list[int] = []
-        keys.pressed.connect(self._on)
-        keys.released.connect(lambda key: self.notes.append(("off", key)))
-
-    def _on(self, key: int, velocity: int) -> None:
-        self.notes.append(("on", key))
-        self.velocities.append(velocity)
+Key = Qt.Key
+Notes = list[tuple[str, int]]
 
 
 @pytest.fixture
@@ -42,8 +30,8 @@ def keys(qtbot: QtBot) -> PianoKeys:
 
 
 @pytest.fixture
-def heard(keys: PianoKeys) -> Heard:
-    return Heard(keys)
+def notes(keys: PianoKeys, notes_of: Callable[[QWidget], Notes]) -> Notes:
+    return notes_of(keys)
 
 
 def spot(keys: PianoKeys, key: int, share: float = 0.9) -> QPoint:
@@ -57,146 +45,106 @@ def test_every_key_is_found_where_it_is_drawn(keys: PianoKeys) -> None:
         assert keys.key_at(QPointF(spot(keys, key))) == key, note_name(key)
     assert keys.key_at(QPointF(-1, 5)) is None
     assert keys.key_at(QPointF(5, 100)) is None
-
-
-def test_between_two_black_keys_is_the_white_one(keys: PianoKeys) -> None:
     between = (keys.key_rect(61).right() + keys.key_rect(63).left()) / 2
-    assert keys.key_at(QPointF(between, 5)) == 62
+    assert keys.key_at(QPointF(between, 5)) == 62, "between two black keys is the white one"
 
 
 @pytest.mark.parametrize(("low", "high"), [(40, 86), (28, 88), (50, 52), (0, 3), (120, 127), (0, 127), (60, 60)])
 def test_whole_octaves_hold_the_range(low: int, high: int) -> None:
     first, last = shown_range(low, high)
-    assert first <= low <= high <= last
-    assert first % 12 == 0
-    assert last % 12 == 11
+    assert 0 <= first <= low <= high <= last
+    assert (first % 12, last % 12) == (0, 11)
     assert last - first + 1 >= 48
-    assert first >= 0
 
 
-def test_lower_on_a_key_is_harder(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
-    for share in (0.0, 0.5, 0.99):
-        qtbot.mouseClick(keys, LEFT, pos=spot(keys, 64, share))
-    soft, middle, hard = heard.velocities
-    assert soft == SOFTEST
-    assert middle == pytest.approx((SOFTEST + HARDEST) / 2, abs=3)
-    assert hard == pytest.approx(HARDEST, abs=3)
-    assert heard.notes == 3 * [("on", 64), ("off", 64)]
-
-
-def test_a_black_key_has_all_velocities_too(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
+def test_lower_on_a_key_is_harder(qtbot: QtBot, keys: PianoKeys, notes: Notes) -> None:
+    pressed = reported(keys.pressed)
     assert is_black(66)
-    qtbot.mouseClick(keys, LEFT, pos=spot(keys, 66, 0.97))
-    assert heard.velocities[0] > HARDEST - 8
+    for key, share in ((64, 0.0), (64, 0.5), (64, 0.99), (66, 0.97)):
+        qtbot.mouseClick(keys, LEFT, pos=spot(keys, key, share))
+    velocities = [values[1] for values in pressed]
+    assert velocities == [
+        SOFTEST,
+        pytest.approx((SOFTEST + HARDEST) / 2, abs=3),
+        pytest.approx(HARDEST, abs=3),
+        pytest.approx(HARDEST, abs=8),
+    ]
+    assert notes == 3 * [("on", 64), ("off", 64)] + [("on", 66), ("off", 66)]
 
 
-def test_a_drag_is_a_glissando(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
+def test_a_drag_is_a_glissando(qtbot: QtBot, keys: PianoKeys, notes: Notes) -> None:
     qtbot.mousePress(keys, LEFT, pos=spot(keys, 60))
     for key in (60, 62, 64):
         qtbot.mouseMove(keys, spot(keys, key))
     qtbot.mouseMove(keys, QPoint(keys.width() + 50, 50))  # beside the keys: the last one continues
     qtbot.mouseRelease(keys, LEFT, pos=spot(keys, 64))
-    assert heard.notes == [("on", 60), ("off", 60), ("on", 62), ("off", 62), ("on", 64), ("off", 64)]
+    assert notes == [("on", 60), ("off", 60), ("on", 62), ("off", 62), ("on", 64), ("off", 64)]
 
 
-@pytest.mark.parametrize(("button", "modifier"), [(RIGHT, Qt.KeyboardModifier.NoModifier), (LEFT, SHIFT)])
+@pytest.mark.parametrize(("button", "modifier"), [(RIGHT, NONE), (LEFT, SHIFT)])
 def test_a_key_that_is_held_stays_until_it_is_clicked_so_again(
-    qtbot: QtBot, keys: PianoKeys, heard: Heard, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
+    qtbot: QtBot, keys: PianoKeys, notes: Notes, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
 ) -> None:
     qtbot.mouseClick(keys, button, modifier, spot(keys, 60))
-    assert heard.notes == [("on", 60)]
-    assert keys.held == {60}
+    assert (notes, keys.held) == ([("on", 60)], {60})
     qtbot.mouseClick(keys, LEFT, pos=spot(keys, 60))  # plucks it again, and it stays
-    assert heard.notes == [("on", 60), ("on", 60), ("off", 60)]  # the release of the first stroke
+    assert notes == [("on", 60), ("on", 60), ("off", 60)]  # the release of the first stroke
     qtbot.mouseClick(keys, button, modifier, spot(keys, 60))
-    assert heard.notes[3:] == [("off", 60)]
-    assert not keys.held
+    assert (notes[3:], keys.held) == ([("off", 60)], set())
 
 
-def test_each_stroke_of_a_key_is_released_however_it_was_struck(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
+@pytest.mark.parametrize("end", ["release_all", "another range", "hide"])
+def test_each_stroke_of_a_key_is_released_however_it_was_struck(
+    qtbot: QtBot, keys: PianoKeys, notes: Notes, end: str
+) -> None:
     qtbot.mouseClick(keys, RIGHT, pos=spot(keys, 60))
     qtbot.mousePress(keys, LEFT, pos=spot(keys, 59))
     for key in (60, 62, 60):  # a glissando over the key that is held
         qtbot.mouseMove(keys, spot(keys, key))
-    qtbot.keyPress(keys, Qt.Key.Key_Return)
-    keys.release_all()
+    qtbot.keyPress(keys, Key.Key_Return)
+    {"release_all": keys.release_all, "another range": lambda: keys.set_range(28, 60), "hide": keys.hide}[end]()
     for key in (59, 60, 62):
-        assert heard.notes.count(("on", key)) == heard.notes.count(("off", key)) > 0
+        assert notes.count(("on", key)) == notes.count(("off", key)) > 0
 
 
-def test_a_key_without_a_string_is_grey_and_silent(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
+def test_a_key_without_a_string_is_grey_and_silent(qtbot: QtBot, keys: PianoKeys, notes: Notes) -> None:
     for key in (39, 87):
         qtbot.mouseClick(keys, LEFT, pos=spot(keys, key))
-    assert heard.notes == []
-    picture = keys.grab().toImage()
-    ratio = picture.devicePixelRatio()
-    inside, outside = (picture.pixelColor(*_at(spot(keys, key, 0.75), ratio)) for key in (77, 89))
+    assert notes == []
+    inside, outside = (colour_at(picture(keys), spot(keys, key, 0.75)) for key in (77, 89))
     assert theme.contrast(inside.name(), outside.name()) > 1.5
 
 
-def _at(point: QPoint, ratio: float) -> tuple[int, int]:
-    return round(point.x() * ratio), round(point.y() * ratio)
-
-
 def test_what_sounds_is_seen_as_loud_as_it_is(keys: PianoKeys) -> None:
-    at = _at(spot(keys, 65, 0.8), keys.grab().devicePixelRatio())
     colours = []
-    for level in (0.0, 0.3, 1.0):
+    for source, level in (("model", 0.0), ("model", 0.3), ("model", 1.0), ("truth", 1.0)):
+        keys.show_source(source)
         keys.show_sounding({65: level} if level else {})
-        colours.append(keys.grab().toImage().pixelColor(*at))
-    assert colours[2].name() == theme.MODEL
-    assert len({colour.name() for colour in colours}) == 3
-    keys.show_source("truth")
-    assert keys.grab().toImage().pixelColor(*at).name() == theme.TRUTH
+        colours.append(colour_at(picture(keys), spot(keys, 65, 0.8)).name())
+    assert colours[2:] == [theme.MODEL, theme.TRUTH]
+    assert len(set(colours)) == 4
 
 
 def test_letters_are_printed_on_the_keys_that_they_play(keys: PianoKeys) -> None:
-    bare = keys.grab(keys.key_rect(60).toRect()).toImage()
-    beside = keys.grab(keys.key_rect(76).toRect()).toImage()
+    rects = [keys.key_rect(key).toRect() for key in (60, 76)]
+    before = [keys.grab(rect).toImage() for rect in rects]
     keys.show_letters({60: "A", 61: "W"})
-    assert keys.grab(keys.key_rect(60).toRect()).toImage() != bare
-    assert keys.grab(keys.key_rect(76).toRect()).toImage() == beside
+    assert [keys.grab(rect).toImage() == bare for rect, bare in zip(rects, before, strict=True)] == [False, True]
 
 
-def test_another_range_releases_what_is_held(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
-    qtbot.mouseClick(keys, RIGHT, pos=spot(keys, 60))
-    keys.set_range(28, 60)
-    assert heard.notes == [("on", 60), ("off", 60)]
-
-
-def test_hidden_keys_do_not_go_on_sounding(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
-    qtbot.mousePress(keys, LEFT, pos=spot(keys, 62))
-    keys.hide()
-    assert heard.notes == [("on", 62), ("off", 62)]
-
-
-def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
-    for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Up):
-        qtbot.keyClick(keys, key)
-    assert keys.chosen.key == 74
-    assert "D5" in keys.accessibleDescription()
-    qtbot.keyClick(keys, Qt.Key.Key_Return)
-    assert heard.notes == [("on", 74), ("off", 74)]
-    qtbot.keyClick(keys, Qt.Key.Key_Up)
-    qtbot.keyClick(keys, Qt.Key.Key_Up)
-    assert keys.chosen.key == 86, "no further than the strings go"
-
-
-def test_the_cursor_is_where_one_clicked_and_seen_by_those_who_use_the_keyboard(
-    qtbot: QtBot, keys: PianoKeys, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(keys, "hasFocus", lambda: True)  # a window without a desktop is never active
+def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, notes: Notes) -> None:
+    keys.activateWindow()
+    keys.setFocus()
+    qtbot.waitUntil(keys.hasFocus)
     qtbot.mouseClick(keys, LEFT, pos=spot(keys, 71))
-    at_rest = keys.grab().toImage()
     assert keys.chosen.key == 71
-    qtbot.keyClick(keys, Qt.Key.Key_Right)
-    assert keys.chosen.key == 72
-    assert keys.grab().toImage() != at_rest
-
-
-def test_enter_is_the_keys_own_and_not_the_windows(keys: PianoKeys) -> None:
-    for key, accepted in ((Qt.Key.Key_Return, True), (Qt.Key.Key_Space, False)):
-        event = QKeyEvent(QEvent.Type.ShortcutOverride, key, Qt.KeyboardModifier.NoModifier)
-        event.ignore()
-        QApplication.sendEvent(keys, event)
-        assert event.isAccepted() == accepted
+    notes.clear()
+    at_rest = picture(keys)
+    press_keys(keys, Key.Key_Right, Key.Key_Right, Key.Key_Up)
+    assert picture(keys) != at_rest, "the cursor is seen by those who use the keyboard"
+    assert keys.chosen.key == 85
+    assert "C♯6" in keys.accessibleDescription()
+    press_keys(keys, Key.Key_Return, Key.Key_Up, Key.Key_Up)
+    assert notes == [("on", 85), ("off", 85)]
+    assert keys.chosen.key <= 86, "no further than the strings go"
+    assert keeps(keys, Key.Key_Return) and not keeps(keys, Key.Key_Space)

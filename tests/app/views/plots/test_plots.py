@@ -1,0 +1,263 @@
+"""Plots over time, their line, axes and legend, and the table of figures."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pyqtgraph as pg
+import pytest
+from numpy.typing import NDArray
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.presets.library import Library
+from app.session.choices import Session
+from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.views import theme
+from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
+from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.legend import SHARE, Legend
+from app.views.plots.time_plot import TimePlot
+from app.window.panels.error_plane import ErrorPlanePanel
+from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_keys, reported, turn_wheel
+
+Key = Qt.Key
+TICKS = [(float(place), f"{place}") for place in range(11)]
+COLUMNS = (Column("name", "name", "a name"), Column("level", "level", "in dB", lambda v: f"{v:.1f}"))
+
+
+@pytest.fixture
+def plot(qtbot: QtBot) -> TimePlot:
+    """Four seconds, of which a quarter of one is trained; a curve from corner to corner."""
+    made = TimePlot("A plot", "A tip")
+    qtbot.addWidget(made)
+    made.resize(640, 240)
+    with qtbot.waitExposed(made):
+        made.show()
+    made.set_times(4.0, 0.25)
+    made.getPlotItem().setYRange(0, 1, padding=0)
+    made.plot([0, 4], [0, 1], pen=pg.mkPen(theme.MODEL, width=1))
+    QApplication.processEvents()
+    return made
+
+
+def place_of(plot: TimePlot, time_s: float, height: float) -> QPoint:
+    return plot.mapFromScene(plot.getPlotItem().vb.mapViewToScene(QPointF(time_s, height)))
+
+
+def pixels(plot: TimePlot) -> NDArray[np.uint32]:
+    image = plot.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    return np.frombuffer(image.constBits(), np.uint32).reshape(image.height(), -1)[:, : image.width()].copy()
+
+
+def line_columns(plot: TimePlot) -> list[int]:
+    """The columns in which the playhead is seen."""
+    return list(np.flatnonzero((pixels(plot) == QColor(theme.TEXT).rgb()).sum(axis=0) > 100))
+
+
+def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot: QtBot, plot: TimePlot) -> None:
+    plot.move_line(9.0)
+    without, paints, places = pixels(plot), Paints(plot.viewport()), []
+    for at in (0.8, 2.0, 3.2):
+        plot.move_line(at)
+        (column,) = line_columns(plot)
+        places.append(column)
+    assert np.diff(places, n=2) == pytest.approx(0, abs=1)
+    plot.plot([0, 4], [1, 0], pen=pg.mkPen(theme.TRUTH, width=1))
+    changed = pixels(plot)
+    assert (changed != without).any()
+    plot.move_line(9.0)
+    assert line_columns(plot) == []
+    qtbot.waitUntil(lambda: bool(paints.rects))
+    whole = pixels(plot)
+
+    def moved_alone() -> bool:
+        paints.rects.clear()
+        plot.move_line(1.0 if plot.line_at != 1.0 else 2.0)
+        qtbot.waitUntil(lambda: bool(paints.rects))
+        return all(rect.width() < plot.width() / 2 for rect in paints.rects)
+
+    qtbot.waitUntil(moved_alone)  # once what else was to be painted is
+    for _ in range(2):
+        plot.move_line(9.0)
+        assert (pixels(plot) == whole).all()
+
+
+def test_the_keyboard_seeks_and_zooms(plot: TimePlot) -> None:
+    asked = reported(plot.seek_asked)
+    plot.show_playhead(1.0)
+    press_keys(plot, Key.Key_Right, Key.Key_Left, Key.Key_Home)
+    assert asked == pytest.approx([1.1, 0.9, 0.0])
+    press_keys(plot, Key.Key_Plus)
+    low, high = plot.times_s
+    assert low < 1.0 < high and high - low == pytest.approx(4.0 / 1.25**2)
+    press_keys(plot, Key.Key_Minus)
+    assert plot.times_s == pytest.approx((0, 4), abs=1e-6)
+    plot.show_times(1.0, 1.02)
+    press_keys(plot, Key.Key_Right)
+    assert asked[-1] == pytest.approx(1.001)  # no more than a little of the view
+    press_keys(plot, Key.Key_0)
+    assert plot.times_s == pytest.approx((0, 4))
+
+
+def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(qtbot: QtBot, plot: TimePlot) -> None:
+    place, view = place_of(plot, 3.0, 0.5), plot.viewport()
+    for steps, length_s in ((4, 4 / 1.25**4), (60, 0.002), (-100, 4)):
+        turn_wheel(view, place, QPoint(0, 120 * steps))
+        low, high = plot.times_s
+        assert high - low == pytest.approx(length_s)
+        assert steps != 4 or (3.0 - low) / (high - low) == pytest.approx(0.75, abs=0.01)
+    plot.show_times(1.0, 2.0)
+    QApplication.processEvents()
+    start, end = place_of(plot, 1.5, 0.5), place_of(plot, 1.25, 0.5)
+    qtbot.mousePress(view, RIGHT, pos=start)
+    for to, times_s in ((start, (1, 2)), (end, (1.25, 2.25)), (end - QPoint(5000, 0), (3, 4))):
+        move(view, to, RIGHT)
+        assert plot.times_s == pytest.approx(times_s, abs=0.01)
+    qtbot.mouseRelease(view, RIGHT, pos=end)
+
+
+def test_a_click_seeks_and_with_shift_reports_the_place_too(qtbot: QtBot, plot: TimePlot) -> None:
+    seeks, points = reported(plot.seek_asked), reported(plot.pointed)
+    place = place_of(plot, 2.0, 0.25)
+    qtbot.mouseClick(plot.viewport(), LEFT, pos=place)
+    assert points == []
+    qtbot.mouseClick(plot.viewport(), LEFT, SHIFT, pos=place)
+    assert seeks == pytest.approx([2.0, 2.0], abs=0.02)
+    assert points[0] == pytest.approx((2.0, 0.25), abs=0.02)
+
+
+def test_the_view_stays_for_a_take_of_the_same_length_and_the_end_of_training_is_seen(
+    qtbot: QtBot, plot: TimePlot
+) -> None:
+    assert (plot.horizon.isVisible(), plot.horizon.value()) == (True, 0.25)
+    shaded, unshaded = (
+        pixels(plot)[place_of(plot, time_s, 0.9).y(), place_of(plot, time_s, 0.9).x()] for time_s in (0.12, 2.0)
+    )
+    assert shaded != unshaded
+    plot.show_times(0.5, 0.7)
+    plot.set_times(4.0, 0.5)
+    assert plot.times_s == pytest.approx((0.5, 0.7))
+    plot.set_times(0.2, 0.25)
+    assert plot.times_s == pytest.approx((0, 0.2))
+    assert not plot.horizon.isVisible()
+
+
+def test_numbers_that_would_touch_are_left_out_the_ends_last() -> None:
+    for room, kept in ((1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))):
+        assert [text for _, text in sparse(TICKS, room)] == [str(number) for number in kept]
+    assert sparse([], 1) == []
+
+
+def numbers(axis: pg.AxisItem) -> dict[str, float]:
+    """The heights in pixels at which an axis writes its numbers, from below."""
+    image = QImage(10, 10, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    specs = axis.generateDrawSpecs(painter)
+    painter.end()
+    written = sorted(((rect.center().y(), text) for rect, _, text in (specs[2] if specs else [])), reverse=True)
+    return {text: y for y, text in written}
+
+
+def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot: QtBot) -> None:
+    plot = pg.PlotWidget()
+    qtbot.addWidget(plot)
+    plot.resize(300, 300)
+    plot.show()
+    item = plot.getPlotItem()
+    axis = item.getAxis("left")
+    label = UprightLabel(item, ("amplitude (mm)", "mm"))
+    for height, words in ((300, "amplitude (mm)"), (100, "mm"), (300, "amplitude (mm)")):
+        plot.resize(300, height)
+        qtbot.waitUntil(lambda words=words: axis.labelText == words)
+        assert axis.label.isVisible()
+    plot.resize(300, 100)
+    qtbot.waitUntil(lambda: axis.labelText == "mm")
+    label.set("a much longer wording than that", "a wording that is too long as well")
+    assert not axis.label.isVisible()
+    plot.resize(300, 400)
+    qtbot.waitUntil(axis.label.isVisible)
+    ticks = UprightTicks(axis, item.vb)
+    item.setYRange(0, 10, padding=0)
+    ticks.set(TICKS, between=(0.5,))
+    for height, highest, most in ((400, 10, 11), (90, 10, 6), (90, 3, 4)):
+        plot.resize(300, height)
+        item.setYRange(0, highest, padding=0)
+        qtbot.waitUntil(lambda most=most: 2 <= len(numbers(axis)) <= most)
+        first, *_, last = numbers(axis)
+        assert (first, last) == ("0", str(highest))
+        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
+
+
+def test_a_low_error_map_has_no_clipped_words(qtbot: QtBot) -> None:
+    view = ErrorPlanePanel(Session(), Library([]))
+    qtbot.addWidget(view)
+    view.show()
+    for height, label, foot in ((400, "amplitude (mm)", True), (130, "mm", False), (400, "amplitude (mm)", True)):
+        view.resize(420, height)
+        item = view.map.getPlotItem()
+        qtbot.waitUntil(lambda item=item, label=label: item.getAxis("left").labelText == label)
+        assert item.getAxis("bottom").label.isVisible() == foot
+        shown = numbers(item.getAxis("left"))
+        assert len(shown) >= 2
+        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(shown.values()))
+
+
+def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot) -> None:
+    plot = pg.PlotWidget()
+    qtbot.addWidget(plot)
+    plot.resize(900, 200)
+    plot.show()
+    legend, seen = Legend(plot), {}
+    long = "Classical guitar, nylon B3, plucked anywhere"
+    for title in (long, long.replace("plucked", "struck")):
+        legend.show_sources(
+            (
+                ShownSource("preset:long", "A", title, heard=True),
+                ShownSource("difference", "B", "difference", gain_db=20.0),
+            )
+        )
+        assert legend.text == f"A  {title} · heard   B  difference +20 dB"
+        for width in (900, 400, 260):
+            plot.resize(width, 200)
+            area = plot.getPlotItem().vb.sceneBoundingRect
+            qtbot.waitUntil(lambda area=area: abs(legend.geometry().right() + 5 - area().right()) < 4)
+            assert legend.width() <= SHARE * area().width() + 1
+            seen[title, width] = legend.width()
+    assert seen[long, 900] > seen[long, 400] > seen[long, 260] > 100
+    legend.show_sources(DEFAULT_SOURCES, "mode 2, left")
+    assert legend.accessibleName() == "Drawn: mode 2, left   A  model · heard   B  truth"
+
+
+@pytest.fixture
+def table(qtbot: QtBot) -> FiguresTable:
+    made = FiguresTable("Figures", COLUMNS)
+    qtbot.addWidget(made)
+    made.show_rows([TableRow("b", ("b", 2.12345)), TableRow("a", ("a", None)), TableRow("c", ("c", -10.0))])
+    made.show()
+    return made
+
+
+def test_figures_are_sorted_as_numbers_none_last_and_copied_so(table: FiguresTable) -> None:
+    for column, order, keys in ((0, "Ascending", "abc"), (1, "Ascending", "cba"), (1, "Descending", "bca")):
+        table.sortByColumn(column, getattr(Qt.SortOrder, f"{order}Order"))
+        assert "".join(row.key for row in table.rows) == keys
+    press_keys(table, Key.Key_C, held=CONTROL)
+    assert QGuiApplication.clipboard().text() == "name\tlevel\nb\t2.12345\nc\t-10.0\na\t\n"
+
+
+def test_rows_are_chosen_by_keys_and_clicks_and_stay_chosen(qtbot: QtBot, table: FiguresTable) -> None:
+    asked = reported(table.row_entered, table.row_deleted, table.escaped, table.row_clicked, table.row_double_clicked)
+    table.choose("a")
+    press_keys(table, Key.Key_Down, Key.Key_Return, Key.Key_Delete, Key.Key_Escape)
+    assert asked == ["b", "b", ()]
+    place = table.visualRect(table.model().index(2, 0)).center()
+    qtbot.mouseClick(table.viewport(), LEFT, pos=place)
+    qtbot.mouseDClick(table.viewport(), LEFT, pos=place)
+    assert asked[3:] == ["c", "c"]
+    for rows, chosen in ((("c", "d"), "c"), (("d",), None)):
+        table.show_rows([TableRow(key, (key, 3.0)) for key in rows])
+        assert table.chosen_key == chosen

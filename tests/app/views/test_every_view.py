@@ -1,0 +1,393 @@
+"""The laws of every control, plot and dialog: a name, the keyboard alone, both themes, room, and no thread left.
+
+Views are found in their modules: one without a maker here fails. That no thread is left is checked of every test.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QAccessible, QColor, QImage
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QDialog,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QPushButton,
+    QScrollArea,
+    QTabBar,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+import app.views
+from app.analysis.abx.record import AbxRecord, Candidate
+from app.analysis.abx.trials import AbxChoices
+from app.export.choices import ExportChoices
+from app.export.sampled.choices import SampledChoices
+from app.shared.parameters import OF_CHOICES
+from app.views import theme
+from app.views.controls import (
+    app_menu,
+    browser,
+    browser_rows,
+    deck,
+    drop_sign,
+    elided_label,
+    filter_button,
+    focus_ring,
+    form,
+    knob,
+    meter,
+    name_button,
+    note_box,
+    notice_bar,
+    notice_list,
+    number_box,
+    overflow,
+    plain,
+    preset_bar,
+    progress_strip,
+    readout,
+    segments,
+    sideways,
+    slot_buttons,
+    song_strip,
+    transport_bar,
+)
+from app.views.dialogs import (
+    abx_dialog,
+    abx_pages,
+    audio_dialog,
+    export_dialog,
+    export_pages,
+    help_dialog,
+    learn_dialog,
+    midi_dialog,
+)
+from app.views.drum.view import DrumView
+from app.views.instrument import neck, panel, patch_bar, patch_card, piano_keys, string_knobs
+from app.views.plots import figures_table, kept_plot, legend, plots, pointed_plot, time_plot
+from app.views.string.view import StringView
+from tests.app.conftest import make_sound
+from tests.app.gestures import picture
+
+BASES = {"ExportPage", "GrowingDialog", "Playable", "StageView"}
+SCREEN = 1280, 720
+MATERIAL = AbxRecord(
+    a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
+    b=Candidate(label="Truth", preset="small", preset_sha256="0f" * 32),
+    pluck={"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1},
+    through={"volume_db": 0.0},
+    planned_trials=1,
+    seed=0,
+)
+
+
+def made_deck() -> QWidget:
+    made = deck.Deck("Views")
+    for key in ("first", "second"):
+        made.add(key, key, plain.Label(key))
+    return made
+
+
+def filtered() -> QWidget:
+    made = filter_button.FilterButton("presets")
+    made.show_listed(2, 3)
+    return made
+
+
+def with_ring() -> QWidget:
+    plot = time_plot.TimePlot("A plot", "A tip")
+    focus_ring.FocusRing(plot)
+    return plot
+
+
+def notice() -> QWidget:
+    made = notice_bar.NoticeBar()
+    made.report("No sound.", "device 3")
+    return made
+
+
+def made_legend() -> QWidget:
+    plot = time_plot.TimePlot("A plot", "A tip")
+    plot.legend = legend.Legend(plot)
+    return plot
+
+
+def export_at(kind: export_pages.Kind) -> Callable[[], QWidget]:
+    def make() -> QWidget:
+        made = export_dialog.ExportDialog(ExportChoices(), SampledChoices())
+        made.open_at(kind)
+        return made
+
+    return make
+
+
+def learn() -> QWidget:
+    sound = make_sound()
+    made = learn_dialog.LearnDialog(Path(__file__), sound)
+    made.finished.connect(sound.close)
+    return made
+
+
+def abx() -> QWidget:
+    rendered: Future[dict[str, np.ndarray]] = Future()
+    rendered.set_result({name: np.ones((480, 1), np.float32) for name in ("model", "truth")})
+    sound = make_sound()
+    made = abx_dialog.AbxDialog(sound, MATERIAL, AbxChoices(), lambda rate_hz: rendered)
+    made.finished.connect(sound.close)
+    return made
+
+
+def with_name(part: QWidget) -> QWidget:
+    """A part, named as by its owner."""
+    part.setAccessibleName("A part")
+    part.setToolTip("A tip")
+    return part
+
+
+def with_text(label: QLabel) -> QLabel:
+    label.setText("A text")
+    return label
+
+
+MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
+    app_menu.AppMenu: app_menu.AppMenu,
+    browser.Browser: patch_card.patch_browser,
+    browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.Column("Name"),))),
+    deck.Deck: made_deck,
+    drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
+    elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
+    filter_button.FilterButton: filtered,
+    focus_ring.FocusRing: with_ring,
+    form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
+    knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
+    meter.Meter: meter.Meter,
+    name_button.NameButton: lambda: with_name(name_button.NameButton("A name")),
+    note_box.NoteBox: lambda: note_box.NoteBox("Lowest key", "The lowest"),
+    notice_bar.Bell: notice_bar.Bell,
+    notice_bar.NoticeBar: notice,
+    notice_list.NoticeList: notice_list.NoticeList,
+    number_box.NumberBox: lambda: form.spin_box("Length", (0, 5), 1, "The length", " m", 2),
+    number_box.CountBox: lambda: form.count_box("Trials", 50, 16, "How many"),
+    overflow.Overflow: lambda: overflow.Overflow("the row"),
+    plain.Label: lambda: plain.Label("A text"),
+    plain.SteadyLabel: lambda: with_text(plain.SteadyLabel("A wide text")),
+    preset_bar.PresetBar: preset_bar.PresetBar,
+    progress_strip.ProgressStrip: lambda: progress_strip.ProgressStrip("Progress"),
+    readout.Readout: lambda: with_text(readout.Readout()),
+    segments.Segments: lambda: segments.Segments("Surface", [("a", "A", "The first"), ("b", "B", "The second")]),
+    sideways.Sideways: lambda: sideways.Sideways(plain.Label("A text")),
+    slot_buttons.SlotButtons: slot_buttons.SlotButtons,
+    song_strip.SongStrip: song_strip.SongStrip,
+    transport_bar.TransportBar: transport_bar.TransportBar,
+    figures_table.FiguresTable: lambda: figures_table.FiguresTable(
+        "Figures", [figures_table.Column("name", "name", "a name")]
+    ),
+    kept_plot.KeptPlot: lambda: with_name(kept_plot.KeptPlot()),
+    legend.Legend: made_legend,
+    pointed_plot.PointedPlot: lambda: pointed_plot.PointedPlot("A plot", "A tip"),
+    time_plot.TimePlot: lambda: time_plot.TimePlot("A plot", "A tip"),
+    StringView: StringView,
+    DrumView: DrumView,
+    neck.Neck: neck.Neck,
+    piano_keys.PianoKeys: piano_keys.PianoKeys,
+    panel.InstrumentPanel: panel.InstrumentPanel,
+    patch_bar.PatchBar: patch_bar.PatchBar,
+    string_knobs.Facts: string_knobs.Facts,
+    string_knobs.StringKnobs: string_knobs.StringKnobs,
+    abx_pages.SetupPage: lambda: abx_pages.SetupPage("A pluck", ("Model", "Truth"), AbxChoices()),
+    abx_pages.TrialPage: lambda: abx_pages.TrialPage(("Model", "Truth")),
+    abx_pages.ResultPage: abx_pages.ResultPage,
+    abx_dialog.AbxDialog: abx,
+    audio_dialog.AudioDialog: audio_dialog.AudioDialog,
+    export_pages.WavForm: lambda: export_pages.WavForm(ExportChoices()),
+    export_pages.NotePage: export_at("note"),
+    export_pages.PerformancePage: export_at("performance"),
+    export_pages.SamplerPage: export_at("sampler"),
+    export_pages.PluginPage: export_at("plugin"),
+    export_dialog.ExportDialog: export_at("note"),
+    help_dialog.HelpDialog: lambda: help_dialog.HelpDialog(
+        [("F1", "Help")], [("A view", "All")], Path("log"), "About"
+    ),
+    learn_dialog.LearnDialog: learn,
+    midi_dialog.MidiDialog: lambda: midi_dialog.MidiDialog({"position": "position"}, {"knobs.decay": "decay"}),
+}
+
+
+def test_every_view_has_a_maker() -> None:
+    found = set()
+    for module in pkgutil.walk_packages(app.views.__path__, "app.views."):
+        for name, each in vars(importlib.import_module(module.name)).items():
+            if inspect.isclass(each) and issubclass(each, QWidget) and each.__module__ == module.name:
+                found.add(each if name not in BASES and not name.startswith("_") else None)
+    assert found - {None} == set(MAKERS)
+
+
+@pytest.fixture(scope="module")
+def themes(qapp: QApplication) -> Iterator[None]:
+    """Plots follow the theme; afterwards all is as it was."""
+    style, palette, font = qapp.styleSheet(), qapp.palette(), qapp.font()
+    theme.apply_theme(qapp, "dark")
+    theme.changes.theme_changed.connect(plots.recolour)
+    yield
+    theme.changes.theme_changed.disconnect(plots.recolour)
+    theme.use(theme.DARK)
+    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+    qapp.setStyleSheet(style)
+    qapp.setPalette(palette)
+    qapp.setFont(font)
+
+
+@pytest.fixture
+def size_percent() -> int:
+    """The size of the text."""
+    return 100
+
+
+@pytest.fixture(params=MAKERS, ids=lambda kind: kind.__name__)
+def view(
+    request: pytest.FixtureRequest,
+    themes: None,
+    size_percent: int,
+    qtbot: QtBot,
+    qapp: QApplication,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[QWidget]:
+    """An empty one, shown: a dialog alone, another in the column of a window."""
+    for name in ("getSaveFileName", "getOpenFileName", "getExistingDirectory"):
+        monkeypatch.setattr(QFileDialog, name, lambda *_: ("", ""))
+    if theme.present != replace(theme.DARK, scale=size_percent / 100):
+        theme.apply_theme(qapp, "dark", size_percent)
+    made = MAKERS[request.param]()
+    window = made if isinstance(made, QDialog) else QWidget()
+    qtbot.addWidget(window)
+    if window is not made:
+        window.resize(*SCREEN)
+        column = QVBoxLayout(window)
+        column.addWidget(made)
+        column.addStretch()
+    window.show()
+    made.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    if isinstance(made, learn_dialog.LearnDialog):
+        qtbot.waitUntil(made.start.isEnabled)
+    yield made
+    made.abandon() if isinstance(made, abx_dialog.AbxDialog) else window.close()
+    assert not window.isVisible()
+
+
+def controls(root: QWidget) -> list[QWidget]:
+    """What the Tab key should reach."""
+    parts = [root, *root.findChildren(QWidget)]
+    return [
+        each
+        for each in parts
+        if each.isVisible()
+        and each.isEnabled()
+        and each.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and each.focusProxy() is None
+        and not (isinstance(each, QLineEdit) and isinstance(each.parent(), QAbstractSpinBox | QComboBox))
+        and not isinstance(each, QMenu)
+    ]
+
+
+def name_of(widget: QWidget) -> str:
+    return str(QAccessible.queryAccessibleInterface(widget).text(QAccessible.Text.Name))
+
+
+def test_each_control_has_a_name_and_what_is_pressed_or_chosen_a_tip(view: QWidget) -> None:
+    for each in controls(view):
+        assert name_of(each), each
+        ends = isinstance(each, QPushButton) and (each.isDefault() or name_of(each) in ("Close", "Cancel"))
+        if isinstance(each, QAbstractButton | QComboBox | QAbstractSpinBox) and not ends:
+            assert each.toolTip() or isinstance(each.parent(), QTabBar), name_of(each)
+
+
+def test_the_keyboard_alone_reaches_and_works_each_control(qtbot: QtBot, view: QWidget) -> None:
+    wanted, reached = set(controls(view)), set[QWidget]()
+    for _ in range(2 * len(wanted) + 4):
+        here = QApplication.focusWidget() or view.window()
+        reached.add(here)
+        if isinstance(here, QAbstractButton) and here.group():
+            for key in (Qt.Key.Key_Right, Qt.Key.Key_Down) * len(
+                here.group().buttons()
+            ):  # arrows pass through a group
+                QTest.keyClick(QApplication.focusWidget(), key)
+                reached.add(QApplication.focusWidget())
+        QTest.keyClick(QApplication.focusWidget() or here, Qt.Key.Key_Tab)
+    wanted &= {each for each in wanted if each.isVisible()}  # a choice may have hidden what it is not of
+    assert wanted <= reached, [name_of(each) for each in wanted - reached]
+    arrows = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Home, Qt.Key.Key_End)
+    for each in wanted:
+        for key in (*arrows, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Delete):
+            QTest.keyClick(each, key)
+        if isinstance(each, QToolButton) and each.menu() is None and each.isEnabled() and each.isVisible():
+            with qtbot.waitSignal(each.clicked):
+                QTest.keyClick(each, Qt.Key.Key_Space)
+    if isinstance(view, QDialog):
+        view.show()
+        QTest.keyClick(view, Qt.Key.Key_Escape)
+        assert not view.isVisible()
+
+
+def share_of(image: QImage, *colours: str) -> float:
+    """The share of the pixels that have one of these colours."""
+    image = image.convertToFormat(QImage.Format.Format_RGB32)
+    pixels = np.frombuffer(image.constBits(), np.uint32).reshape(image.height(), -1)[:, : image.width()]
+    return float(np.isin(pixels & 0xFFFFFF, [QColor(colour).rgb() & 0xFFFFFF for colour in colours]).mean())
+
+
+def test_each_has_the_colours_of_the_theme_and_comes_back(view: QWidget, qapp: QApplication) -> None:
+    view.window().setFocus()
+    QApplication.processEvents()
+    seen = [picture(view)]
+    for choice in ("light", "dark"):
+        theme.apply_theme(qapp, choice)  # type: ignore[arg-type]
+        QApplication.processEvents()
+        seen.append(picture(view))
+    dark, light, again = seen
+    assert again == dark
+    for image, other in ((dark, theme.LIGHT), (light, theme.DARK)):
+        assert share_of(image, other.background, other.panel, other.raised, other.text) < 0.01
+    assert light != dark or share_of(light, theme.LIGHT.text) == 0
+
+
+@pytest.mark.parametrize("size_percent", [150])
+def test_each_has_room_with_larger_text(view: QWidget) -> None:
+    window = view.window()
+    window.adjustSize() if isinstance(view, QDialog) else window.resize(*SCREEN)
+    QApplication.processEvents()
+    assert window.width() <= SCREEN[0] or window.minimumSizeHint().width() > SCREEN[0]
+    assert window.height() <= SCREEN[1]
+    for each in controls(view):
+        area = QRect(each.mapTo(view, QPoint()), each.size())
+        inside = each is view or any(isinstance(above, QScrollArea) for above in ancestors(each))
+        assert inside or view.rect().contains(area), name_of(each)
+        if isinstance(each, QAbstractButton):
+            assert each.height() >= min(each.fontMetrics().height(), each.sizeHint().height()), name_of(each)
+    assert not picture(view).isNull()
+
+
+def ancestors(widget: QWidget) -> Iterator[QWidget]:
+    while (widget := widget.parentWidget()) is not None:
+        yield widget
