@@ -2,7 +2,7 @@
 
 The force is a raised cosine of the time of contact. After a symmetrical pulse a mode moves as if it had been kicked
 at the pulse's middle with the pulse's spectrum at its own frequency. So a blow is a start with speeds alone. The
-time of contact falls with the speed as v^(-1/5), Hertz's law for a ball on an elastic body (Johnson, Contact
+time of contact falls with the speed as v^(-1/5), Hertz's law for an elastic ball (Johnson, Contact
 Mechanics (1985), 11.4). It is a period of the lowest mode at most, in which the surface throws the mallet off: an
 estimate, without which soft blows on small drums would be silent. Sticks touch drums for 3 to 6 ms (Wagner, Analysis
 of Drumbeats, KTH (2006)). What the head does to the mallet while they touch, and the change of tension meanwhile, are

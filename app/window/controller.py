@@ -1,6 +1,7 @@
 """The controller, which connects everything: session, performance, sound, panels and window.
 
     widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
+
     a timer ── 60 times a second, 10 when all is still ──► the panels that can be seen, meter
 
 Everything here runs in the window's thread.

@@ -64,7 +64,7 @@ def averaged_amplitude(physics: Physics) -> Tensor:
 def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
     """The modulation by the swinging tension within a period, to first order: float64 (modes, modes) each.
 
-    -k_n q_n η_m² q_m² swings at ω_n ± 2ω_m. There mode n answers with α z_m² z_n + β z̄_m² z_n,
+    -k_n q_n η_m² q_m² swings at ω_n ± 2ω_m. There mode n answers with α z_m² z_n + β z̄_m² z_n:
     α = k_n η_m²/(16 ω_m (ω_n + ω_m)) and β = -k_n η_m²/(16 ω_m (ω_n - ω_m)); n = m has no β, its part is in K.
 
     Returns:

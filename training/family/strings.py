@@ -1,7 +1,7 @@
 """The family: strings with random pitch, inharmonicity and damping, each with a random pluck.
 
-A string's motion depends on three numbers of its own (inharmonicity B, two damping rates), and on the shape and
-relative rise of tension of its pluck; pitch, length, density and tension rescale it exactly. So the ranges are those
+A string's motion depends on three numbers of its own (inharmonicity B, two damping rates) and on its pluck's
+shape and relative rise of tension; pitch, length, density and tension rescale it exactly. So the ranges are those
 of audible properties, and strings of one length and density stand for all.
 """
 

@@ -2,8 +2,8 @@
 
 For an integrated phase, which has that form; `training.research.fourier_wiring` adds the Fourier cells.
 
-The shapes that the motions show (`modes`) keep theirs while their frequencies move. So the motion of a mode n in a
-string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
+The shapes that the motions show (`modes`) keep theirs while their frequencies move. A string starts at rest. Mode
+n then moves, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t}, by
 
     q_n(t) = q_n Re s_n exp[(-σ_n + iω_n) t + i Σ_m κ_nm ∫₀ᵗ E_m(s) ds],     s_n ≈ 1,
 

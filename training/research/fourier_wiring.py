@@ -12,8 +12,8 @@ numbers only where they belong. The three layers are analysis of the field at th
 synthesis. So the field is a part of the state, and a linear string is kept exactly.
 
 FGRU. tanh is the identity for numbers that are small, and the gates' biases are factors of single points: the cosine
-and the sine of mode n's phase per sample are r's at the point n of channels that hold copies of all modes'
-states. z's say where anything is written. How far a mode turns follows the squares of all: a product r ⊙ h of two
+and the sine of mode n's phase per sample are r's at the point n. Their channels hold copies of all modes' states.
+z's say where anything is written. How far a mode turns follows the squares of all: a product r ⊙ h of two
 copies is a square; their sum, at one point, reaches each mode's r by the lag between them.
 """
 
