@@ -16,7 +16,7 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError, read, write
-from tests.training.sweeping.conftest import row_of
+from tests.training.sweeping.conftest import plan_in, row_of
 from training.fitting.fit import Progress
 from training.results import RESULTS, Row, add_rows, read_results
 from training.sweeping.plan import Plan
@@ -50,8 +50,12 @@ class Script:
 
     description = "a script"
 
-    def __init__(self, outcome: Callable[[TaskRun, int], Row | str], capacity: int = 3) -> None:
-        self._outcome, self._pool = outcome, ThreadPoolExecutor(10)
+    def __init__(
+        self, outcome: Callable[[TaskRun, int], Row | str], capacity: int = 3, wrong: dict[str, Any] | None = None
+    ) -> None:
+        self._outcome = outcome
+        self._wrong = wrong or {}  # values of every row
+        self._pool = ThreadPoolExecutor(10)
         self.capacity = lambda: capacity
         self.started: list[str] = []
         self.tasks: list[Task] = []
@@ -65,7 +69,7 @@ class Script:
     def _end(self, task: Task, tries: int) -> dict[str, Any]:
         found = [self._outcome(run, tries) for run in task.runs]
         errors = [each for each in found if isinstance(each, str)]
-        return {"rows": [] if errors else [write(row) for row in found], "error": "".join(errors[:1])}
+        return {"rows": [] if errors else [write(row) | self._wrong for row in found], "error": "".join(errors[:1])}
 
 
 # --- the queue
@@ -177,10 +181,7 @@ def test_workers_that_are_gone_end_the_sweep(plan, options: Options) -> None:
 
 @pytest.mark.parametrize("wrong", [{"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}])
 def test_a_row_that_makes_no_sense_is_a_failure(plan, options: Options, wrong: dict[str, Any]) -> None:
-    workers = Script(lambda run, tries: row_of(run))
-    end = workers._end
-    workers._end = lambda *each: {**end(*each), "rows": [row | wrong for row in end(*each)["rows"]]}
-    rows = sweep(plan(), workers, options, Mock())
+    rows = sweep(plan(), Script(lambda run, tries: row_of(run), wrong=wrong), options, Mock())
     assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
 
 
@@ -212,12 +213,12 @@ def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(pl
 
 
 def test_trials_are_kept_apart(plan, tmp_path: Path) -> None:
-    trial = plan()
-    real = replace(trial, trial=False)
-    assert results_of(real, tmp_path) == RESULTS
-    assert results_of(trial, tmp_path) == tmp_path / "trial" / "results.csv"
-    options = Options(runs=tmp_path)
-    assert (options.task(trial, trial.runs[0]).group, options.task(real, real.runs[0]).group) == ("trial", "")
+    options, trial = Options(runs=tmp_path), plan()
+    for made, results, group in (
+        (trial, tmp_path / "trial" / "results.csv", "trial"),
+        (replace(trial, trial=False), RESULTS, ""),
+    ):
+        assert (results_of(made, tmp_path), options.task(made, made.runs[0]).group) == (results, group)
 
 
 # --- whole sweeps
@@ -273,17 +274,24 @@ def measured(file: Path) -> list[list[Any]]:
     return [[getattr(row, name) for name in MEASURED] for row in read_results(file)]
 
 
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
+    """The rows of fifteen epochs, measured one after another in this process."""
+    folder = tmp_path_factory.mktemp("alone")
+    made = plan_in(folder, epochs=15)
+    return alone_rows(made, Options(folder / "alone.csv", folder / "alone", folder / "cache", "cpu", 1))
+
+
 def here(count: int) -> Layout:
     return replace(fitted(count, device="cpu", workers=count), threads=1)
 
 
 @pytest.mark.parametrize("seeds_at_once", [False, True])
 def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
-    plan, options: Options, alone: Options, seeds_at_once: bool, monkeypatch: pytest.MonkeyPatch
+    plan, options: Options, expected, seeds_at_once: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=15)
-    expected = alone_rows(made, alone)
     options = replace(options, seeds_at_once=seeds_at_once)
 
     monkeypatch.setattr("training.sweeping.sweep.POLL_S", 0.02)
