@@ -12,13 +12,11 @@ import pytest
 from engine.presets import load_preset
 from engine.resonators.recorded import RecordedString
 from tests.training.recording.synthetic import SyntheticNote
-from training.recording.fit import fit_note
 from training.recording.joint import combined
 from training.recording.learn import Learned, examined, learn
-from training.recording.numbering import number_note
 from training.recording.physics import Partial
 from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
-from training.recording.report import errors_of, figures
+from training.recording.report import figures
 from training.recording.table import as_data, as_text
 
 
@@ -28,14 +26,9 @@ def recorded_of(learned: Learned) -> RecordedString:
 
 
 def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -> None:
-    note, errors = learned.note, learned.report.errors
-    assert errors.esr < 2e-3
-    assert errors.distance_db < 4
-    series = number_note(note)
-    linear = fit_note(note, series, free=0, glides=False)
-    truth = note.fitted()
-    found = linear.render(np.arange(len(truth)) / note.rate_hz)
-    assert errors.esr < 0.5 * errors_of(truth, found, note.rate_hz).esr
+    errors = learned.report.errors
+    assert errors.esr < 2e-3 and errors.distance_db < 4
+    assert errors.esr < 0.5 * learned.verdict.linear_esr
 
 
 def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: SyntheticNote) -> None:
@@ -83,7 +76,7 @@ def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
         pass
 
     def stop(share: float) -> None:
-        if share > 0.2:
+        if share > 0.05:
             raise Cancelled
 
     with pytest.raises(Cancelled):

@@ -50,27 +50,16 @@ def change(path: Path, old: str, new: str) -> str:
 def test_the_order_is_of_value(path: Path) -> None:
     """Block, seed, the non-linear string first, the short horizon first, then as named; each run once."""
     plan = load_plan(str(path))
-    assert [run.name.removeprefix("nylon_") for run in plan.runs] == [
-        "nonlinear_noise_4k_koopman_var_400",
-        "nonlinear_noise_4k_dmd_400",
-        "nonlinear_noise_4k_koopman_var",
-        "nonlinear_noise_4k_dmd",
-        "linear_noise_4k_koopman_var_400",
-        "linear_noise_4k_dmd_400",
-        "linear_noise_4k_koopman_var",
-        "linear_noise_4k_dmd",
-        "nonlinear_noise_4k_koopman_var_400_seed1",
-        "nonlinear_noise_4k_dmd_400_seed1",
-        "nonlinear_noise_4k_koopman_var_seed1",
-        "nonlinear_noise_4k_dmd_seed1",
-        "linear_noise_4k_koopman_var_400_seed1",
-        "linear_noise_4k_dmd_400_seed1",
-        "linear_noise_4k_koopman_var_seed1",
-        "linear_noise_4k_dmd_seed1",
-        "nonlinear_noise_4k_lru_400",
-        "nonlinear_gaussian_4k_lru_400",
-        "nonlinear_gaussian_4k_dmd_400",  # dmd on noise is there already
+    first = [
+        f"{string}_noise_4k_{model}{horizon}{seed}"
+        for seed in ("", "_seed1")
+        for string in ("nonlinear", "linear")
+        for horizon in ("_400", "")
+        for model in ("koopman_var", "dmd")
     ]
+    second = ["nonlinear_noise_4k_lru_400", "nonlinear_gaussian_4k_lru_400", "nonlinear_gaussian_4k_dmd_400"]
+    # dmd on noise is there already
+    assert [run.name.removeprefix("nylon_") for run in plan.runs] == first + second
     assert (plan.name, plan.trial) == ("plan", False)
     assert plan.runs[0].configuration.horizon == 400
     assert plan.runs[8].configuration.recipe.seed == 1
