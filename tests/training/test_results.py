@@ -170,6 +170,7 @@ def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.M
     [
         ("", "not a results file"),
         ("name,status\nx,done\n", "not a results file"),
+        ("digest," + "y" * 200_000, "field larger"),
         ("digest,name,colour\nx,y,red\n", "unknown column 'colour'; it is of a newer version: update"),
         ("digest,name\nx,y\n", "line 2: field 'status' is missing"),
         (b"\xff\xfe\x00", "not a text file"),

@@ -37,7 +37,7 @@ def test_a_fit_has_the_pitch_decay_and_level_of_every_partial(seed: int, polaris
         assert other[2] == pytest.approx(own[2], abs=level_db)
     samples = note.fitted()
     error = errors_of(samples, found.render(np.arange(len(samples)) / note.rate_hz), note.rate_hz)
-    assert error.esr < 5e-4
+    assert error.esr < (5e-4 if polarisations == 1 else 1e-2)
 
 
 def test_a_fit_without_a_glide_has_none_and_fits_worse() -> None:

@@ -86,19 +86,19 @@ def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
 def test_one_recording_alone_combines_to_itself_and_takes_to_their_medians(learned: Learned) -> None:
     own = combined([learned], {"kind": "guitar"})
     assert own == replace(recorded_of(learned), settings={"kind": "guitar"})
-    louder = [
-        replace(learned, physics=replace(learned.physics, partials=tuple(shifted(each, hz) for each in partials)))
-        for hz in (1.001, 1.003)
-        for partials in [learned.physics.partials]
+    physics = learned.physics
+    takes = [
+        replace(learned, physics=replace(physics, partials=tuple(shifted(each, factor) for each in physics.partials)))
+        for factor in (1.001, 1.003)
     ]
-    together = combined([learned, *louder], {})
+    together = combined([learned, *takes], {})
     assert together.note == own.note and together.digest == own.digest
     above = np.array(together.cents) - np.array(own.cents)
     np.testing.assert_allclose(above, 1200 * math.log2(1.001), atol=0.02)  # the median of none, one and three
     np.testing.assert_allclose(together.smooth_ratio, own.smooth_ratio, rtol=1e-9)
-    octave = replace(learned.physics, f0_hz=2 * learned.physics.f0_hz)
-    damped = replace(octave, smooth_decay=tuple(4 * each for each in octave.smooth_decay))
-    apart = combined([learned, replace(learned, physics=damped)], {})
+    damped = tuple(4 * each for each in physics.smooth_decay)
+    octave = replace(learned, physics=replace(physics, f0_hz=2 * physics.f0_hz, smooth_decay=damped))
+    apart = combined([learned, octave], {})
     assert apart.cents == own.cents
     assert np.median(np.array(apart.smooth_ratio) / own.smooth_ratio) == pytest.approx(2, rel=0.3)
 
