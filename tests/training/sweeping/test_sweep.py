@@ -59,12 +59,16 @@ class Script:
         self.capacity = lambda: capacity
         self.started: list[str] = []
         self.tasks: list[Task] = []
+        self.futures: list[Future[dict[str, Any]]] = []
+        self.most = 0  # under way at once
 
     def submit(self, plain: Any) -> Future[dict[str, Any]]:
         task = read(Task, plain, "task")
         self.tasks.append(task)
         self.started.append(task.runs[0].name)
-        return self._pool.submit(self._end, task, self.started.count(task.runs[0].name))
+        self.futures.append(self._pool.submit(self._end, task, self.started.count(task.runs[0].name)))
+        self.most = max(self.most, sum(not future.done() for future in self.futures))
+        return self.futures[-1]
 
     def _end(self, task: Task, tries: int) -> dict[str, Any]:
         found = [self._outcome(run, tries) for run in task.runs]
@@ -100,20 +104,17 @@ def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, option
 
 def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options: Options) -> None:
     made = plan()
-    at_once, most = 0, 0
+    together = threading.Barrier(3)
 
     def outcome(run: TaskRun, tries: int) -> Row:
-        nonlocal at_once, most
-        at_once += 1
-        most = max(most, at_once)
-        time.sleep(0.02)
-        at_once -= 1
+        if run.name in [each.name for each in made.runs[:3]]:
+            together.wait(timeout=60)
         return row_of(run)
 
     workers, watch = Script(outcome, capacity=3), Record()
     rows = sweep(made, workers, options, watch)
     assert workers.started == watch.names == [run.name for run in made.runs]
-    assert most == 3
+    assert workers.most == 3
     assert [row.name for row in rows] == workers.started
     assert read_results(options.results) == sorted(rows, key=lambda row: row.name)
 
