@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from dataclasses import replace
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from engine.presets import Preset, load_preset, preset_digest
+from engine.presets import load_preset, preset_digest
 from engine.sources import Runaway
 from training.heard import AMPLITUDES_MM, listen_to, standard_plucks
 from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_REPORTED, NAME, Heard, add_heard, read_heard
@@ -29,34 +30,23 @@ def table(folder: Path, *lines: str) -> Path:
     return folder
 
 
-def test_a_model_that_is_nearly_the_string_is_heard_so(small_preset: Path) -> None:
+def test_a_model_is_heard_as_it_is_tuned_and_each_time_alike(small_preset: Path) -> None:
     """Its multiplier is untrained: the fundamental is right, the glide of a hard pluck is not."""
     shares: list[float] = []
-    heard = listen_to(load_preset(small_preset), shares.append)
-    assert (heard.name, heard.sha256) == ("small", preset_digest(small_preset))
-    assert heard.seconds == pytest.approx(4.0)
-    assert heard.runs_away_s is None
-    assert heard.pitch_cents == pytest.approx(0, abs=1)
-    assert heard.distance_db > 0
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1)
-    assert listen_to(load_preset(small_preset)) == heard
-
-
-def _detuned(preset: Preset, cents: float) -> Preset:
-    """All of its frequencies are higher."""
+    right = listen_to(load_preset(small_preset), shares.append)
+    assert (right.name, right.sha256) == ("small", preset_digest(small_preset))
+    assert right.seconds == pytest.approx(4.0)
+    assert right.runs_away_s is None and right.hum_db is None
+    assert right.pitch_cents == pytest.approx(0, abs=1)
+    assert shares == sorted(shares) and shares[-1] == pytest.approx(1)
+    detuned = load_preset(small_preset)
     with torch.no_grad():
-        preset.model.theta_log.add_(cents / 1200 * float(torch.log(torch.tensor(2.0))))
-    return preset
-
-
-def test_a_detuned_model_is_heard_detuned(small_preset: Path) -> None:
-    right = listen_to(load_preset(small_preset))
-    heard = listen_to(_detuned(load_preset(small_preset), 13.0))
-    assert heard.pitch_cents is not None
-    assert right.pitch_cents is not None
+        detuned.model.theta_log.add_(13.0 / 1200 * math.log(2))
+    heard, again = listen_to(detuned), listen_to(detuned)
+    assert heard == again
+    assert heard.pitch_cents is not None and right.pitch_cents is not None
     assert heard.pitch_cents - right.pitch_cents == pytest.approx(13, abs=0.2)
-    assert heard.distance_db > right.distance_db
+    assert heard.distance_db > right.distance_db > 0
 
 
 def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
@@ -82,7 +72,6 @@ def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
 def test_a_model_that_hums_on_is_heard_to(small_preset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where its voice is made to end; one of a string without losses is not waited for."""
     preset = load_preset(small_preset)
-    assert listen_to(preset).hum_db is None
     with torch.no_grad():
         preset.model.nu_log.sub_(40)  # hardly any decay
     heard = listen_to(preset)
@@ -115,41 +104,29 @@ def test_plucks_stay_within_what_was_trained(small_preset: Path) -> None:
 def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path: Path) -> None:
     assert read_heard(tmp_path) == ({}, [])
     other = Heard("other", "b" * 64, 4.0, 1.0, 0.0, 0.0)
-    add_heard(tmp_path, [GOOD])
-    add_heard(tmp_path, [other])
-    assert read_heard(tmp_path) == ({GOOD.sha256: GOOD, other.sha256: other}, [])
-    again = replace(GOOD, sha256="c" * 64)
-    add_heard(tmp_path, [again])
-    assert read_heard(tmp_path) == ({again.sha256: again, other.sha256: other}, [])
+    again = replace(GOOD, sha256="c" * 64, level_db=-0.0001)
+    for added, known in ((GOOD, [GOOD]), (other, [GOOD, other]), (again, [replace(again, level_db=0.0), other])):
+        add_heard(tmp_path, [added])
+        assert read_heard(tmp_path) == ({each.sha256: each for each in known}, [])
     text = (tmp_path / NAME).read_text()
     assert [row.split(",")[0] for row in text.splitlines()] == ["name", "good", "other"]
-    assert "-0.0" not in line_of(tmp_path, replace(GOOD, level_db=-0.0001))
-
-
-def line_of(folder: Path, heard: Heard) -> str:
-    add_heard(folder, [heard])
-    return (folder / NAME).read_text()
+    assert "-0.0" not in text.splitlines()[1]
 
 
 @pytest.mark.parametrize(
     ("bad", "reported"),
     [
         (line(distance_db="nan"), "finite"),
-        (line(distance_db="1e999"), "finite"),
         (line(distance_db="1e300"), "distance_db must lie in"),
-        (line(distance_db="-1"), "distance_db must lie in"),
         (line(distance_db=""), "'distance_db' is missing"),
         (line(pitch_cents="<b>sharp</b>"), "is not a number"),
         (line(split_cents="-3"), "split_cents must lie in"),
-        (line(method="1.5"), "is not a number"),
         (line(method="9" * 5000), "is not a number"),
         (line(sha256="../../etc/passwd"), "64 hexadecimal digits"),
-        (line(name="x" * 5000), "name must be"),
         (line(name="a\x1b[31m"), "name must be"),
         (line(name=""), "name must be"),
         ("a,b", "holds 2 values"),
         ("x" * 200_000, "field larger"),
-        ("", "holds 0 values"),
         ("\0" * 10, "values"),
         ('"' + line(), "values"),
     ],
@@ -162,14 +139,10 @@ def test_a_bad_line_is_reported_and_hides_no_other(tmp_path: Path, bad: str, rep
     assert len(problem) < len(str(tmp_path)) + 300
 
 
-def test_markup_in_a_name_stays_text(tmp_path: Path) -> None:
-    known, problems = read_heard(table(tmp_path, line(name="<img src=x>")))
+def test_markup_in_a_name_stays_text_and_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
+    known, problems = read_heard(table(tmp_path, line(name="<img src=x>"), line(sha256="e" * 64, method=METHOD + 1)))
     assert problems == []
-    assert known[GOOD.sha256].name == "<img src=x>"
-
-
-def test_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
-    assert read_heard(table(tmp_path, line(method=METHOD + 1))) == ({}, [])
+    assert {digest: each.name for digest, each in known.items()} == {GOOD.sha256: "<img src=x>"}
 
 
 @pytest.mark.parametrize(
@@ -190,24 +163,22 @@ def test_a_file_that_is_no_table_is_reported_in_one_line(tmp_path: Path, content
 
 
 def test_many_bad_lines_are_reported_in_few(tmp_path: Path) -> None:
-    known, problems = read_heard(table(tmp_path, *["a,b"] * 100_000, line()))
+    known, problems = read_heard(table(tmp_path, *["a,b"] * 1_000, line()))
     assert known == {GOOD.sha256: GOOD}
     assert len(problems) == MOST_REPORTED + 1
-    assert "99997 more lines" in problems[-1]
+    assert "997 more lines" in problems[-1]
 
 
-def test_a_folder_in_its_place_and_one_that_cannot_be_written(tmp_path: Path) -> None:
+def test_a_folder_or_a_link_to_nowhere_in_its_place_is_no_table(tmp_path: Path) -> None:
+    if os.name != "nt":  # links need rights there
+        (tmp_path / NAME).symlink_to(tmp_path / "gone")
+        assert read_heard(tmp_path) == ({}, [])
+        (tmp_path / NAME).unlink()
     (tmp_path / NAME).mkdir()
     known, (reported,) = read_heard(tmp_path)
     assert known == {} and "not an ordinary file; remove it" in reported
     with pytest.raises(OSError, match=NAME):
         add_heard(tmp_path, [GOOD])
-
-
-@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
-def test_a_link_to_nowhere_is_no_table(tmp_path: Path) -> None:
-    (tmp_path / NAME).symlink_to(tmp_path / "gone")
-    assert read_heard(tmp_path) == ({}, [])
 
 
 def test_the_shipped_table_knows_every_shipped_preset() -> None:

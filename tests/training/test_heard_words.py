@@ -1,4 +1,4 @@
-"""What is wrong with a preset's sound is called by its name, the worst first."""
+"""Faults of a preset's sound, each by its name, the worst first."""
 
 from __future__ import annotations
 
@@ -19,34 +19,25 @@ TRUE = Heard("x", "0" * 64, 4.0, 0.2, 0.5, 0.0, 1.0)
         ({"level_db": 1.9, "rise_db": 5.0, "pitch_cents": -2.9}, []),  # a beat alone does not grow
         ({"level_db": 5.2, "rise_db": 3.0}, ["grows, +5 dB"]),
         ({"level_db": 5.2}, ["fades too slowly, +5 dB"]),
-        ({"level_db": -7.6}, ["decays too fast, −8 dB"]),
         ({"pitch_cents": 13.1}, ["pitch 13 cents too high"]),
-        ({"pitch_cents": -13.1}, ["pitch 13 cents too low"]),
         ({"pitch_cents": None}, []),
-        ({"split_cents": 22.2, "pitch_cents": 7.0}, ["two pitches, 22 cents apart", "pitch 7 cents too high"]),
-        ({"pitch_cents": 12.0, "level_db": -3.0}, ["pitch 12 cents too high", "decays too fast, −3 dB"]),
-        ({"hum_db": -66.0}, ["residual hum at −66 dB"]),
+        ({"split_cents": 22.2, "pitch_cents": -7.0}, ["two pitches, 22 cents apart", "pitch 7 cents too low"]),
+        ({"pitch_cents": 12.0, "level_db": -7.6}, ["pitch 12 cents too high", "decays too fast, −8 dB"]),
         ({"hum_db": -66.0, "level_db": 3.0}, ["residual hum at −66 dB", "fades too slowly, +3 dB"]),
         ({"hum_db": -90.0}, []),
         ({"runs_away_s": 3.21, "pitch_cents": 400.0}, ["diverges after 3.2 s", "pitch 400 cents too high"]),
     ],
 )
-def test_faults_by_name(changes: dict[str, float | None], named: list[str]) -> None:
+def test_faults_are_named_the_worst_first(changes: dict[str, float | None], named: list[str]) -> None:
     heard = replace(TRUE, **changes)  # type: ignore[arg-type]
     assert faults(heard) == named
     word = heard_word(heard)
     assert word.startswith(named[0] if named else "true")
     assert word.endswith("…") == (len(named) > 1)
     assert all(fault in heard_sentence(heard, "x") for fault in named)
-    assert heard_sentence(heard, "x").startswith("past training: " if named else "true: spectra 0.2 dB apart")
 
 
-def test_a_sound_that_is_off_without_a_name_is_not_called_true() -> None:
-    heard = replace(TRUE, distance_db=3.21)
-    assert heard_word(heard) == "3.2 dB off"
-    assert heard_sentence(heard, "x") == "not quite true: spectra 3.2 dB apart over 4 s"
-
-
-def test_what_was_not_measured_says_so_and_how_to_measure_it() -> None:
+def test_a_sound_that_is_off_without_a_name_or_not_measured_is_not_called_true() -> None:
+    assert heard_word(replace(TRUE, distance_db=3.21)) == "3.2 dB off"
     assert heard_word(None) == "not measured"
     assert "learned-strings evaluate mine --heard --write" in heard_sentence(None, "mine")

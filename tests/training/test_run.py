@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,22 +29,16 @@ def read(path: Path) -> list[list[str]]:
         return list(csv.reader(file))
 
 
-def test_the_log_has_a_line_per_epoch(tmp_path: Path) -> None:
-    log = TrainingLog(tmp_path / "run" / "log.csv")
-    log.add(progress(1))
-    log.add(progress(2))
-    assert read(tmp_path / "run" / "log.csv") == [
+def test_the_log_has_a_line_per_epoch_also_after_an_older_checkpoint(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "log.csv"
+    log = TrainingLog(path)
+    for epoch in (1, 2, 3, 4):
+        log.add(progress(epoch))
+    assert read(path)[:3] == [
         list(Epoch.__dataclass_fields__),
         ["1", "150", "0.001", "1.0", "", "", "2.0"],
         ["2", "150", "0.001", "1.0", "0.5", "0.25", "4.0"],
     ]
-
-
-def test_a_run_that_goes_on_from_an_older_checkpoint_repeats_no_epoch(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    log = TrainingLog(path)
-    for epoch in (1, 2, 3, 4):
-        log.add(progress(epoch))
     with path.open("a", encoding="utf-8") as file:
         file.write("5,150,0.0")  # killed within a line
     log = TrainingLog(path)
@@ -75,22 +68,15 @@ def configuration(**changes: object) -> TrainingConfiguration:
 
 
 def run_row(
-    name: str,
-    recipe: str,
-    configuration: TrainingConfiguration,
-    runs: Path,
-    *,
-    cache: Path,
-    preset: Path | None = None,
-    report: Callable[[Progress], None] = lambda progress: None,
+    configuration: TrainingConfiguration, folder: Path, name: str = CELL.name, preset: Path | None = None
 ) -> Row:
-    (row,) = run_rows([NamedRun(name, recipe, configuration, preset, report)], runs, cache=cache)
+    (row,) = run_rows([NamedRun(name, "ours", configuration, preset)], folder / "runs", cache=folder / "cache")
     return row
 
 
 def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
     made = configuration()
-    row = run_row(CELL.name, "ours", made, tmp_path / "runs", cache=tmp_path / "cache")
+    row = run_row(made, tmp_path)
     preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")
     dataset = load_dataset(made.data, tmp_path / "cache")
     sums = evaluate_model(preset.model, dataset, "validation", 420)
@@ -121,43 +107,39 @@ def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
     assert preset.info.horizon_steps == 420
 
 
-def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:
-    places = {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
-    row = run_row(CELL.name, "ours", configuration(), **places)
-
-    def trained(progress: Progress) -> None:
-        pytest.fail("trained again")
-
-    assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
-    file = tmp_path / "runs" / CELL.name / "row.json"
+def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = run_row(configuration(), tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr("training.run.fit_seeds", lambda *_, **__: pytest.fail("trained again"))
+        assert run_row(configuration(), tmp_path) == row
     with pytest.raises(ValueError, match="was trained with other settings"):
-        run_row(CELL.name, "ours", configuration(epochs=3), **places)
-    file.write_text("{")
+        run_row(configuration(epochs=3), tmp_path)
+    (tmp_path / "runs" / CELL.name / "row.json").write_text("{")
     with pytest.raises(ValueError, match=r"row.json: not a row .*delete it to measure the run again"):
-        run_row(CELL.name, "ours", configuration(), **places)
+        run_row(configuration(), tmp_path)
 
 
 def test_a_preset_that_is_elsewhere_is_written_again_and_its_row_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As `train` leaves a run in which `sweep` finds it, on another day and machine."""
-    places = {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
     monkeypatch.setattr("training.provenance.commit", lambda: "first")
-    row = run_row(CELL.name, "ours", configuration(), **places, preset=tmp_path / "elsewhere.safetensors")
+    row = run_row(configuration(), tmp_path, preset=tmp_path / "elsewhere.safetensors")
     monkeypatch.setattr("training.provenance.commit", lambda: "second")
     own = tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors"
     for _ in range(2):
-        assert run_row(CELL.name, "ours", configuration(), **places) == row
+        assert run_row(configuration(), tmp_path) == row
         assert own.read_bytes() == (tmp_path / "elsewhere.safetensors").read_bytes()
-    other = configuration(seed=1)
-    run_row("other", "ours", other, **places, preset=own)  # over it
-    assert run_row(CELL.name, "ours", configuration(), **places) == row
+    run_row(configuration(seed=1), tmp_path, "other", own)  # over it
+    assert run_row(configuration(), tmp_path) == row
     assert own.read_bytes() == (tmp_path / "elsewhere.safetensors").read_bytes()
 
 
 def test_a_run_that_diverges_is_a_row_that_says_so(tmp_path: Path) -> None:
     wild = configuration(peak_learning_rate=1e30, clip_norm=1e30, schedule="constant")
-    row = run_row(CELL.name, "ours", wild, tmp_path / "runs", cache=tmp_path / "cache")
+    row = run_row(wild, tmp_path)
     assert row.status == "diverged" and "lower peak_learning_rate" in row.message
     assert row.rel_mse is None and row.initialisation == "physics" and row.seed == 0
     assert not (tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors").exists()

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import signal
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -38,12 +39,8 @@ def test_a_draw_that_would_break_the_string_is_softened() -> None:
 
 
 def test_splits_are_in_order_and_whole() -> None:
-    assert [split_rows(1000, name) for name in ("train", "validation", "test")] == [
-        slice(0, 800),
-        slice(800, 900),
-        slice(900, 1000),
-    ]
-    assert split_rows(1000, "all") == slice(0, 1000)
+    found = [split_rows(1000, name) for name in ("train", "validation", "test", "all")]
+    assert found == [slice(0, 800), slice(800, 900), slice(900, 1000), slice(0, 1000)]
     with pytest.raises(ValueError, match="split 'half' is not one of train, validation, test, all"):
         split_rows(10, "half")
 
@@ -107,32 +104,32 @@ def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path: Path)
         replace(TINY, stride=4)
 
 
-def damage(folder: Path, how: str) -> None:
-    facts = json.loads((folder / "dataset.json").read_text())
-    if how == "cut":
-        file = folder / "amplitudes.npy"
-        file.write_bytes(file.read_bytes()[:-100])
-    elif how == "missing":
-        (folder / "amplitudes.npy").unlink()
-    elif how == "type":
-        np.save(folder / "amplitudes.npy", np.zeros((10, 31, 4)))
-    elif how == "zeros":
-        file = folder / "amplitudes.npy"
-        whole = file.read_bytes()
-        file.write_bytes(whole[:-4000] + bytes(4000))
-    elif how == "json":
-        (folder / "dataset.json").write_text("{")
-    elif how == "scale":
-        (folder / "dataset.json").write_text(json.dumps({**facts, "scale_m": float("nan")}))
-    else:
-        (folder / "dataset.json").write_text(json.dumps({**facts, "scale_m": [1]}))
+def cut_off(folder: Path, count: int, new: bytes = b"") -> None:
+    file = folder / "amplitudes.npy"
+    file.write_bytes(file.read_bytes()[:-count] + new)
 
 
-@pytest.mark.parametrize("how", ["cut", "missing", "type", "zeros", "json", "scale", "list"])
+def set_scale(folder: Path, scale_m: object) -> None:
+    file = folder / "dataset.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "scale_m": scale_m}))
+
+
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "cut": lambda folder: cut_off(folder, 100),
+    "zeros": lambda folder: cut_off(folder, 4000, bytes(4000)),
+    "missing": lambda folder: (folder / "amplitudes.npy").unlink(),
+    "type": lambda folder: np.save(folder / "amplitudes.npy", np.zeros((10, 31, 4))),
+    "json": lambda folder: (folder / "dataset.json").write_text("{"),
+    "scale": lambda folder: set_scale(folder, float("nan")),
+    "list": lambda folder: set_scale(folder, [1]),
+}
+
+
+@pytest.mark.parametrize("how", DAMAGES)
 def test_a_damaged_cache_is_reported_with_its_remedy(tmp_path: Path, how: str) -> None:
     load_dataset(TINY, tmp_path)
     folder = dataset_folder(TINY, tmp_path)
-    damage(folder, how)
+    DAMAGES[how](folder)
     with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as reported:
         load_dataset(TINY, tmp_path)
     assert str(folder) in str(reported.value)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -33,6 +34,8 @@ SMALL = {
     "fgru": {"width": 20},
     "frnn": {"width": 8},
 }
+
+HUGE = {"encoder_widths": [4096, 4096]}  # more than a preset can hold
 
 
 def small(model: str, recipe: str = "ours", horizon: int = 40, **changes: Any) -> TrainingConfiguration:
@@ -90,40 +93,26 @@ def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs:
     assert again.rel_mae == pytest.approx(found.start.rel_mae, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"average_decay": 0.9},
-        {"schedule": "constant", "patience": 100},
-        {"loss": "log10_mse"},
-        {"optimiser": "soap", "batch_size": 3},  # so many steps that its eigenvectors are refreshed, too
-    ],
-    ids=["plain", "average", "constant", "log10", "soap"],
-)
-@pytest.mark.parametrize("model", ["koopman_var", "lru"])
+CUTS: list[tuple[str, dict[str, Any]]] = [
+    *((model, {}) for model in ("koopman_var", "lru")),
+    *((model, {"average_decay": 0.9}) for model in ("koopman_var", "lru")),
+    ("koopman_var", {"schedule": "constant", "patience": 100}),
+    ("lru", {"loss": "log10_mse"}),
+    *(
+        (model, {"optimiser": "soap", "batch_size": 3}) for model in ("koopman_var", "lru")
+    ),  # refreshes its basis, too
+    ("lru", {"batch_statistics_until": 0.5}),
+    ("koopman", {"latent_epochs": 2}),
+]
+
+
+@pytest.mark.parametrize(("model", "changes"), CUTS, ids=[f"{model}-{[*changes.items()]}" for model, changes in CUTS])
 def test_a_run_that_is_cut_anywhere_is_the_whole_run(
     small_dataset: Dataset, runs: Path, model: str, changes: dict[str, Any]
 ) -> None:
     check_cuts(small(model, **changes), small_dataset, runs)
-
-
-def test_batch_norm_keeps_its_statistics_from_a_share_of_the_run_on(small_dataset: Dataset, runs: Path) -> None:
-    configuration = small("lru", batch_statistics_until=0.5)  # two batches an epoch
-    check_cuts(configuration, small_dataset, runs)
-    kept = weights(runs / "whole")["layers.0.normalization.num_batches_tracked"]
-    assert int(kept) == 4
-    with pytest.raises(ValueError, match="batch_statistics_until"):
-        small("lru", batch_statistics_until=0.0)
-
-
-def test_latents_that_are_learned_first_are_too(small_dataset: Dataset, runs: Path) -> None:
-    check_cuts(small("koopman", latent_epochs=2), small_dataset, runs)
-
-
-def test_a_polish_without_latents_is_refused() -> None:
-    with pytest.raises(ValueError, match="latent_polish needs latent_epochs"):
-        Recipe(epochs=1, latent_polish=1)
+    if "batch_statistics_until" in changes:  # of four epochs of two batches
+        assert int(weights(runs / "whole")["layers.0.normalization.num_batches_tracked"]) == 4
 
 
 def test_a_polish_is_too_and_lowers_the_error(
@@ -182,14 +171,33 @@ def test_a_checkpoint_within_an_epoch_goes_on_within_it(
     assert all(torch.equal(left[name], right[name]) for name in left)
 
 
-def test_a_checkpoint_of_another_version_is_reported(small_dataset: Dataset, runs: Path) -> None:
+def test_a_checkpoint_of_another_version_or_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:
     fit(small("koopman_var"), small_dataset, runs)
+    with pytest.raises(ValueError, match="was trained with other settings; delete it to start again"):
+        fit(small("koopman_var", epochs=5), small_dataset, runs)
     path = runs / "checkpoint.safetensors"
     checkpoint = Checkpoint.load(path)
     facts = {name: value for name, value in checkpoint.facts.items() if name != "step"}
     replace(checkpoint, facts=facts).save(path)
     with pytest.raises(ValueError, match=r"checkpoint.safetensors: of another version .*delete it to start"):
         fit(small("koopman_var"), small_dataset, runs)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda data: small("lru", batch_statistics_until=0.0), "batch_statistics_until"),
+        (lambda data: Recipe(epochs=1, latent_polish=1), "latent_polish needs latent_epochs"),
+        (lambda data: new_model(replace(small("koopman"), model_configuration=HUGE), 1.0), "lower its widths"),
+        (
+            lambda data: fit_seeds([Seed(small("koopman", epochs=n), Path(str(n))) for n in (2, 3)], data),
+            "differ in their seeds alone",
+        ),
+    ],
+)
+def test_what_cannot_be_trained_is_refused_before(small_dataset: Dataset, make: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        make(small_dataset)
 
 
 def test_early_stopping_ends_when_nothing_gets_better(
@@ -215,32 +223,16 @@ def test_the_mean_of_the_weights_is_what_is_kept(small_dataset: Dataset, runs: P
     assert not torch.equal(found.model.state_dict()["decoder.weight"], weights(runs)["decoder.weight"])
 
 
-def test_a_loss_that_is_no_number_is_a_divergence(small_dataset: Dataset, runs: Path) -> None:
-    with pytest.raises(Diverged, match=r"the loss is nan in epoch \d; lower peak_learning_rate"):
-        fit(small("frnn", peak_learning_rate=1e30, clip_norm=1e30), small_dataset, runs)
-
-
-def test_a_model_that_overflows_is_never_the_best(
+def test_a_loss_or_an_error_that_is_no_number_is_a_divergence(
     small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    measure = module.evaluate_model
-
-    class Overflowing:
-        def total(self) -> RelativeError:
-            return RelativeError(math.inf, 1e10)
-
-    monkeypatch.setattr(module, "evaluate_model", lambda *asked: Overflowing())
-    with pytest.raises(Diverged, match="the validation error was never a number"):
-        fit(small("koopman_var"), small_dataset, runs)
-    with pytest.raises(Diverged, match="grows beyond all numbers"):
-        fit(small("dmd"), small_dataset, runs)
-    monkeypatch.setattr(module, "evaluate_model", measure)
-
-
-def test_a_checkpoint_of_another_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:
-    fit(small("koopman_var"), small_dataset, runs)
-    with pytest.raises(ValueError, match="was trained with other settings; delete it to start again"):
-        fit(small("koopman_var", epochs=5), small_dataset, runs)
+    with pytest.raises(Diverged, match=r"the loss is nan in epoch \d; lower peak_learning_rate"):
+        fit(small("frnn", peak_learning_rate=1e30, clip_norm=1e30), small_dataset, runs / "frnn")
+    overflowing = SimpleNamespace(total=lambda: RelativeError(math.inf, 1e10))
+    monkeypatch.setattr(module, "evaluate_model", lambda *asked: overflowing)
+    for model, words in (("koopman_var", "the validation error was never a number"), ("dmd", "beyond all numbers")):
+        with pytest.raises(Diverged, match=words):
+            fit(small(model), small_dataset, runs / model)
 
 
 def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
@@ -265,7 +257,7 @@ def test_the_horizon_grows_geometrically() -> None:
     assert horizon_at(recipe, 0, 40) == 40
 
 
-class _Shifted(torch.nn.Module):
+class Shifted(torch.nn.Module):
     """A "model" whose every frame is the initial one plus one."""
 
     def encode(self, displacement: torch.Tensor, second: torch.Tensor | None = None) -> torch.Tensor:
@@ -275,22 +267,24 @@ class _Shifted(torch.nn.Module):
         return (state + 1)[:, None].expand(-1, steps, -1), state
 
 
-def test_the_loss_of_a_model_without_latents_is_its_prediction_alone() -> None:
-    batch = Batch(torch.zeros(2, 3), torch.tensor([1, 4]), torch.full((2, 2, 3), 3.0))
-    model: Any = _Shifted()
-    loss, error = training_loss(model, batch, Recipe(epochs=1))
-    assert (float(loss), float(error)) == (4.0, 4.0)
-    loss, _ = training_loss(model, batch, Recipe(epochs=1, loss="log10_mse"))
-    assert float(loss) == pytest.approx(math.log10(4))
-
-
-def test_a_relative_loss_counts_soft_strings_as_loud_ones() -> None:
-    target = torch.stack([torch.full((2, 3), 4.0), torch.full((2, 3), 0.01)])
-    batch = Batch(torch.zeros(2, 3), torch.tensor([1, 4]), target)
-    model: Any = _Shifted()  # which says 1: beside 4 an error of 3/4, beside 0.01 of 99
-    loss, error = training_loss(model, batch, Recipe(epochs=1, loss="relative_mse"))
-    assert float(loss) == pytest.approx((0.75**2 + 99**2) / 2)
-    assert float(error) == pytest.approx((9 + 0.99**2) / 2)
+@pytest.mark.parametrize(
+    ("kind", "targets", "expected"),
+    [
+        ("mse", (3.0, 3.0), 4.0),
+        ("log10_mse", (3.0, 3.0), math.log10(4)),
+        ("relative_mse", (4.0, 0.01), (0.75**2 + 99**2) / 2),  # soft strings count as loud ones
+    ],
+)
+def test_the_loss_of_a_model_without_latents_is_its_prediction_alone(
+    kind: Any, targets: tuple[float, float], expected: float
+) -> None:
+    target = torch.stack([torch.full((2, 3), value) for value in targets])
+    model: Any = Shifted()  # which says 1
+    loss, error = training_loss(
+        model, Batch(torch.zeros(2, 3), torch.tensor([1, 4]), target), Recipe(epochs=1, loss=kind)
+    )
+    assert float(loss) == pytest.approx(expected)
+    assert float(error) == pytest.approx(sum((value - 1) ** 2 for value in targets) / 2)
 
 
 def test_a_coupling_without_a_rate_stays(small_dataset: Dataset, runs: Path) -> None:
@@ -298,12 +292,6 @@ def test_a_coupling_without_a_rate_stays(small_dataset: Dataset, runs: Path) -> 
     moved = fit(small("koopman_integrated", coupling_rate=1.0), small_dataset, runs / "moved").model
     start = new_model(small("koopman_integrated"), small_dataset.scale_m)
     assert torch.equal(kept.K, start.K) and not torch.equal(moved.K, start.K)
-
-
-def test_a_model_that_no_preset_can_hold_is_refused_before_it_is_trained(small_dataset: Dataset) -> None:
-    configuration = replace(small("koopman"), model_configuration={"encoder_widths": [4096, 4096]})
-    with pytest.raises(ValueError, match="lower its widths"):
-        new_model(configuration, small_dataset.scale_m)
 
 
 @pytest.fixture
@@ -391,9 +379,3 @@ def test_a_seed_that_diverges_leaves_the_others(
     assert isinstance(broke, Diverged)
     assert not isinstance(well, Diverged)
     assert well.epochs == 4
-
-
-def test_seeds_of_different_runs_are_refused(small_dataset: Dataset, runs: Path) -> None:
-    mixed = [Seed(small("koopman", epochs=n), runs / str(n)) for n in (2, 3)]
-    with pytest.raises(ValueError, match="differ in their seeds alone"):
-        fit_seeds(mixed, small_dataset)

@@ -55,12 +55,20 @@ def test_what_follows_its_equation_is_found_exactly() -> None:
 
 def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
     times, starts = np.arange(1.0, 50.0), np.linspace(0.1, 1, 49)
-    motion = Motion(starts, starts, times, np.outer(times, [1.0, 0.5]))
+    integrals = np.outer(times, [1.0, 0.5])
+
+    def motion(guess: np.ndarray) -> np.ndarray:
+        omega, sigma, real, imag = guess[:4]
+        phase = omega * times + integrals @ guess[4:]
+        return np.asarray((starts * complex(real, imag) * np.exp(-sigma * times + 1j * phase)).real)
+
     found = np.array([-0.01, 0.002, 0.9, 0.2, 0.03, -0.05])
     other = upright(found)
     assert other[0] == 0.01
-    np.testing.assert_allclose(motion._latent(other).real, motion._latent(found).real, rtol=1e-12)
+    np.testing.assert_allclose(motion(other), motion(found), rtol=1e-12)
     np.testing.assert_array_equal(upright(other), other)
+    fitted = Motion(starts, motion(found), times, integrals).fitted(1.01 * found)
+    np.testing.assert_allclose(motion(fitted), motion(found), atol=1e-6)
 
 
 @pytest.mark.parametrize("state_size", [5, 7])
@@ -92,23 +100,24 @@ def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
         found_modes(strided, STEPS)
+    for model in ("fgru", "frnn"):
+        with pytest.raises(ValueError, match=r"-m training\.research\.fourier_wiring RUN$"):
+            begin(configuration_of(Cell(model, True, "gaussian", 4000, 400)), small_dataset)
 
 
-@pytest.mark.parametrize("model", ["fgru", "frnn"])
-def test_a_fourier_cell_names_the_script_that_starts_it(small_dataset: Dataset, model: str) -> None:
-    configuration = configuration_of(Cell(model, True, "gaussian", 4000, 400))
-    with pytest.raises(ValueError, match=r"-m training\.research\.fourier_wiring RUN$"):
-        begin(configuration, small_dataset)
-
-
-def test_a_start_is_one_of_the_models() -> None:
+@pytest.mark.parametrize(
+    ("model", "start", "latent_epochs", "words"),
+    [
+        ("s5", PHASES, 0, "start 'phases of the displacement' is not one of paper, physics"),
+        ("koopman", PURSUIT, 0, "a pursuit needs some, any other start none"),
+        ("koopman", BLIND_PURSUIT, 0, "a pursuit needs some, any other start none"),
+        ("koopman", "paper", 1, "a pursuit needs some, any other start none"),
+    ],
+)
+def test_a_start_is_one_of_the_models(model: str, start: str, latent_epochs: int, words: str) -> None:
     data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
-    with pytest.raises(ValueError, match="start 'phases of the displacement' is not one of paper, physics"):
-        TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, start=PHASES))
-    for start, latent_epochs in ((PURSUIT, 0), (BLIND_PURSUIT, 0), ("paper", 1)):
-        with pytest.raises(ValueError, match="a pursuit needs some, any other start none"):
-            recipe = Recipe(epochs=1, start=start, latent_epochs=latent_epochs)
-            TrainingConfiguration("A test", "koopman", data, recipe)
+    with pytest.raises(ValueError, match=words):
+        TrainingConfiguration("A test", model, data, Recipe(epochs=1, start=start, latent_epochs=latent_epochs))
 
 
 @pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
@@ -126,28 +135,15 @@ def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_f
     assert (model.configuration.state_size, latents) == (sizes.get("state_size", 5), None)
 
 
-BLIND_CELLS = [
-    Cell(model, True, "gaussian", rate_hz, recipe="blind")
-    for model in ("koopman", "koopman_integrated")
-    for rate_hz in (4000, 16000)
-]
-
-
-@pytest.mark.parametrize("cell", BLIND_CELLS, ids=lambda cell: cell.name)
-def test_the_blind_recipe_is_given_nothing_of_the_string(cell: Cell) -> None:
-    configuration = configuration_of(cell)
-    assert configuration.knowledge == ""
-    assert not configuration.recipe.flip
-    assert "state_size" not in configuration.model_configuration
-
-
-def test_hints_are_reported() -> None:
-    koopman, phase = (
-        configuration_of(Cell(model, True, "gaussian", 4000, recipe="hinted"))
-        for model in ("koopman", "koopman_integrated")
+@pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
+@pytest.mark.parametrize("rate_hz", [4000, 16000])
+def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(model: str, rate_hz: int) -> None:
+    blind, hinted = (
+        configuration_of(Cell(model, True, "gaussian", rate_hz, recipe=name)) for name in ("blind", "hinted")
     )
-    assert koopman.knowledge == SYMMETRIES
-    assert phase.knowledge == f"{SYMMETRIES}, and {COUNT}"
+    assert blind.knowledge == "" and not blind.recipe.flip
+    assert "state_size" not in blind.model_configuration
+    assert hinted.knowledge == (SYMMETRIES if model == "koopman" else f"{SYMMETRIES}, and {COUNT}")
 
 
 def blind_weights(cell: Cell, dataset: Dataset, runs: Path) -> StringModel:

@@ -28,18 +28,22 @@ def koopman(state_size: int = 40) -> Koopman:
     return model
 
 
+@pytest.mark.parametrize(("blind", "largest"), [(False, 1e-3), (True, 3e-3)])
 @torch.no_grad()
-def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(small_dataset: Dataset) -> None:
+def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(
+    small_dataset: Dataset, blind: bool, largest: float
+) -> None:
     model = koopman()
-    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))
+    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0), blind=blind)
     parts = latents.targets.double() @ latents.mixing.T
     origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
     found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
     amplitudes = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m
     truth = amplitudes @ SINES.float()
-    assert float((found - truth).square().sum() / truth.square().sum()) < 1e-3
-    energies = latents.targets.square().sum(1) * latents.unit**2
-    assert torch.allclose(energies, amplitudes.square().mean(1).sum(1), rtol=1e-3)
+    assert float((found - truth).square().sum() / truth.square().sum()) < largest
+    if not blind:
+        energies = latents.targets.square().sum(1) * latents.unit**2
+        assert torch.allclose(energies, amplitudes.square().mean(1).sum(1), rtol=1e-3)
 
 
 @torch.no_grad()
@@ -50,9 +54,7 @@ def test_its_loss_is_the_error_of_the_prediction(small_dataset: Dataset) -> None
     rows = torch.arange(16)
     _, error = latents.loss(model, Recipe(epochs=1, flip=False), rows, 0)
     latents.yield_latents(model)
-    truth = (small_dataset.split("train")[:, : STEPS + 1] / small_dataset.scale_m) @ torch.from_numpy(
-        synthesis_matrix(101, 5)
-    ).float()
+    truth = (small_dataset.split("train")[:, : STEPS + 1] / small_dataset.scale_m) @ SINES.float()
     found = model(truth[:, 0], STEPS)
     assert float((found - truth[:, 1:]).square().mean()) == pytest.approx(float(error), rel=0.03)
 
@@ -71,10 +73,9 @@ def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> N
 @torch.no_grad()
 def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Dataset, blind: bool) -> None:
     modes = (found_modes if blind else known_modes)(small_dataset, STEPS)
-    sines = SINES
-    alike = modes.shapes @ sines.T / 50
+    alike = modes.shapes @ SINES.T / 50
     torch.testing.assert_close(alike.abs(), torch.eye(5, dtype=torch.float64), rtol=0, atol=2e-3)
-    truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ sines
+    truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ SINES
     torch.testing.assert_close(modes.motions @ modes.shapes, truth, rtol=0, atol=1e-5)
     assert modes.mirror == (1, -1, 1, -1, 1)
     linear = resonator_of(small_dataset.configuration.string, 5).eigenvalues() / small_dataset.configuration.rate_hz
@@ -89,17 +90,6 @@ def test_a_mode_that_seems_to_grow_decays_all_the_same(small_dataset: Dataset) -
     swelling = torch.linspace(0.5, 1.5, small_dataset.amplitudes.shape[1])[:, None]
     grown = replace(small_dataset, amplitudes=small_dataset.amplitudes * swelling)
     assert all(float(grid.real.max()) < 0 for grid in found_modes(grown, STEPS).grids)
-
-
-@torch.no_grad()
-def test_a_blind_pursuit_predicts_every_frame_too(small_dataset: Dataset) -> None:
-    model = koopman()
-    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0), blind=True)
-    parts = latents.targets.double() @ latents.mixing.T
-    origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
-    found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
-    truth = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m @ SINES.float()
-    assert float((found - truth).square().sum() / truth.square().sum()) < 3e-3
 
 
 def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> None:

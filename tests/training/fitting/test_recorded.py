@@ -12,7 +12,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 
 from engine.models import build_model
 from training.cell import Cell, configuration_of
-from training.configuration import Recipe, TrainingConfiguration
+from training.configuration import Recipe
 from training.data.batches import TrainingData
 from training.data.dataset import Dataset
 from training.fitting import recorded, together
@@ -22,17 +22,17 @@ from training.fitting.losses import backward
 CPU, META = torch.device("cpu"), torch.device("meta")
 MODELS = ("koopman", "koopman_var", "lru", "s5", "fgru", "frnn")
 EVERY = Recipe(epochs=1, steps_per_batch=0, flip=False, koopman_terms="published")
-READS = ("_local_scalar_dense", "equal", "is_nonzero", "nonzero")  # by the host, which waits for them
+READS = ("local_scalar_dense", "equal", "is_nonzero", "nonzero")  # by the host, which waits for them
 
 
 class _Apart(TorchDispatchMode):
     """Refuse what a recording cannot hold: a value that the host reads, or one that it sends."""
 
     def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        name = func.overloadpacket.__name__
+        name = func.overloadpacket.__name__.strip("_")
         assert name not in READS, f"{name}: the host reads a value"
         given = [each for each in args if isinstance(each, torch.Tensor)]
-        sent = [each for each in given if each.device != META and (each.ndim or name in ("copy_", "_to_copy"))]
+        sent = [each for each in given if each.device != META and (each.ndim or name in ("copy", "to_copy"))]
         assert not sent, f"{name}: the host sends a value"
         return func(*args, **(kwargs or {}))
 
@@ -59,35 +59,20 @@ def test_a_step_asks_nothing_of_the_host(name: str, small_dataset: Dataset, monk
 
 
 @pytest.mark.parametrize(
-    "asks",
-    [lambda: float(torch.zeros((), device=META)), lambda: torch.tensor([1.0]).to(META)],
-    ids=["reads", "sends"],
-)
-def test_what_is_asked_of_the_host_is_noticed(asks: Any) -> None:
-    with _Apart(), pytest.raises(AssertionError, match="the host"):
-        asks()
-
-
-def configuration(recipe: str, **changes: Any) -> TrainingConfiguration:
-    data = {"modes": 5, "steps": 450, "count": 20}
-    return configuration_of(
-        Cell("koopman_var", True, "gaussian", 4000, 400, recipe), data, {"batch_size": 4, **changes}
-    )
-
-
-@pytest.mark.parametrize(
-    ("made", "repeats"),
+    ("recipe", "changes", "repeats"),
     [
-        (configuration("published"), True),
-        (configuration("paper"), True),
-        (configuration("ours"), False),  # other frames each time
-        (configuration("published", flip=True), False),
-        (configuration("published", batch_size=5), False),  # 16 trajectories: the last batch has one
+        ("published", {}, True),
+        ("paper", {}, True),
+        ("ours", {}, False),  # other frames each time
+        ("published", {"flip": True}, False),
+        ("published", {"batch_size": 5}, False),  # 16 trajectories: the last batch has one
     ],
 )
 def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(
-    small_dataset: Dataset, made: TrainingConfiguration, repeats: bool
+    small_dataset: Dataset, recipe: str, changes: dict[str, Any], repeats: bool
 ) -> None:
+    cell = Cell("koopman_var", True, "gaussian", 4000, 400, recipe)  # type: ignore[arg-type]
+    made = configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, {"batch_size": 4, **changes})
     assert Run(made, small_dataset, CPU).repeats_itself is repeats
 
 

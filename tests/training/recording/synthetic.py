@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,12 @@ from engine.resonators.string import resonator_of
 from engine.truth.splitting import SplittingSolver
 from engine.truth.state import ModalState
 from engine.values.string import StringParameters
-from training.recording.note import FIT_BEGINS_S
+from training.recording.fit import LearnedNote
+from training.recording.glide import CENTS, Glide
+from training.recording.intervals import figures_of
+from training.recording.note import FIT_BEGINS_S, Note
+from training.recording.numbering import Series, partial_hz
+from training.recording.refine import Pole
 
 Array = NDArray[np.float64]
 
@@ -117,9 +123,42 @@ def synthetic_note(
 
 
 def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, ...]:
-    from training.recording.intervals import figures_of
-
     s = -sigma + 1j * np.sqrt(omega**2 - sigma**2)
     a = amplitude * np.exp(s.real * FIT_BEGINS_S)
     hz, decay, level = figures_of(a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2))
     return tuple(TruePartial(n + 1, float(hz[n]), float(decay[n]), float(level[n])) for n in range(len(hz)))
+
+
+def modelled_note(
+    seed: int, polarisations: int, seconds: float = 1.0, cents: float = 0.0, loudness: float = 1.0
+) -> tuple[LearnedNote, Note, Series]:
+    """A note of the form that a fit has, drawn by its seed, its recording with a faint noise, and its series.
+
+    Args:
+        cents, loudness: of another take of the same string; its glide follows the square of its amplitude.
+    """
+    random = np.random.default_rng(seed)
+    f0, stiffness = math.exp(random.uniform(math.log(90), math.log(300))), 10 ** random.uniform(-5, -3.7)
+    poles, rate_hz, noise = [], 22_050, 1e-4
+    for k in range(1, 9):
+        hz = float(partial_hz(k, f0, stiffness))
+        decay, a = random.uniform(1, 4) + hz / 1_000, 0.1 * k**-1.2 * np.exp(2j * math.pi * random.uniform())
+        poles.append(Pole(complex(-decay, 2 * math.pi * hz), complex(a), k))
+        if polarisations == 2:
+            split, slower = 2 ** (random.uniform(1.5, 5) / 1200), random.uniform(0.4, 0.8)
+            poles.append(Pole(complex(-slower * decay, 2 * math.pi * hz * split), 0.4j * complex(a), k))
+    glide = Glide(random.uniform(2, 12, 3) * CENTS * loudness**2)
+    higher = 2 ** (cents / 1200)
+    poles = [replace(pole, s=pole.s * higher, a=pole.a * loudness) for pole in poles]
+    learned = LearnedNote(rate_hz, f0 * higher, stiffness, glide, tuple(poles))
+    samples = learned.render(np.arange(round(seconds * rate_hz)) / rate_hz - FIT_BEGINS_S)
+    samples = samples + noise * random.standard_normal(len(samples))
+    series = Series(f0 * higher, stiffness, tuple(range(1, 9)), 1.0, 0.0, 1.0)
+    return learned, Note(samples, rate_hz, 0, noise**2), series
+
+
+def figures_at_rest(poles: Sequence[Pole]) -> tuple[float, float, float]:
+    """The mean frequency in Hz, σ and level in dB of a partial's poles."""
+    a, s = np.array([[pole.a for pole in poles]]), np.array([[pole.s for pole in poles]])
+    hz, decay, level = figures_of(a, -s.real, s.imag)
+    return float(hz[0]), float(decay[0]), float(level[0])

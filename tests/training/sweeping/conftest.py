@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,6 @@ steps_per_batch = 8
 first_horizon = 20
 validate_every = 4
 latent_polish = 0
-{more}
 
 [[block]]
 models = ["koopman_var", "koopman"]
@@ -40,14 +40,15 @@ seeds = [{seeds}]
 """
 
 
+def plan_in(folder: Path, seeds: str = "0, 1", epochs: int = 4) -> Plan:
+    path = folder / "trial.toml"
+    path.write_text(PLAN.format(seeds=seeds, epochs=epochs), encoding="utf-8")
+    return load_plan(str(path))
+
+
 @pytest.fixture
 def plan(tmp_path: Path) -> Callable[..., Plan]:
-    def make(seeds: str = "0, 1", epochs: int = 4, more: str = "") -> Plan:
-        path = tmp_path / "trial.toml"
-        path.write_text(PLAN.format(seeds=seeds, epochs=epochs, more=more), encoding="utf-8")
-        return load_plan(str(path))
-
-    return make
+    return partial(plan_in, tmp_path)
 
 
 @pytest.fixture

@@ -2,33 +2,43 @@ from __future__ import annotations
 
 import pytest
 
-from training.sweeping import processes as module
 from training.sweeping.processes import Layout, fitted
 
 
-def test_workers_fit_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
-    monkeypatch.setattr("os.sched_getaffinity", lambda pid: set(range(8)), raising=False)
-    monkeypatch.setattr(module, "_memory_bytes", lambda: 20 * 2**30)
-    assert len(fitted(100).environments) == 2
-    assert len(fitted(100, workers=5).environments) == 5
-    monkeypatch.setattr(module, "_memory_bytes", lambda: 2**40)
-    found = fitted(100)
-    assert (found.device, found.threads, len(found.environments)) == ("cpu", 1, 8)
-    assert found.environments[0]["OMP_NUM_THREADS"] == "1"
-    assert len(fitted(3).environments) == 3
-    assert len(fitted(100, threads=4).environments) == 2
-    assert len(fitted(100, threads=16).environments) == 1
-    assert len(fitted(100, workers=20).environments) == 20
+def set_machine(monkeypatch: pytest.MonkeyPatch, cores: int, memory_bytes: int, gpus: int = 0) -> None:
+    sizes = {"SC_PHYS_PAGES": memory_bytes, "SC_PAGE_SIZE": 1}
+    monkeypatch.setattr("os.sysconf", sizes.__getitem__, raising=False)
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: set(range(cores)), raising=False)
+    monkeypatch.setattr("torch.cuda.is_available", lambda: gpus > 0)
+    monkeypatch.setattr("torch.cuda.device_count", lambda: gpus)
+
+
+@pytest.mark.parametrize(
+    ("memory_bytes", "tasks", "options", "count"),
+    [
+        (20 * 2**30, 100, {}, 2),
+        (20 * 2**30, 100, {"workers": 5}, 5),
+        (2**40, 100, {}, 8),
+        (2**40, 3, {}, 3),
+        (2**40, 100, {"threads": 4}, 2),
+        (2**40, 100, {"threads": 16}, 1),
+        (2**40, 100, {"workers": 20}, 20),
+    ],
+)
+def test_workers_fit_the_machine(
+    monkeypatch: pytest.MonkeyPatch, memory_bytes: int, tasks: int, options: dict[str, int], count: int
+) -> None:
+    set_machine(monkeypatch, 8, memory_bytes)
+    found, threads = fitted(tasks, **options), options.get("threads", 1)  # type: ignore[arg-type]
+    assert (found.device, found.threads, len(found.environments)) == ("cpu", threads, count)
+    assert {environment["OMP_NUM_THREADS"] for environment in found.environments} == {str(threads)}
     with pytest.raises(ValueError, match="no CUDA device can be used here"):
         fitted(1, device="cuda")
 
 
 @pytest.mark.parametrize(("visible", "gpus"), [(None, ["0", "1"]), ("3, MIG-7", ["3", "MIG-7"])])
 def test_several_runs_share_a_gpu(monkeypatch: pytest.MonkeyPatch, visible: str | None, gpus: list[str]) -> None:
-    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
-    monkeypatch.setattr("torch.cuda.device_count", lambda: 2)
-    monkeypatch.setattr("os.sched_getaffinity", lambda pid: set(range(12)), raising=False)
+    set_machine(monkeypatch, 12, 2**40, gpus=2)
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     if visible:
         monkeypatch.setenv("CUDA_VISIBLE_DEVICES", visible)

@@ -16,7 +16,7 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError, read, write
-from tests.training.sweeping.conftest import row_of
+from tests.training.sweeping.conftest import plan_in, row_of
 from training.fitting.fit import Progress
 from training.results import RESULTS, Row, add_rows, read_results
 from training.sweeping.plan import Plan
@@ -50,22 +50,30 @@ class Script:
 
     description = "a script"
 
-    def __init__(self, outcome: Callable[[TaskRun, int], Row | str], capacity: int = 3) -> None:
-        self._outcome, self._pool = outcome, ThreadPoolExecutor(10)
+    def __init__(
+        self, outcome: Callable[[TaskRun, int], Row | str], capacity: int = 3, wrong: dict[str, Any] | None = None
+    ) -> None:
+        self._outcome = outcome
+        self._wrong = wrong or {}  # values of every row
+        self._pool = ThreadPoolExecutor(10)
         self.capacity = lambda: capacity
         self.started: list[str] = []
         self.tasks: list[Task] = []
+        self.futures: list[Future[dict[str, Any]]] = []
+        self.most = 0  # under way at once
 
     def submit(self, plain: Any) -> Future[dict[str, Any]]:
         task = read(Task, plain, "task")
         self.tasks.append(task)
         self.started.append(task.runs[0].name)
-        return self._pool.submit(self._end, task, self.started.count(task.runs[0].name))
+        self.futures.append(self._pool.submit(self._end, task, self.started.count(task.runs[0].name)))
+        self.most = max(self.most, sum(not future.done() for future in self.futures))
+        return self.futures[-1]
 
     def _end(self, task: Task, tries: int) -> dict[str, Any]:
         found = [self._outcome(run, tries) for run in task.runs]
         errors = [each for each in found if isinstance(each, str)]
-        return {"rows": [] if errors else [write(row) for row in found], "error": "".join(errors[:1])}
+        return {"rows": [] if errors else [write(row) | self._wrong for row in found], "error": "".join(errors[:1])}
 
 
 # --- the queue
@@ -96,20 +104,17 @@ def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, option
 
 def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options: Options) -> None:
     made = plan()
-    at_once, most = 0, 0
+    together = threading.Barrier(3)
 
     def outcome(run: TaskRun, tries: int) -> Row:
-        nonlocal at_once, most
-        at_once += 1
-        most = max(most, at_once)
-        time.sleep(0.02)
-        at_once -= 1
+        if run.name in [each.name for each in made.runs[:3]]:
+            together.wait(timeout=60)
         return row_of(run)
 
     workers, watch = Script(outcome, capacity=3), Record()
     rows = sweep(made, workers, options, watch)
     assert workers.started == watch.names == [run.name for run in made.runs]
-    assert most == 3
+    assert workers.most == 3
     assert [row.name for row in rows] == workers.started
     assert read_results(options.results) == sorted(rows, key=lambda row: row.name)
 
@@ -177,10 +182,7 @@ def test_workers_that_are_gone_end_the_sweep(plan, options: Options) -> None:
 
 @pytest.mark.parametrize("wrong", [{"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}])
 def test_a_row_that_makes_no_sense_is_a_failure(plan, options: Options, wrong: dict[str, Any]) -> None:
-    workers = Script(lambda run, tries: row_of(run))
-    end = workers._end
-    workers._end = lambda *each: {**end(*each), "rows": [row | wrong for row in end(*each)["rows"]]}
-    rows = sweep(plan(), workers, options, Mock())
+    rows = sweep(plan(), Script(lambda run, tries: row_of(run), wrong=wrong), options, Mock())
     assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
 
 
@@ -200,24 +202,19 @@ def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, opti
 
 def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(plan, options: Options) -> None:
     workers = Script(lambda run, tries: row_of(run))
-    folder = options.results
-    folder.mkdir()
+    options.results.mkdir()
     with pytest.raises(SchemaError, match="not an ordinary file"):
-        sweep(plan(), workers, options, Mock())
-    folder.rmdir()
-    folder.write_text("something else\n", encoding="utf-8")
-    with pytest.raises(SchemaError, match="not a results file"):
         sweep(plan(), workers, options, Mock())
     assert workers.started == []
 
 
 def test_trials_are_kept_apart(plan, tmp_path: Path) -> None:
-    trial = plan()
-    real = replace(trial, trial=False)
-    assert results_of(real, tmp_path) == RESULTS
-    assert results_of(trial, tmp_path) == tmp_path / "trial" / "results.csv"
-    options = Options(runs=tmp_path)
-    assert (options.task(trial, trial.runs[0]).group, options.task(real, real.runs[0]).group) == ("trial", "")
+    options, trial = Options(runs=tmp_path), plan()
+    for made, results, group in (
+        (trial, tmp_path / "trial" / "results.csv", "trial"),
+        (replace(trial, trial=False), RESULTS, ""),
+    ):
+        assert (results_of(made, tmp_path), options.task(made, made.runs[0]).group) == (results, group)
 
 
 # --- whole sweeps
@@ -273,17 +270,24 @@ def measured(file: Path) -> list[list[Any]]:
     return [[getattr(row, name) for name in MEASURED] for row in read_results(file)]
 
 
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
+    """The rows of fifteen epochs, measured one after another in this process."""
+    folder = tmp_path_factory.mktemp("alone")
+    made = plan_in(folder, epochs=15)
+    return alone_rows(made, Options(folder / "alone.csv", folder / "alone", folder / "cache", "cpu", 1))
+
+
 def here(count: int) -> Layout:
     return replace(fitted(count, device="cpu", workers=count), threads=1)
 
 
 @pytest.mark.parametrize("seeds_at_once", [False, True])
 def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
-    plan, options: Options, alone: Options, seeds_at_once: bool, monkeypatch: pytest.MonkeyPatch
+    plan, options: Options, expected, seeds_at_once: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=15)
-    expected = alone_rows(made, alone)
     options = replace(options, seeds_at_once=seeds_at_once)
 
     monkeypatch.setattr("training.sweeping.sweep.POLL_S", 0.02)

@@ -59,13 +59,10 @@ def test_marks(ours: Any, paper: Any, expected: str) -> None:
     assert mark(Figure(*ours), Figure(*paper)) == expected
 
 
-def test_what_a_figure_may_be_off_by() -> None:
+def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures() -> None:
     assert Figure(1.0).total is None
     assert Figure(1.0, 0.3).total == Figure(1.0, None, 0.3).total == 0.3
     assert Figure(1.0, 0.3, 0.4).total == pytest.approx(0.5)
-
-
-def test_factors() -> None:
     assert factor(Figure(5.65e-6), Figure(0.0113)) == "×0.0005"
     assert factor(Figure(1.0), Figure(0.004)) == "×250"
     assert factor(Figure(5e-6), Figure(0.0)) == "> ×0.1"

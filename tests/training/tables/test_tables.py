@@ -56,80 +56,70 @@ def cell(rows: list[Row], **wanted: str) -> dict[str, str]:
     return found
 
 
-def test_a_cell_is_the_mean_over_its_seeds_beside_the_paper() -> None:
-    first, second = seeds(2)
-    found = cell([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
-    assert (found["paper_rel_mse"], found["paper_rel_mse_std"]) == ("0.026", "0.0067")
-    assert float(found["rel_mse"]) == pytest.approx(0.011)
-    assert float(found["rel_mae_std"]) == pytest.approx(0.03 * 2**0.5)
-    assert (found["mse_mark"], found["mae_mark"], found["seeds"]) == ("better", "equal", "2")
+A, B, C, D = seeds(4)
+LONG, SHORT = Cell("lru", True, "gaussian", 4000), Cell("lru", True, "gaussian", 4000, 400)
+OURS, PAPER = (Cell("koopman_var", True, "gaussian", 4000, recipe=recipe) for recipe in ("ours", "paper"))
+DMD = Cell("dmd", True, "gaussian", 4000)
+GONE: dict[str, Any] = {"mse": None, "mae": None}
+OF_400 = {"rel_mse_400": 0.0002, "rel_mae_400": 0.01, "test_rel_mse_400": 0.0003, "rel_mse_400_se": 0.00001}
+SOFT, LOUD = 0.02 - 0.0015 * 2**0.5, 0.02 + 0.0015 * 2**0.5
+ENDS = [row(A), row(B, **GONE, status="diverged"), row(C, **GONE, status="diverged"), row(D, **GONE, status="failed")]
+TWO = [row(A, 0.010, 0.10), row(B, 0.012, 0.16)]
+RECIPES = [row(OURS, 0.006, initialisation="physics"), row(PAPER, 0.020)]
+APART = [row(LONG, test_rel_mse=0.9, **OF_400), row(SHORT, 0.0008, 0.02)]
+TEST = [row(mse=0.005, mae=0.1, test_rel_mse=0.03, test_rel_mae=0.2, test_rel_mse_se=0.002)]
+TRIAL = [row(A, 0.010), row(A, 0.9, digest="of a trial", finished="2999"), row(B, 0.2, digest="older")]
+FITTED = [row(DMD, 1.0, 0.8, initialisation="least squares")]
+CASES = [  # rows, the cell, and what it says
+    ("a mean over seeds", TWO, "", "rel_mse=.011 rel_mse_std=.00141421 rel_mae_std=.0424264 seeds=2 trained=4000"),
+    ("the paper's beside it", TWO, "", "paper_rel_mse=.026 paper_rel_mse_std=.0067 paper_rel_mae_std=.024"),
+    ("marks", TWO, "", "mse_mark=better mae_mark=equal"),
+    ("one seed has no deviation", [row(mse=5.123e-6, mae=1.5)], "", "rel_mse=5.123e-06 rel_mse_std= seeds=1"),
+    ("the paper's is lower", [row(mse=5.123e-6, mae=1.5)], "", "mse_mark=better mae_mark=worse"),
+    ("the test split", [row(A, test_rel_mse=0.01)], "", "test_rel_mse=0.01 test_mse_mark=better"),
+    ("a seed that runs away there counts", [row(A, test_rel_mse=0.01), row(B)], "", "test_rel_mse="),
+    ("the choice of strings has an error", [row(A, 0.02, rel_mse_se=0.005)], "", "rel_mse_se=0.005"),
+    # √((0.003² + 0.005²) / 2): the seeds share their strings
+    (
+        "which counts beside the seeds",
+        [row(A, SOFT, rel_mse_se=0.003), row(B, LOUD, rel_mse_se=0.005)],
+        "",
+        "mse_mark=equal rel_mse_std=.003 rel_mse_se=.00412311",
+    ),
+    ("marks of the test split", TEST, "", "mse_mark=better test_mse_mark=equal test_mae_mark=worse"),
+    ("figures of the test split", TEST, "", "test_rel_mse=.03 test_rel_mse_se=.002 test_rel_mae_se="),
+    ("runs that ended badly are counted", ENDS, "", "rel_mse=0.01 seeds=1 diverged=2 failed=1"),
+    ("and have no figure", ENDS[1:3], "", "rel_mse= seeds=0 diverged=2"),
+    ("prior knowledge has a line", RECIPES, "model=koopman_var structured=True", "mse_mark=equal"),
+    ("a recipe too", RECIPES, "model=koopman_var recipe=paper", "mse_mark=worse structured=False"),
+    ("a fit is no prior knowledge", FITTED, "model=dmd", "structured=False"),
+    ("short runs", APART, "horizon=400 trained=400", "rel_mse=.0008"),
+    ("long runs over 400 frames", APART, "horizon=400 trained=4000", "rel_mse=.0002 rel_mse_se=1e-05 rel_mae=.01"),
+    ("their test split", APART, "horizon=400 trained=4000", "test_rel_mse=.0003 test_rel_mae="),
+    ("long runs alone", [row(LONG)], "horizon=400", "seeds=0"),
+    ("a trial and an older recipe are left out", TRIAL, "", "rel_mse=.01 seeds=1"),
+    ("no run", TWO, "string=linear horizon=400 model=frnn initial=noise rate_hz=16000", "seeds=0 mse_mark=not_run"),
+]
 
 
-def test_one_seed_has_no_deviation() -> None:
-    found = cell([row(mse=5.123e-6, mae=1.5)])
-    assert (found["rel_mse"], found["rel_mse_std"], found["seeds"]) == ("5.123e-06", "", "1")
-    assert (found["mse_mark"], found["mae_mark"]) == ("better", "worse")
+def fields(text: str) -> dict[str, str]:
+    return dict(pair.replace("not_run", "not run").split("=") for pair in text.split(" "))
 
 
-def test_a_seed_that_runs_away_on_the_test_split_is_not_left_out_of_its_mean() -> None:
-    first, second = seeds(2)
-    tame, wild = (row(name, 0.01, test_rel_mse=test) for name, test in ((first, 0.01), (second, None)))
-    assert (cell([tame])["test_rel_mse"], cell([tame])["test_mse_mark"]) == ("0.01", "better")
-    assert cell([tame, wild])["test_rel_mse"] == ""
+@pytest.mark.parametrize(("rows", "place", "expected"), [each[1:] for each in CASES], ids=[each[0] for each in CASES])
+def test_a_cell_reports_its_rows(rows: list[Row], place: str, expected: str) -> None:
+    found = cell(rows, **fields(place) if place else {})
+    for name, value in fields(expected).items():
+        is_number = value[:1].isdigit() or value[:1] == "."
+        assert float(found[name]) == pytest.approx(float(value), rel=1e-5) if is_number else found[name] == value
 
 
-def test_which_strings_are_in_the_split_counts_beside_the_seeds() -> None:
-    first, second = seeds(2)
-    assert cell([row(first, 0.02, rel_mse_se=0.005)])["rel_mse_se"] == "0.005"
-    # deviation over seeds 0.003, of the split √((0.003² + 0.005²) / 2): the seeds share their strings
-    found = cell(
-        [
-            row(first, 0.02 - 0.0015 * 2**0.5, rel_mse_se=0.003),
-            row(second, 0.02 + 0.0015 * 2**0.5, rel_mse_se=0.005),
-        ]
-    )
-    assert found["mse_mark"] == "equal"
-    assert float(found["rel_mse_std"]) == pytest.approx(0.003)
-    assert float(found["rel_mse_se"]) == pytest.approx(17e-6**0.5)
-
-
-def test_the_test_split_has_marks_of_its_own() -> None:
-    found = cell([row(mse=0.005, mae=0.1, test_rel_mse=0.03, test_rel_mae=0.2, test_rel_mse_se=0.002)])
-    assert (found["mse_mark"], found["test_mse_mark"], found["test_mae_mark"]) == ("better", "equal", "worse")
-    assert (found["test_rel_mse"], found["test_rel_mse_se"], found["test_rel_mae_se"]) == ("0.03", "0.002", "")
-
-
-def test_diverged_and_failed_runs_are_counted() -> None:
-    a, b, c, d = seeds(4)
-    gone = {"mse": None, "mae": None}
-    rows = [row(a), row(b, **gone, status="diverged"), row(c, **gone, status="diverged")]
-    rows.append(row(d, **gone, status="failed"))
-    found = cell(rows)
-    assert (found["rel_mse"], found["seeds"], found["diverged"], found["failed"]) == ("0.01", "1", "2", "1")
-    assert cell(rows[1:3])["rel_mse"] == ""
-
-
-def test_prior_knowledge_and_recipes_have_lines_of_their_own() -> None:
-    ours, paper = (Cell("koopman_var", True, "gaussian", 4000, recipe=recipe) for recipe in ("ours", "paper"))
-    rows = [row(ours, 0.006, initialisation="physics"), row(paper, 0.020)]
-    assert cell(rows, model="koopman_var", structured="True")["mse_mark"] == "equal"
-    assert cell(rows, model="koopman_var", recipe="paper")["mse_mark"] == "worse"
-    dmd = row(Cell("dmd", True, "gaussian", 4000), 1.0, 0.8, initialisation="least squares")
-    assert cell([dmd], model="dmd")["structured"] == "False"
+def test_csv_has_every_cell_and_is_of_a_recipe_where_one_is_asked_for() -> None:
+    assert len(records(as_csv(TWO))) == len(COLUMNS) * 2 * (6 + 8)  # models with the integrated phase
+    assert cell(TWO)["runs"].split() == [A.name, B.name]
     for recipe in ("ours", "paper"):
-        lines = records(as_csv(rows, recipe), model="koopman_var", seeds="1")  # type: ignore[arg-type]
+        lines = records(as_csv(RECIPES, recipe), model="koopman_var", seeds="1")  # type: ignore[arg-type]
         assert [entry["recipe"] for entry in lines] == [recipe]
-
-
-def test_long_runs_measured_over_400_frames_are_apart_from_short_ones() -> None:
-    long, short = Cell("lru", True, "gaussian", 4000), Cell("lru", True, "gaussian", 4000, 400)
-    first_frames = {"rel_mse_400": 0.0002, "rel_mae_400": 0.01, "test_rel_mse_400": 0.0003, "rel_mse_400_se": 0.00001}
-    rows = [row(long, test_rel_mse=0.9, **first_frames), row(short, 0.0008, 0.02)]
-    assert cell(rows, horizon="400", trained="400")["rel_mse"] == "0.0008"
-    from_long = cell(rows, horizon="400", trained="4000")
-    assert (from_long["rel_mse"], from_long["rel_mse_se"], from_long["rel_mae"]) == ("0.0002", "1e-05", "0.01")
-    assert (from_long["test_rel_mse"], from_long["test_rel_mae"]) == ("0.0003", "")
-    assert cell([row(long)], horizon="400")["seeds"] == "0"
 
 
 def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_out() -> None:
@@ -152,11 +142,9 @@ def compact_lines(text: str, horizon: int, string: str, model: str) -> list[list
 
 
 def test_a_compact_line_has_start_seeds_figures_and_ratio() -> None:
-    first, second = seeds(2)
-    found = as_compact([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
-    (ours,) = compact_lines(found, 4000, "nonlinear", "LRU")
+    (ours,) = compact_lines(as_compact(TWO), 4000, "nonlinear", "LRU")
     assert ours == ["random weights", "2", "**0.011 (0.0260) ×0.42**", *["not run"] * 3]
-    by_mae = as_compact([row(first, 0.010, 0.10), row(second, 0.012, 0.16)], metric="rel_mae")
+    by_mae = as_compact(TWO, metric="rel_mae")
     assert compact_lines(by_mae, 4000, "nonlinear", "LRU")[0][2] == "0.13 (0.1571) ×0.83"  # equal: not bold
     assert compact_lines(as_compact([row(mse=1.5)]), 4000, "nonlinear", "LRU")[0][2] == "*1.5 (0.0260) ×58*"
 
@@ -177,8 +165,7 @@ def test_compact_lines_name_what_the_start_was_given() -> None:
 
 
 def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:
-    a, b = seeds(2)
-    found = as_compact([row(a), row(b, None, None, status="diverged")])
+    found = as_compact([row(A), row(B, None, None, status="diverged")])
     assert compact_lines(found, 4000, "nonlinear", "LRU")[0][2].endswith("; 1 diverged")
     assert "- LRU, nonlinear string, 4000 frames: not Gaussian 16 kHz, Noise 4 kHz, Noise 16 kHz.\n" in found
     assert "- FRNN, linear string, 400 frames: no cell.\n" in found
@@ -186,35 +173,7 @@ def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:
 
 
 def test_compact_tables_leave_out_long_runs_measured_over_400_frames() -> None:
-    long = row(Cell("lru", True, "gaussian", 4000), rel_mse_400=0.0002, rel_mae_400=0.01)
+    long = row(LONG, rel_mse_400=0.0002, rel_mae_400=0.01)
     assert compact_lines(as_compact([long]), 4000, "nonlinear", "LRU")
     (none,) = compact_lines(as_compact([long]), 400, "nonlinear", "LRU")
     assert none == ["—", "0", "not run (0.0008)", "not run (0.0013)", "not run (0.0008)", "not run (0.0259)"]
-
-
-def test_rows_of_a_trial_or_of_an_older_recipe_are_no_figures() -> None:
-    a, b = seeds(2)
-    rows = [row(a, 0.010), row(a, 0.9, digest="of a trial", finished="2999"), row(b, 0.2, digest="older")]
-    assert (cell(rows)["rel_mse"], cell(rows)["seeds"]) == ("0.01", "1")
-    assert "2 of 3 rows of the results file are not shown" in as_compact(rows)
-
-
-def test_csv_has_every_cell_and_exact_figures() -> None:
-    a, b = seeds(2)
-    text = as_csv([row(a, 0.010, 0.10), row(b, 0.012, 0.16)])
-    lines = records(text)
-    assert len(lines) == len(COLUMNS) * 2 * (6 + 8)  # models with the integrated phase
-    (ours,) = records(text, string="nonlinear", horizon="4000", model="lru", initial="gaussian", rate_hz="4000")
-    assert float(ours["rel_mse"]) == pytest.approx(0.011)
-    assert float(ours["rel_mse_std"]) == pytest.approx(0.002 / 2**0.5)
-    assert (ours["seeds"], ours["mse_mark"], ours["mae_mark"], ours["trained"]) == ("2", "better", "equal", "4000")
-    assert (ours["paper_rel_mse"], ours["paper_rel_mae_std"]) == ("0.026", "0.024")
-    assert ours["runs"].split() == [a.name, b.name]
-    (empty,) = records(text, string="linear", horizon="400", model="frnn", initial="noise", rate_hz="16000")
-    assert (empty["seeds"], empty["rel_mse"], empty["mse_mark"]) == ("0", "", "not run")
-
-
-def test_csv_reports_diverged_runs_without_a_mark() -> None:
-    text = as_csv([row(mse=None, mae=None, status="diverged")])
-    (found,) = records(text, diverged="1")
-    assert (found["seeds"], found["rel_mse"], found["mse_mark"]) == ("0", "", "")

@@ -1,0 +1,83 @@
+"""Poles: their start by a subspace, their spectra by an FFT, their steps by finite differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from training.recording.glide import CENTS, Glide
+from training.recording.poles import subspace_poles
+from training.recording.refine import MOST_GLIDE, Fit, Pole, polarisations
+
+RATE_HZ = 8_000
+GLIDING = Pole(complex(-4, 2 * math.pi * 103), 0.3 + 0.2j, 1)
+FREE = Pole(complex(-20, 2 * math.pi * 180), 0.3 - 0.2j, 0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_subspace_has_the_poles_of_exponentials(count: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turns = np.linspace(-2.5, 2.5, count) + random.uniform(-0.3, 0.3, count)
+    z = np.exp(-random.uniform(1e-3, 5e-2, count) + 1j * turns)
+    envelope = np.exp(2j * math.pi * random.uniform(size=count)) @ z[:, None] ** np.arange(200)
+    found = subspace_poles(envelope, count)
+    np.testing.assert_allclose(found[np.argsort(np.angle(found))], z, atol=1e-8)
+    assert len(subspace_poles(envelope[: 2 * count], count)) == 0
+
+
+@pytest.fixture(scope="module")
+def fit() -> Fit:
+    """Two bands of a note that glides."""
+    noise = np.random.default_rng(0).standard_normal(4_000)
+    glide = Glide(np.array([5, -3, 4]) * CENTS)
+    return Fit(noise, RATE_HZ, np.array([50.0, 150, 250]), np.array([100.0, 200]), glide)
+
+
+@pytest.mark.parametrize(("pole", "most"), [(GLIDING, 1e-10), (FREE, 2e-2)])
+def test_the_spectrum_of_a_pole_is_its_sounds(fit: Fit, pole: Pole, most: float) -> None:
+    """In closed form; of poles that do not glide by a sum over some samples."""
+    bins = slice(1, fit.highest)
+    index = np.arange(bins.start, bins.stop)
+    time_s = np.arange(fit.count) / RATE_HZ if pole.partial else fit.times
+    for power, found in enumerate(fit.spectra(pole, bins)):
+        whole = np.fft.fft(time_s**power * np.exp(pole.s * time_s), fit.size)
+        scale = np.abs(whole).max()
+        np.testing.assert_allclose(found[0], whole[index], atol=most * scale)
+        np.testing.assert_allclose(found[1], whole[-index].conj(), atol=most * scale)
+
+
+@pytest.mark.parametrize("pole", [GLIDING, FREE])
+def test_the_columns_of_a_pole_are_the_slopes_of_its_spectrum(fit: Fit, pole: Pole) -> None:
+    bins = slice(1, fit.highest)
+    linear, bent = fit.columns([pole], bins)
+    present = fit.part([pole], bins)
+    np.testing.assert_allclose(linear @ [pole.a.real, pole.a.imag], present, atol=1e-9)
+    for column, (change, step) in enumerate(((1e-6 * pole.s.real, 1e-6), (1e-4j, 1e-4))):  # of log σ, and of ω
+        slope = (fit.part([Pole(pole.s + change, pole.a, pole.partial)], bins) - present) / step
+        np.testing.assert_allclose(bent[:, column], slope, atol=1e-3 * np.abs(slope).max())
+
+
+def test_of_a_partials_poles_two_are_its_polarisations_the_lower_one_first() -> None:
+    def pole(cents: float, decay: float, amplitude: float) -> Pole:
+        return Pole(complex(-decay, 2 * math.pi * 200 * 2 ** (cents / 1200)), complex(amplitude), 1)
+
+    main, above, below = pole(0, 2, 1), pole(5, 3, 0.5), pole(-5, 1, 0.1)
+    far, body = pole(40, 2, 0.9), pole(3, 50, 0.9)
+    assert polarisations([]) == []
+    assert polarisations([far, main, body]) == [main]
+    assert polarisations([above, body, main]) == [main, above]
+    assert polarisations([main, below, above]) == [main, above]  # the louder of two
+    assert polarisations([main, below, far]) == [below, main]
+
+
+def test_a_short_note_with_the_largest_glide_is_refined() -> None:
+    """Time that is stretched by it ends with the spectrum."""
+    time_s = np.arange(22_050) / 44_100
+    sound = np.exp(-3 * time_s) * np.cos(2 * math.pi * 100 * time_s)
+    poles = [[Pole(complex(-3, 2 * math.pi * 100), 1 + 0j, 1)]]
+    fit = Fit(sound, 44_100, np.array([50.0, 150.0]), np.array([100.0]), Glide(np.full(3, MOST_GLIDE[1])), poles)
+    assert fit.count <= fit.size
+    assert np.isfinite(fit.step_glide().shares).all()
