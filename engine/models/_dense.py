@@ -1,8 +1,8 @@
 """Dense layers over many frames in training, as other calls than `torch.nn.functional.linear` for the same product.
 
 On a CPU they are convolutions of width one, taken by oneDNN instead of the BLAS. On processors of another make than
-the BLAS's these are two to three times as fast. An AMD EPYC has 58 GFLOP/s as a product and 185 as a convolution (one
-thread, 20,000 × 128 by 128 × 128, timed by hand). A training step takes a third less time there. On an Intel Xeon both
+the BLAS's these are two to three times as fast. By hand, on one thread of an AMD EPYC: 58 GFLOP/s as a product, 185
+as a convolution (20,000 × 128 by 128 × 128). A training step takes a third less time there. On an Intel Xeon both
 have 97 GFLOP/s.
 
 On a GPU the rows go in parts, each with a copy of the weight. The weight's gradient is a sum over all rows for few
