@@ -137,7 +137,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Case:
+class RecipeCase:
     """A difference of a recipe from its default, in cells that match every field given here."""
 
     model: tuple[str, ...] = ()  # any of these; empty: all
@@ -169,7 +169,7 @@ class RecipeBook:
 
     description: str
     default: dict[str, Any]
-    case: tuple[Case, ...] = ()
+    case: tuple[RecipeCase, ...] = ()
 
 
 def recipe_names() -> list[str]:

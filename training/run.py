@@ -31,7 +31,7 @@ from training.data.draws import (
     WIDTH_RANGE,
 )
 from training.evaluate import evaluate_model
-from training.fitting.fit import Diverged, FitResult, Progress, Seed, fit_seeds
+from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
@@ -50,7 +50,7 @@ class NamedRun:
     recipe: str
     configuration: TrainingConfiguration
     preset: Path | None = None
-    report: Callable[[Progress], None] = lambda progress: None
+    report: Callable[[FitProgress], None] = lambda progress: None
 
     def output(self, runs: Path) -> Path:
         return self.preset or runs / self.name / f"{self.name}.safetensors"
@@ -68,7 +68,7 @@ def _logged(run: NamedRun, runs: Path) -> Seed:
         pass  # a folder that cannot be written is reported before the work
     log = TrainingLog(runs / run.name / "log.csv")
 
-    def log_and_report(progress: Progress) -> None:
+    def log_and_report(progress: FitProgress) -> None:
         if progress.ends_epoch:
             log.add(progress)
         run.report(progress)

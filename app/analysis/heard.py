@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from app.rendering import SOURCES, Take
 from app.rendering.strobe import Strobe
-from app.rendering.take import Listened, Motion, Signal
+from app.rendering.take import Listened, Pictures, Signal
 from app.shared.vocabulary import DIFFERENCE
 
 Owner = TypeVar("Owner", Take, Listened)
-Each = TypeVar("Each", Motion, Signal)
+Each = TypeVar("Each", Pictures, Signal)
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,11 @@ class _Heard(Generic[Owner, Each]):
         return _subtract_parts([series.read(first, stop) for series in self._series], self.gain)
 
 
-class HeardMotion(_Heard[Take, Motion]):
+class HeardMotion(_Heard[Take, Pictures]):
     """Displacement of a source on its grid in m, at its own rate of pictures."""
 
     @property
-    def _by_source(self) -> Mapping[str, Motion]:
+    def _by_source(self) -> Mapping[str, Pictures]:
         return self.of.motions
 
     @property

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from engine.plain_text import one_line
 from engine.result_file import whole_file
-from training.cli.console import Failure, Report
+from training.cli.console import Failure, ProgressReport
 
 Array = NDArray[np.floating]
 MOST_NUMBERS = 8 * 2**20  # of a file of displacements: 64 MiB in double precision
@@ -60,7 +60,7 @@ def check_result_size(batch: int, frames: int, points: int) -> None:
         )
 
 
-def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report: Report) -> None:
+def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report: ProgressReport) -> None:
     """Write float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
 
     Raises:
@@ -78,7 +78,7 @@ def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report:
     write_array(path, (batch, steps + 1, points), blocks(), report)
 
 
-def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], report: Report) -> None:
+def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], report: ProgressReport) -> None:
     """Write float64 of a shape, whole or not at all, from blocks that follow one another.
 
     Raises:

@@ -15,7 +15,7 @@ from app.shared.vocabulary import PlayedSource
 from engine.bounds import MOST_FRAMES
 from training.cli import arguments
 from training.cli.arguments import Json
-from training.cli.console import Failure, Report, number, print_json, print_table, progress
+from training.cli.console import Failure, ProgressReport, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -312,7 +312,7 @@ def _with_file(path: Path) -> Patch:
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 
-def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
+def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressReport) -> Blocks:
     import torch
 
     from engine.truth import ModalState, solve_dop853
@@ -329,7 +329,7 @@ def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: Report) -
     return following
 
 
-def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, report: Report) -> None:
+def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, report: ProgressReport) -> None:
     """Write the displacement (steps + 1, rows, columns) in m, from the blow on.
 
     Raises:

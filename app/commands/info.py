@@ -20,7 +20,7 @@ def info(
 
     `render --recipe FILE.wav` renders a pluck again, `play FILE.mid` what was played.
     """
-    from app.export.recipe import Recipe, RecipeError, preset_of, read_origin
+    from app.export.recipe import RecipeError, SoundRecipe, preset_of, read_origin
     from engine.folders import usable_files
 
     origin = read_origin(file)
@@ -39,7 +39,7 @@ def info(
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")
-    if not isinstance(origin, Recipe):
+    if not isinstance(origin, SoundRecipe):
         say(f"note: {one_line(origin.words)}")
     elif origin.source != "truth" and (origin.decay_db is not None or origin.seconds > origin.horizon_s):
         say(f"note: from {duration(origin.horizon_s)} on, the model is past its training")

@@ -12,7 +12,7 @@ from app.commands import options
 from engine.bounds import MOST_FRAMES, MOST_SUBSTEPS, SIZES
 from engine.plain_text import one_line
 from training.cli import arguments
-from training.cli.console import Failure, Report, number, print_json, print_table, progress, say
+from training.cli.console import Failure, ProgressReport, number, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -270,7 +270,9 @@ def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps
     return motion
 
 
-def _dop853_motion(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
+def _dop853_motion(
+    resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: ProgressReport
+) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
     solved = 0

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from app.export.recipe import Recipe
-from app.export.recording import Sound
+from app.export.recipe import SoundRecipe
+from app.export.recording import SoundSamples
 from app.export.sound import (
     Mixed,
     SoundRequest,
@@ -106,7 +106,7 @@ def export_sounds(
     request = next(iter(requests.values()))
     info = request.preset.info
     with ExitStack() as files:
-        recipes = {source: Recipe.of(source_request, settings) for source, source_request in requests.items()}
+        recipes = {source: SoundRecipe.of(source_request, settings) for source, source_request in requests.items()}
         # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
@@ -116,7 +116,7 @@ def export_sounds(
             raise WriteError(explain(Path(tempfile.gettempdir()), error)) from error
         sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
         # of each file the gain follows from its own recipe, whatever else is written beside it
-        beside: list[Sound] = list(voices.sounds.values()) if settings.normalise else []
+        beside: list[SoundSamples] = list(voices.sounds.values()) if settings.normalise else []
         reports = []
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]
@@ -148,7 +148,7 @@ def _digits(value: float, least: int) -> str:
     return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
 
 
-def _tags(title: str, recipe: Recipe) -> dict[str, str]:
+def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
     tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": recipe.model_dump_json()}
     return {name: text for name, text in tags.items() if text}
 

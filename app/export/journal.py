@@ -24,7 +24,7 @@ from app.export.played import Played
 from app.instrument.events import (
     LONGEST_RECORDING,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -44,11 +44,11 @@ SUFFIX = ".recording"
 VERSION = 1
 LARGEST_BYTES = 256 * 2**20
 LONGEST_S = 7 * 24 * 3600.0
-KINDS: dict[str, type[NoteOn | NoteOff | Bend | Controller]] = {
+KINDS: dict[str, type[NoteOn | NoteOff | Bend | ControlChange]] = {
     "on": NoteOn,
     "off": NoteOff,
     "bend": Bend,
-    "controller": Controller,
+    "controller": ControlChange,
 }
 _NAMES = {kind: name for name, kind in KINDS.items()}
 _CHECKED = {name: TypeAdapter(kind) for name, kind in KINDS.items()}

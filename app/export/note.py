@@ -29,7 +29,7 @@ LEAST_MM = 0.05  # softer plucks count as this soft
 
 
 @dataclass(frozen=True)
-class Note:
+class ExportedPluck:
     """A pluck and where it is heard, or a key of an instrument.
 
     Attributes:
@@ -144,7 +144,7 @@ class HeardNote:
         words: for people.
     """
 
-    note: Note
+    note: ExportedPluck
     source: PlayedSource
     another: bool
     difference_gain_db: float
@@ -164,7 +164,7 @@ class NoteExport:
         paths: the files to write, by source.
     """
 
-    note: Note
+    note: ExportedPluck
     paths: Mapping[Source, Path]
     choices: ExportChoices
 

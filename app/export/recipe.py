@@ -86,7 +86,7 @@ def source_words(source: str, difference_gain_db: float) -> str:
     return f"the difference of model and truth at {difference_gain_db:+g} dB"
 
 
-class Recipe(Value):
+class SoundRecipe(Value):
     """Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
 
     Attributes:
@@ -122,7 +122,7 @@ class Recipe(Value):
     struck: StruckKey | None = None
 
     @classmethod
-    def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
+    def of(cls, request: SoundRequest, settings: WavSettings) -> SoundRecipe:
         """The recipe of a request that is written with these settings.
 
         Raises:
@@ -169,7 +169,7 @@ class Recipe(Value):
         return WavSettings(self.bits, self.rate_hz, self.normalise, self.fade_out_s)
 
 
-def read_origin(path: Path) -> Recipe | InstrumentSound:
+def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
     """Read the origin that a WAV file carries.
 
     Raises:
@@ -190,14 +190,14 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
     try:
         data = parse_json(text, "the text")
         on_instrument = isinstance(data, dict) and "kind" in data
-        return InstrumentSound.model_validate(data) if on_instrument else Recipe.model_validate(data)
+        return InstrumentSound.model_validate(data) if on_instrument else SoundRecipe.model_validate(data)
     except ValueError as error:
         raise _unusable_error(path, explained(error)) from error
     except OverflowError as error:  # raised for numbers that are too long
         raise _unusable_error(path, str(error)) from error
 
 
-def read_recipe(path: Path) -> Recipe:
+def read_recipe(path: Path) -> SoundRecipe:
     """The recipe that a WAV file carries.
 
     Raises:
@@ -213,7 +213,7 @@ def read_recipe(path: Path) -> Recipe:
     return origin
 
 
-def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
+def request_of(recipe: SoundRecipe, preset: Preset, path: Path) -> SoundRequest:
     """The request of the recipe in the file at `path`. Raises RecipeError where its values do not go together."""
     try:
         return recipe.request(preset)
@@ -227,7 +227,7 @@ def _unusable_error(path: Path, why: str) -> RecipeError:
     )
 
 
-def preset_of(recipe: Recipe | InstrumentSound, presets: Iterable[Path]) -> tuple[Path, bool]:
+def preset_of(recipe: SoundRecipe | InstrumentSound, presets: Iterable[Path]) -> tuple[Path, bool]:
     """The preset file of a WAV, found by content, else by name, and whether its content is the same.
 
     Raises:
@@ -248,7 +248,7 @@ def preset_of(recipe: Recipe | InstrumentSound, presets: Iterable[Path]) -> tupl
     )
 
 
-def changed_notices(recipe: Recipe, exact: bool) -> list[str]:
+def changed_notices(recipe: SoundRecipe, exact: bool) -> list[str]:
     """Warnings for a preset and an instrument that were found by their names alone.
 
     Args:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 BLOCK_FRAMES = 2**16
 
 
-class Sound(Protocol):
+class SoundSamples(Protocol):
     """Samples (frames, points) that can be sliced by frames: an array, or a recording."""
 
     def __len__(self) -> int: ...
@@ -67,7 +67,7 @@ def _read(file: Any, count: int) -> bytes:
     return b"".join(parts)
 
 
-def blocks(sound: Sound, frames: int = BLOCK_FRAMES) -> Iterator[tuple[int, NDArray[np.floating]]]:
+def blocks(sound: SoundSamples, frames: int = BLOCK_FRAMES) -> Iterator[tuple[int, NDArray[np.floating]]]:
     """The number of the first frame, and the samples (frames, points), of each block of a sound."""
     for first in range(0, len(sound), frames):
         yield first, sound[first : first + frames]

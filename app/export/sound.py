@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
+from app.export.recording import BLOCK_FRAMES, Recording, SoundSamples, blocks
 from app.export.struck import Struck
 from app.instrument.bodies import body_digest
 from app.instrument.effects import channels_of, effects_from
-from app.patches.patch import Body
+from app.patches.patch import BodyChoice
 from app.shared.value import Value
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Source
 from app.shared.worker import Progress
@@ -55,7 +55,7 @@ class Through(Value):
 
     instrument: str
     gain: float = Field(ge=0, le=MOST_GAIN)
-    body: Body = Body()
+    body: BodyChoice = BodyChoice()
     room: Room = Room()
     amp: Amp = Amp()
     level_db: float = 0.0
@@ -139,7 +139,7 @@ class Voices:
         ended: False where the sound was to end by its decay but reached its longest duration first.
     """
 
-    sounds: Mapping[Voice, Sound]
+    sounds: Mapping[Voice, SoundSamples]
     ended: bool = True
 
     def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
@@ -168,7 +168,7 @@ class Mixed:
         return parts[0]
 
     @property
-    def _parts(self) -> list[Sound]:
+    def _parts(self) -> list[SoundSamples]:
         return [self.voices.sounds[voice] for voice in voices_of(self.source)]
 
 
@@ -231,7 +231,7 @@ def render_voices(
     return Voices(sounds, ended)
 
 
-def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
+def decayed_frames(sound: SoundSamples, rate_hz: int, decay_db: float) -> int:
     """The number of frames of a sound until its level stays `decay_db` below its maximum.
 
     The level is the mean square over windows of 50 ms and all points. Returns all frames where it does not fall so

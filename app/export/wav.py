@@ -16,7 +16,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from app.export.recording import Sound, blocks
+from app.export.recording import SoundSamples, blocks
 from app.shared.vocabulary import BITS, Bits
 from engine import bounds
 
@@ -67,11 +67,11 @@ class Level:
 
 def write_wav(
     file: BinaryIO,
-    sound: Sound,
+    sound: SoundSamples,
     rate_hz: int,
     settings: WavSettings,
     tags: Mapping[str, str],
-    beside: Sequence[Sound] = (),
+    beside: Sequence[SoundSamples] = (),
 ) -> Level:
     """Write a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
 

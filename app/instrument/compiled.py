@@ -18,7 +18,7 @@ from app.instrument.events import (
     COARSE_TUNING,
     FINE_TUNING,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -35,7 +35,7 @@ from engine.kernels import constants as of
 from engine.presets import Preset
 from engine.values.ear import Ear
 from engine.voices import CompiledPlayer
-from engine.voices.player import Report, Ringing, Table
+from engine.voices.player import NoteReport, Ringing, Table
 
 STOP_S = 0.03
 
@@ -157,13 +157,13 @@ class InstrumentPlayer:
             if channel.coarse_tuning:
                 state_events += parameter_set(COARSE_TUNING, channel.coarse_tuning + 64, 0, number)
             if channel.volume != of.USUAL_VOLUME:
-                state_events.append(Controller(events.VOLUME, channel.volume, number))
+                state_events.append(ControlChange(events.VOLUME, channel.volume, number))
             if channel.expression != 127:
-                state_events.append(Controller(events.EXPRESSION, channel.expression, number))
+                state_events.append(ControlChange(events.EXPRESSION, channel.expression, number))
             if channel.bend:
                 state_events.append(Bend(channel.bend, number))
             if channel.pedal:
-                state_events.append(Controller(events.SUSTAIN, 127, number))
+                state_events.append(ControlChange(events.SUSTAIN, 127, number))
             for controller, value in (
                 (events.SOFT, channel.mute),
                 (events.LEGATO, 127 * channel.legato),
@@ -174,12 +174,12 @@ class InstrumentPlayer:
                 (events.STRUM, 127 * channel.strums),
             ):
                 if value:
-                    state_events.append(Controller(controller, value, number))
+                    state_events.append(ControlChange(controller, value, number))
             if channel.slide is not None:
-                state_events.append(Controller(events.SLIDE, channel.slide, number))
+                state_events.append(ControlChange(events.SLIDE, channel.slide, number))
         wheel, moved_by = self._wheel
         if wheel:
-            state_events.append(Controller(events.MOD_WHEEL, wheel, moved_by))
+            state_events.append(ControlChange(events.MOD_WHEEL, wheel, moved_by))
         return state_events
 
     def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
@@ -298,7 +298,7 @@ class InstrumentPlayer:
         drum_key = self._keys.of_key(event.key)
         return None if drum_key is None else drum_key.struck(event.place)
 
-    def _follow_wheel(self, event: Controller) -> None:
+    def _follow_wheel(self, event: ControlChange) -> None:
         moved_by = self._wheel[1]
         if event.number == events.MOD_WHEEL:
             self._wheel = event.value, event.channel
@@ -321,7 +321,7 @@ class InstrumentPlayer:
 
     # What became of them
 
-    def reports(self) -> list[Report]:
+    def reports(self) -> list[NoteReport]:
         """The reports of what became of notes since the last call. One thread asks."""
         return self.compiled.reports()
 

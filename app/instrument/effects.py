@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import own_impulse
-from app.patches.patch import Body as ChosenBody
-from app.patches.patch import Patch
+from app.patches.patch import BodyChoice, Patch
 from engine.effects import BODIES, Body, Effects
 from engine.values.effects import Amp, Room
 
@@ -21,7 +20,7 @@ def effects_of(patch: Patch) -> Effects | None:
     return effects_from(patch.body, patch.room, patch.amp, patch.level_db)
 
 
-def effects_from(chosen: ChosenBody, room: Room, amp: Amp, level_db: float) -> Effects | None:
+def effects_from(chosen: BodyChoice, room: Room, amp: Amp, level_db: float) -> Effects | None:
     """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
     driven = amp.drive_db > 0
     effects = Effects(
@@ -72,7 +71,7 @@ def body_curves(patch: Patch) -> NDArray[np.float64] | None:
     return None if body is None else curves_of(body)
 
 
-def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
+def _body(chosen: BodyChoice) -> tuple[Body | None, str]:
     """The body, and why it cannot be used."""
     name = chosen.name
     mix = chosen.mix

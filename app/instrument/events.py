@@ -105,7 +105,7 @@ class Bend:
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControlChange:
     """A controller moves to 0 … 127."""
 
     number: Number
@@ -139,12 +139,12 @@ def is_obeyed(number: int) -> bool:
 
 def moves_effects(event: object, patch: Patch) -> bool:
     """Return True if an event changes a patch's body or room."""
-    if isinstance(event, Controller):
+    if isinstance(event, ControlChange):
         return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
     return isinstance(event, PatchTurned)
 
 
-Event = NoteOn | NoteOff | Bend | Controller | PatchTurned | PluckAt
+Event = NoteOn | NoteOff | Bend | ControlChange | PatchTurned | PluckAt
 
 
 def channels_in(events: Iterable[Event]) -> set[int]:
@@ -156,8 +156,8 @@ def release_all(channels: Iterable[int]) -> list[Event]:
     """Events that leave channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
     events: list[Event] = []
     for channel in sorted(channels):
-        events += [Controller(SUSTAIN, 0, channel), Bend(0.0, channel)]
-        events += [Controller(RESET, AT_REST, channel), Controller(NOTES_OFF, 0, channel)]
+        events += [ControlChange(SUSTAIN, 0, channel), Bend(0.0, channel)]
+        events += [ControlChange(RESET, AT_REST, channel), ControlChange(NOTES_OFF, 0, channel)]
     return events
 
 
@@ -171,7 +171,7 @@ def parameter_set(number: int, value: int, fine_value: int, channel: int) -> lis
         (REGISTERED, NO_PARAMETER),
         (FINE_REGISTERED, NO_PARAMETER),
     )
-    return [Controller(controller, byte, channel) for controller, byte in messages]
+    return [ControlChange(controller, byte, channel) for controller, byte in messages]
 
 
 def bend_range(semitones: float, channel: int) -> list[Event]:
@@ -184,7 +184,7 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
 
     There is one for each stroke of a key.
     """
-    down: dict[NoteOff | Controller, int] = {}  # strokes without a release, in the order of the latest
+    down: dict[NoteOff | ControlChange, int] = {}  # strokes without a release, in the order of the latest
     for event in events:
         if isinstance(event, NoteOn | NoteOff):
             off = NoteOff(event.key, event.channel, event.string)
@@ -193,8 +193,8 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
             strokes = (1 if event.string is not None else strokes + 1) if begins else strokes - 1
             if strokes > 0:
                 down[off] = strokes
-        elif isinstance(event, Controller) and event.number == SUSTAIN:
-            up = Controller(SUSTAIN, 0, event.channel)
+        elif isinstance(event, ControlChange) and event.number == SUSTAIN:
+            up = ControlChange(SUSTAIN, 0, event.channel)
             down.pop(up, None)
             if event.value >= PEDAL_DOWN:
                 down[up] = 1

@@ -19,7 +19,7 @@ SLOWEST = 1e-9  # decay rate in 1/s, shown for a string without damping
 
 
 @dataclass(frozen=True)
-class Figure:
+class MeasuredFact:
     """A figure that a knob of the string changes, measured on a string.
 
     Attributes:
@@ -53,15 +53,17 @@ def by_two_numbers(patch: Patch, string: StringParameters) -> StringParameters:
     return replace(string, damping_d1_kg_m_s=max(d1, 0.0), damping_d3_kg_m_s=max(d3, 0.0))
 
 
-FIGURES: Mapping[str, Figure] = {  # by the field of the patch
-    "knobs.tension": Figure(lambda string, _: string.tension_n),
-    "knobs.length": Figure(lambda string, _: 1000 * string.length_m),
-    "knobs.gauge": Figure(lambda string, _: 2000 * math.sqrt(string.area_m2 / math.pi)),
-    "knobs.density": Figure(lambda string, _: string.density_kg_m3),
-    "knobs.modulus": Figure(lambda string, _: string.youngs_modulus_pa / 1e9),
-    "knobs.stiffness": Figure(lambda string, _: inharmonicity(string)),
-    "knobs.decay": Figure(lambda string, patch: t60_s(string, 1, patch), falls=True),
-    "knobs.brightness_decay": Figure(lambda string, patch: t60_s(string, bright_mode(string), patch), falls=True),
+FIGURES: Mapping[str, MeasuredFact] = {  # by the field of the patch
+    "knobs.tension": MeasuredFact(lambda string, _: string.tension_n),
+    "knobs.length": MeasuredFact(lambda string, _: 1000 * string.length_m),
+    "knobs.gauge": MeasuredFact(lambda string, _: 2000 * math.sqrt(string.area_m2 / math.pi)),
+    "knobs.density": MeasuredFact(lambda string, _: string.density_kg_m3),
+    "knobs.modulus": MeasuredFact(lambda string, _: string.youngs_modulus_pa / 1e9),
+    "knobs.stiffness": MeasuredFact(lambda string, _: inharmonicity(string)),
+    "knobs.decay": MeasuredFact(lambda string, patch: t60_s(string, 1, patch), falls=True),
+    "knobs.brightness_decay": MeasuredFact(
+        lambda string, patch: t60_s(string, bright_mode(string), patch), falls=True
+    ),
 }
 
 

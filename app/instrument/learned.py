@@ -25,7 +25,7 @@ from app.instrument.bodies import own_bodies
 from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import Name
 from app.patches.library import SHIPPED, SUFFIX, PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Patch, Pickup, PluckChoices
+from app.patches.patch import BodyChoice, Category, Fretted, Patch, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
 from engine.presets import load_preset
@@ -228,7 +228,7 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
                 hardest_mm=hardest_mm,
             ),
             pickup=Pickup(points=(listening_point(partials),)),
-            body=Body(name=stem, mix=1.0, size=1.0),
+            body=BodyChoice(name=stem, mix=1.0, size=1.0),
         )
     except ValueError as error:
         raise PatchError(f"{name}: {explained(error)}") from error

@@ -17,7 +17,7 @@ from app.instrument.events import (
     SETS_PARAMETER,
     VOLUME,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -56,7 +56,7 @@ class MidiFileError(ValueError):
 
 
 @dataclass(frozen=True)
-class Song:
+class SongPart:
     """The part of a MIDI file that a patch plays.
 
     Attributes:
@@ -86,7 +86,7 @@ def event_of(message: Sequence[int]) -> Event | None:
         steps = first + 128 * second - BEND_STEPS
         return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
     if kind == CONTROLLER:
-        return Controller(first, 0 if first == RESET else second, channel)
+        return ControlChange(first, 0 if first == RESET else second, channel)
     return None
 
 
@@ -152,7 +152,7 @@ def _count(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def read_song(path: Path, patch: Patch | None) -> Song:
+def read_song(path: Path, patch: Patch | None) -> SongPart:
     """Read the events of a MIDI file that a patch plays.
 
     Strings leave out drums, and drums on pads all else. Keys without sound are left out too.
@@ -189,7 +189,7 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
 
-def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
+def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> SongPart:
     """The song; `left_out` with the notes for which the patch has no sound."""
     keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
     if patch is not None and (silent := _count_silent(patch, keys)):
@@ -198,7 +198,7 @@ def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: li
         left_out.append(
             f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
         )
-    return Song(timed, f"{path.name} is played without {_join_words(left_out)}" if left_out else "")
+    return SongPart(timed, f"{path.name} is played without {_join_words(left_out)}" if left_out else "")
 
 
 def _join_words(words: Sequence[str]) -> str:
@@ -263,12 +263,12 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
             range_changed = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
             patch = event.patch
             set_ranges(time_s, [channel for channel in channels if range_changed and channel not in with_own_range])
-        elif isinstance(event, Controller) and event.number in SETS_PARAMETER:
+        elif isinstance(event, ControlChange) and event.number in SETS_PARAMETER:
             with_own_range.add(event.channel)
-        elif isinstance(event, Controller) and (event.number, event.value) == (RESET, AT_REST):
+        elif isinstance(event, ControlChange) and (event.number, event.value) == (RESET, AT_REST):
             with_own_range.discard(event.channel)
             set_ranges(time_s, [event.channel])
-            track.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
+            track.append(TimedEvent(time_s, ControlChange(VOLUME, USUAL_VOLUME, event.channel)))
     return track
 
 
@@ -291,6 +291,6 @@ def messages_of(event: Event) -> Iterable[Any]:
     elif isinstance(event, Bend):
         steps = BEND_STEPS if event.value < 0 else BEND_STEPS - 1
         yield mido.Message("pitchwheel", pitch=round(event.value * steps), channel=channel)
-    elif isinstance(event, Controller):
+    elif isinstance(event, ControlChange):
         value = 0 if event.number == RESET else event.value
         yield mido.Message("control_change", control=event.number, value=value, channel=channel)

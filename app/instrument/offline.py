@@ -13,7 +13,7 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.effects import channels_of, effects_of
 from app.instrument.events import (
     MOD_WHEEL,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -176,7 +176,7 @@ def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
     """The channels that `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
     events = [timed_event.event for timed_event in timed]
     later_patches = (event.patch for event in events if isinstance(event, PatchTurned))
-    wheeled = any(isinstance(event, Controller) and event.number == MOD_WHEEL for event in events)
+    wheeled = any(isinstance(event, ControlChange) and event.number == MOD_WHEEL for event in events)
     return max(channels_of(version, wheeled) for version in (patch, *later_patches))
 
 

@@ -246,7 +246,7 @@ class Technique(Rows, part="technique"):
     """
 
 
-class Body(Rows, part="body"):
+class BodyChoice(Rows, part="body"):
     """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""
@@ -254,7 +254,7 @@ class Body(Rows, part="body"):
     size: float = parameter("body.size")
 
 
-class Target(Value):
+class MacroTarget(Value):
     """A field that a macro changes, by its path, and its values at 0 and 1."""
 
     field: str
@@ -267,7 +267,7 @@ class Macro(Value):
 
     name: Annotated[str, Field(max_length=24), AfterValidator(filled)]
     value: Share = 0.5
-    targets: Annotated[tuple[Target, ...], Field(min_length=1, max_length=MOST_TARGETS)]
+    targets: Annotated[tuple[MacroTarget, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 
     def nearest(self, patch: Patch) -> float:
         """The position, 0 … 1, that is nearest to a patch's values: the mean over targets, each within its ends."""
@@ -321,7 +321,7 @@ class Patch(Value):
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
     amp: Amp = Amp()
-    body: Body = Body()
+    body: BodyChoice = BodyChoice()
     room: Room = Room()
     level_db: float = parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()

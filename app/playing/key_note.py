@@ -14,7 +14,7 @@ from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
 from engine.voices import Mixer
-from engine.voices.player import Playing, Report
+from engine.voices.player import NoteReport, Playing
 
 SOURCES = ("model", "truth")
 AS_THEY_ARE: Mapping[str, float] = dict.fromkeys(SOURCES, 1.0)
@@ -62,10 +62,10 @@ class KeyNote:
         self.match = AS_THEY_ARE
         self.released = self.cut = self.timed = False
         self._ended = False
-        self._begun: Report | None = None
+        self._begun: NoteReport | None = None
         self._playing = Playing(0.0, 0, None)
 
-    def take(self, report: Report) -> None:
+    def take(self, report: NoteReport) -> None:
         """Follow a report of the player."""
         if report.kind == of.BEGAN:
             self._begun, self.gain = report, report.gain

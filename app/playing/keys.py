@@ -21,7 +21,7 @@ from app.instrument.events import (
     SOUND_OFF,
     SUSTAIN,
     SWITCHES,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -115,7 +115,9 @@ class Keys:
         self._path = Path()
         self._effects: Effects | None = None  # as set
         self._dry = False
-        self._switches: dict[tuple[int, int], Controller] = {}  # the latest of each channel, which players take over
+        self._switches: dict[
+            tuple[int, int], ControlChange
+        ] = {}  # the latest of each channel, which players take over
         self._frames, self._moved_s = -1, 0.0  # of the mixer when it was last seen to move, and when that was
         self._reported_body = ""  # the fault of the body that was reported last
 
@@ -166,7 +168,7 @@ class Keys:
             begun: is called with the note; under the lock, so that notes of a key keep their order.
         """
         with self._lock:
-            if isinstance(event, Controller):
+            if isinstance(event, ControlChange):
                 self._note_switch(event)
             player, mixer = self._present(), self._mixer()
             self._release_before(event, 0 if due is None else due.frame_in(mixer))
@@ -180,7 +182,7 @@ class Keys:
                     id = player.handle(event, frame, struck_s)
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
-            if isinstance(event, Controller) and moves_effects(event, player.patch):
+            if isinstance(event, ControlChange) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
             if note_on is None or not id:
                 return None
@@ -190,12 +192,12 @@ class Keys:
 
     def _release_before(self, event: Event, frame: int) -> None:
         """Let releases of keys and pedals damp what players before have struck, too. Under the lock."""
-        released = isinstance(event, NoteOff) or (isinstance(event, Controller) and event.number in RELEASES)
+        released = isinstance(event, NoteOff) or (isinstance(event, ControlChange) and event.number in RELEASES)
         for player in self._playing if released else []:
             if player is not self._player:
                 player.handle(event, frame)
 
-    def _note_switch(self, event: Controller) -> None:
+    def _note_switch(self, event: ControlChange) -> None:
         if event.number in SWITCHES:
             self._switches[event.number, event.channel] = event
         elif event.number == RESET:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.playing.sources import Sources
 from engine.voices import Mixer, Voice
 
@@ -36,11 +36,13 @@ class Levels:
         self._known: OrderedDict[tuple[object, ...], Mapping[str, float]] = OrderedDict()
         self._waiting: set[tuple[object, ...]] = set()
 
-    def of(self, note: Note) -> Mapping[str, float] | None:
+    def of(self, note: PluckVoices) -> Mapping[str, float] | None:
         """The gain by source; None: not known yet."""
         return self._known.get(note.matching_key) if note.match is None else note.match
 
-    def ask(self, note: Note, rate_hz: int, take: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:
+    def ask(
+        self, note: PluckVoices, rate_hz: int, take: Callable[[tuple[object, ...], Mapping[str, float]], None]
+    ) -> None:
         """Compute the gains where they are not known and enough of the note is rendered; `take` is then called."""
         key = note.matching_key
         if note.match is not None or not all(voice.finished or voice.rendered_s >= MATCHED_S for voice in note.ahead):
@@ -51,7 +53,7 @@ class Levels:
             self._waiting.add(key)
         self._in_background(lambda: take(key, self._match(note, min(rate_hz, HIGHEST_RATE_HZ))))
 
-    def _match(self, note: Note, rate_hz: int) -> Mapping[str, float]:
+    def _match(self, note: PluckVoices, rate_hz: int) -> Mapping[str, float]:
         """Compute the gain of each source of a note, and keep it for notes of the same pluck and ear."""
         key = note.matching_key
         try:
@@ -67,7 +69,7 @@ class Levels:
                 self._known.popitem(last=False)
         return gains
 
-    def _level(self, note: Note, source: str, seconds: float, rate_hz: int) -> float:
+    def _level(self, note: PluckVoices, source: str, seconds: float, rate_hz: int) -> float:
         """Root mean square of the first `seconds`. 0 where it is not known, so that the source stays as it is."""
         subject, ear = note.subject(source), note.request.ear
         program = self._sources.program(subject, source, rate_hz)

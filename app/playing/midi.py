@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
-from app.instrument.events import Controller, fixed_function
+from app.instrument.events import ControlChange, fixed_function
 from app.patches.patch import Patch
 from app.shared.parameters import LEARNABLE, MACROS, OF_CHOICES
 from app.shared.value import Value
@@ -69,7 +69,7 @@ def turned(patch: Patch, field: str, value: float) -> Patch:
         return patch
 
 
-def turns_of(event: Controller, choices: MidiChoices, patch: Patch | None) -> dict[str, Any]:
+def turns_of(event: ControlChange, choices: MidiChoices, patch: Patch | None) -> dict[str, Any]:
     """New values for `Choices.changed`, of all that a controller is assigned to.
 
     Args:

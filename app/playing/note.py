@@ -12,7 +12,7 @@ from engine.kernels.constants import QUANTUM
 from engine.voices import Mixer, Voice
 
 
-class Note:
+class PluckVoices:
     """A note whose voices begin with the same frame, so that a switch between them stays in time.
 
     Args:

@@ -29,7 +29,7 @@ from app.playing.key_note import SOURCES, KeyNote
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
 from app.playing.levels import Levels
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
@@ -56,7 +56,7 @@ LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the m
 
 Report = Callable[[str, str], None]  # a message and its details
 Made = TypeVar("Made")
-MadeNote = TypeVar("MadeNote", Note, KeyNote, Note | KeyNote)
+MadeNote = TypeVar("MadeNote", PluckVoices, KeyNote, PluckVoices | KeyNote)
 
 
 class Notes:
@@ -85,11 +85,11 @@ class Notes:
         self._find = find
         self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
-        self._notes: list[Note | KeyNote] = []
+        self._notes: list[PluckVoices | KeyNote] = []
         self._monitor = Monitor()
         self._compared = True
         self._ear: Ear | None = None
-        self.latest: Note | KeyNote | None = None
+        self.latest: PluckVoices | KeyNote | None = None
         self._chosen: RenderRequest | None = None
         self._reach: PluckRange | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
@@ -167,7 +167,7 @@ class Notes:
 
     # Events
 
-    def handle(self, event: Event, due: Due | None = None) -> Note | KeyNote | None:
+    def handle(self, event: Event, due: Due | None = None) -> PluckVoices | KeyNote | None:
         """Play an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
@@ -179,7 +179,7 @@ class Notes:
             drop(None, error, self._report)
             return None
 
-    def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
+    def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._as_pluck(event)
         if not isinstance(placed, PluckAt):
@@ -203,7 +203,7 @@ class Notes:
             return PluckAt(event.pluck)
         return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
 
-    def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:
+    def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> PluckVoices | None:
         """Begin a note of the chosen pluck, while others ring on; None where nothing is chosen.
 
         Args:
@@ -217,9 +217,9 @@ class Notes:
 
     def _ring_pluck(
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
-    ) -> Note:
+    ) -> PluckVoices:
         """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
-        note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
+        note = PluckVoices(chosen, self._voices_of(chosen), from_s, begin_frame)
         note.ahead_of_event, loaded = waits, self._is_loaded(note)
         if begin_frame:
             note.mixer = self._sound.mixer  # whose frame it is
@@ -232,7 +232,9 @@ class Notes:
             self._wrap_errors(begin, note)()
         return note
 
-    def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
+    def turn(
+        self, note: PluckVoices | KeyNote, seconds: float, event: NoteOn | PluckAt
+    ) -> PluckVoices | KeyNote | None:
         """Hand the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
 
         Args:
@@ -264,7 +266,7 @@ class Notes:
 
     # Ahead of events
 
-    def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
+    def in_background(self, work: Callable[[], None], note: PluckVoices | None = None) -> None:
         """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
             self._helper.submit(self._wrap_errors(work, note))
@@ -274,7 +276,7 @@ class Notes:
         """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
         with self._lock:
             chosen = self._chosen
-            return chosen is not None and self._is_loaded(Note(chosen, self._voices_of(chosen)))
+            return chosen is not None and self._is_loaded(PluckVoices(chosen, self._voices_of(chosen)))
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
@@ -317,7 +319,7 @@ class Notes:
         """The factor by source that brings the chosen pluck to the level of the truth. None: not known yet."""
         with self._lock:
             chosen = self._chosen
-            return None if chosen is None else self._levels.of(Note(chosen, self._voices_of(chosen)))
+            return None if chosen is None else self._levels.of(PluckVoices(chosen, self._voices_of(chosen)))
 
     @property
     def ringing(self) -> int:
@@ -359,14 +361,14 @@ class Notes:
             except Exception as error:
                 drop(note, error, self._report)
 
-    def _take_latency(self, note: Note | KeyNote) -> None:
+    def _take_latency(self, note: PluckVoices | KeyNote) -> None:
         """Add the latency of a note, once it is known, to the recent ones; notes rendered ahead have none."""
-        ahead = isinstance(note, Note) and note.ahead
+        ahead = isinstance(note, PluckVoices) and note.ahead
         if not note.timed and not ahead and (latency_s := note.latency_s) is not None:
             note.timed = True
             self._latencies_s.append(latency_s)
 
-    def _follow(self, note: Note) -> None:
+    def _follow(self, note: PluckVoices) -> None:
         """Let a note be heard where all are, and as loud as the truth once that is known."""
         if note.ahead and note.match is None and not note.pending:
             self._ask_match(note)
@@ -379,9 +381,9 @@ class Notes:
         gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
         self.keys.set_gains(gains, self._compared)
 
-    def _plucks(self) -> list[Note]:
+    def _plucks(self) -> list[PluckVoices]:
         """The notes whose voices are made here."""
-        return [note for note in self._notes if isinstance(note, Note)]
+        return [note for note in self._notes if isinstance(note, PluckVoices)]
 
     def look(self) -> None:
         """Follow what the player reports of notes of keys: the latest that began is the string that is shown.
@@ -404,12 +406,12 @@ class Notes:
         available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
         return tuple(source for source in self._monitor.voices if source in available) or ("model",)
 
-    def _is_loaded(self, note: Note) -> bool:
+    def _is_loaded(self, note: PluckVoices) -> bool:
         """Return True if nothing needs to be loaded for it."""
         rate_hz = self._sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
-    def _wrap_errors(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
+    def _wrap_errors(self, work: Callable[[], None], note: PluckVoices | None = None) -> Callable[[], None]:
         """The work with its errors reported; they cut the note."""
 
         def guarded() -> None:
@@ -429,9 +431,9 @@ class Notes:
         """Let the latest plucks ring on in the new mixer of a device that has changed its rate. Keys' notes end."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
-        plucks = [note for note in left if isinstance(note, Note) and note.seconds and not note.released]
+        plucks = [note for note in left if isinstance(note, PluckVoices) and note.seconds and not note.released]
         for note in left:
-            if isinstance(note, Note) and note in plucks[-MOST_CARRIED:]:
+            if isinstance(note, PluckVoices) and note in plucks[-MOST_CARRIED:]:
                 note.from_s = note.seconds
                 note.begin_frame = 0
                 note.mixer = None
@@ -446,7 +448,7 @@ class Notes:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
 
-    def _begin(self, note: Note, struck_s: float) -> None:
+    def _begin(self, note: PluckVoices, struck_s: float) -> None:
         """Make the voices and hand them over; again where the device changes its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
@@ -461,12 +463,12 @@ class Notes:
                 return
             note.begin_frame = 0  # another mixer counts again
 
-    def _skip(self, note: Note) -> None:
+    def _skip(self, note: PluckVoices) -> None:
         if note.from_s > 0:
             for voice in note.voices.values():
                 voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
-    def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
+    def _make_voices(self, note: PluckVoices, rate_hz: int, struck_s: float) -> None:
         request, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
         for source in note.sources:
@@ -501,7 +503,7 @@ class Notes:
             )
         note.ahead, note.voices = ahead, voices
 
-    def _hand_over_rendered(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
+    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice], struck_s: float) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
@@ -512,11 +514,11 @@ class Notes:
             note.handed_over, note.begin_frame = False, 0
             self.in_background(partial(self._begin, note, struck_s), note)
 
-    def _cannot_render(self, note: Note, error: Exception) -> None:
+    def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
         note.cut = True
         self._report(f"This pluck cannot be rendered: {error}", "")
 
-    def _hand_over(self, note: Note, mixer: Mixer) -> bool:
+    def _hand_over(self, note: PluckVoices, mixer: Mixer) -> bool:
         """Hand a note over to a mixer; return False where the device has another mixer by now."""
         with self._lock:
             if note.over:
@@ -558,14 +560,14 @@ class Notes:
         ringing = [note for note in self._notes if not note.over and not note.released]
         self._do_for_each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
-    def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
+    def _apply_monitor(self, note: PluckVoices, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
             gain = self._monitor.gain(source, note.voices.keys(), note.match)
             voice.set_gain(gain)
             if at_once:
                 voice.start_with_gain(gain)
 
-    def _ask_match(self, note: Note) -> None:
+    def _ask_match(self, note: PluckVoices) -> None:
         if self._monitor.level_match:
             self._levels.ask(note, self._sound.rate_hz, self._take_match)
 

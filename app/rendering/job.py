@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 
-from app.rendering.line import Line
+from app.rendering.line import SourceLine
 from app.rendering.loaded import Loaded
 from app.rendering.rendering import Rendering
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Subject
-from app.rendering.take import SOURCES, Listened, Motion, Take, picture_stride
+from app.rendering.take import SOURCES, Listened, Pictures, Take, picture_stride
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
 from engine.sources import ModelSource
@@ -21,7 +21,7 @@ FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
-class Job(Rendering[RenderRequest, Take]):
+class PluckJob(Rendering[RenderRequest, Take]):
     """The rendering of a pluck.
 
     Requests for the same motion differ in listening points, slow motion or other presets.
@@ -31,7 +31,7 @@ class Job(Rendering[RenderRequest, Take]):
         self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
         super().__init__(request, load, listener, helper)
-        self._lines: dict[str, Line] = {}
+        self._lines: dict[str, SourceLine] = {}
         self._strobe: Strobe | None = None
         self._coming: Listened | None = None  # signals at new listening points, until they are complete
         self._measured = 1  # pictures; the first is no prediction
@@ -66,7 +66,7 @@ class Job(Rendering[RenderRequest, Take]):
             ("truth", loaded.truth, loaded.truth_program),
         ):
             motion = take.motions[name]
-            self._lines[name] = Line(source, program, info, request.pluck, motion, request.seconds, stride)
+            self._lines[name] = SourceLine(source, program, info, request.pluck, motion, request.seconds, stride)
         take.listened = self._listened(request.ear)
         return take
 
@@ -86,8 +86,8 @@ class Job(Rendering[RenderRequest, Take]):
                 info, stride = loaded.preset.info, _stride(source)
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
-            motion = Motion(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = Line(source, program, info, take.pluck, motion, take.seconds, stride)
+            motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
+            line = self._lines[name] = SourceLine(source, program, info, take.pluck, motion, take.seconds, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened

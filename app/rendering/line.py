@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.rendering.listening import Listening
 from app.rendering.strobe import Flashes, Strobe
-from app.rendering.take import Motion, Signal
+from app.rendering.take import Pictures, Signal
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
@@ -19,7 +19,7 @@ from engine.values.ear import Ear
 from engine.voices import Program
 
 
-class Line:
+class SourceLine:
     """The rendering of a source into its motion and its signal.
 
     Args:
@@ -40,7 +40,7 @@ class Line:
         program: Program | None,
         info: PresetInfo,
         pluck: Pluck,
-        motion: Motion,
+        motion: Pictures,
         seconds: float,
         stride: int,
     ) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering.take import Motion, Signal
+from app.rendering.take import Pictures, Signal
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import REACH
 from engine.levels import FULL_SCALE_M
@@ -41,7 +41,7 @@ class Listening:
         program: Program,
         initial_m: Array,
         ear: Ear,
-        motion: Motion | None,
+        motion: Pictures | None,
     ) -> None:
         self.signal = signal
         self._source = source

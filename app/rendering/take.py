@@ -31,7 +31,7 @@ def picture_stride(rate_hz: int) -> int:
     return math.ceil(rate_hz / PICTURE_HZ)
 
 
-class Series:
+class FrameSeries:
     """Frames of one source, (frames, places), growing at their end.
 
     Attributes:
@@ -66,7 +66,7 @@ class Series:
         return self._values[min(start, ready) : ready if stop is None else min(stop, ready)]
 
 
-class Signal(Series):
+class Signal(FrameSeries):
     """The signal of a source at the listening points, in m or m/s, at the source's own rate."""
 
     rate_hz: int
@@ -77,7 +77,7 @@ class Signal(Series):
         self.ready_frames = self.frames
 
 
-class Motion(Series):
+class Pictures(FrameSeries):
     """Pictures: the displacement of a source on its grid, in m.
 
     Attributes:
@@ -184,7 +184,7 @@ class Take:
         self.stride = stride
         self.model = model
         self.model_ends_s: float | None = None
-        self.motions = {name: Motion(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
+        self.motions = {name: Pictures(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
         self.frames = self.motions["truth"].frames
         self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
         self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 from app.rendering.blow import BlowRequest
-from app.rendering.job import Job
+from app.rendering.job import PluckJob
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.subject import Subject
@@ -80,7 +80,7 @@ class RenderWorker:
         ends_s = time.monotonic() + PATIENCE_S
         while not (self._closing or self._sounds() or time.monotonic() > ends_s):
             time.sleep(LOOK_AGAIN_S)
-        job: Job | BlowJob | None = None
+        job: PluckJob | BlowJob | None = None
         untidy = False  # whether anything was rendered since free memory was given back
         while True:
             with self._mailbox:
@@ -114,13 +114,13 @@ class RenderWorker:
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 
-    def _job(self, request: RenderRequest | BlowRequest) -> Job | BlowJob:
+    def _job(self, request: RenderRequest | BlowRequest) -> PluckJob | BlowJob:
         if isinstance(request, RenderRequest):
-            return Job(request, self._load, self._listener, self._helper)
+            return PluckJob(request, self._load, self._listener, self._helper)
         from app.rendering.blow_job import BlowJob  # and torch
 
         return BlowJob(request, self._load, self._listener, self._helper)
 
-    def _in_step(self, job: Job | BlowJob) -> bool:
+    def _in_step(self, job: PluckJob | BlowJob) -> bool:
         """Return True if the motion is far enough ahead of its sound for now."""
         return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

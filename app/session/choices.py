@@ -24,7 +24,7 @@ from engine.pluck import Pluck, Shape
 from engine.schema import explained
 
 
-class PluckedString(Value):
+class ShownString(Value):
     """The string that is shown and how it is plucked: of the latest note, or as drawn.
 
     Attributes:
@@ -44,7 +44,7 @@ class PluckedString(Value):
         return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
 
 
-class Choices(Monitor, Listener, PluckedString):
+class Choices(Monitor, Listener, ShownString):
     """The choices that are restored at the next start.
 
     Attributes:

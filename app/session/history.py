@@ -12,14 +12,12 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from app.session.choices import Choices, PluckedString, Session
+from app.session.choices import Choices, Session, ShownString
 from app.session.listener import Listener
 from app.session.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset(
-    {"instrument", "kept", "seconds", *PluckedString.model_fields, *Listener.model_fields} - {"solo"}
-)
+RECORDED = frozenset({"instrument", "kept", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 

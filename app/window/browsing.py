@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
 from app.views.controls.browser import Browser
-from app.views.controls.browser_rows import Row
+from app.views.controls.browser_rows import BrowserRow
 
 
 class BrowserDesk(QObject):
@@ -30,7 +30,7 @@ class BrowserDesk(QObject):
     def __init__(
         self,
         browser: Browser,
-        rows: Callable[[], Sequence[Row]],
+        rows: Callable[[], Sequence[BrowserRow]],
         chosen: Callable[[], str],
         choose: Callable[[str], None],
         folder: Callable[[], Path],

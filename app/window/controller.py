@@ -25,7 +25,7 @@ from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.presets.library import Library, PresetEntry
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
@@ -313,7 +313,7 @@ class Controller(QObject):
         """Strike the drum at a place, in half-lengths from its centre."""
         self.instruments.strike(x, y, velocity)
 
-    def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
+    def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
         """Handle an event of the instrument; called in the thread of the event."""
         if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards

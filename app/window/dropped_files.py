@@ -12,7 +12,7 @@ from typing import Any
 from app.audio.impulse_file import LONGEST_FILE_S, ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
-from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_notices, preset_of, read_recipe
+from app.export.recipe import NoRecipe, RecipeError, SoundRecipe, changed_notices, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
 from app.patches.instrument import SingleString
 from app.presets.install import SUFFIX, InstallError, install_preset
@@ -113,7 +113,7 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     return Dropped(choices, notice)
 
 
-def restored_choices(recipe: Recipe) -> dict[str, Any]:
+def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
     """The fields of `Choices` that a recipe sets, without the instrument. Of a key, no pluck and no pick-up.
 
     Of a single string, the patch that is there and its pick-up stay as they are.

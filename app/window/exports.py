@@ -11,7 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
-from app.export.note import HeardNote, Note, musical_name, struck_name
+from app.export.note import ExportedPluck, HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
 from app.export.struck import Struck
@@ -154,9 +154,9 @@ def heard_note(choices: Choices, library: Library, struck: Struck | None = None)
     return HeardNote(note, saved, another is not None, choices.difference_gain_db, note_words(entry.title, choices))
 
 
-def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> Note:
+def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> ExportedPluck:
     """The chosen pluck, or the key `struck`, played by a preset."""
-    return Note(
+    return ExportedPluck(
         entry.path,
         entry.info.rate_hz,
         choices.pluck,

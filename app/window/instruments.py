@@ -23,11 +23,11 @@ from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import string_of
-from app.session.choices import PluckedString, Session
+from app.session.choices import Session, ShownString
 from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
@@ -66,7 +66,7 @@ class Instruments(QObject):
         session: Session,
         library: Library,
         midi: MidiChoices,
-        handle: Callable[[Event, Due | None], Note | KeyNote | None],
+        handle: Callable[[Event, Due | None], PluckVoices | KeyNote | None],
         play_preset: Callable[[str], None],
         look: Callable[[], None],
     ) -> None:
@@ -79,7 +79,7 @@ class Instruments(QObject):
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
-        self.latest: Note | KeyNote | None = None
+        self.latest: PluckVoices | KeyNote | None = None
         self._shown: Patch | None = None  # the instrument whose string is shown
         self._chosen: frozenset[str] = frozenset()  # of string and pluck with an instrument that is not shown yet
         self._own_timer = QTimer(self, interval=OWN_MS, singleShot=True)
@@ -117,7 +117,7 @@ class Instruments(QObject):
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
         if "instrument" in names:
-            self._chosen |= names & PluckedString.model_fields.keys()
+            self._chosen |= names & ShownString.model_fields.keys()
             self._own_timer.start()
 
     def _show_own_string(self) -> None:

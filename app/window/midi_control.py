@@ -11,7 +11,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
-from app.instrument.events import Controller, Event, NoteOn, fixed_function
+from app.instrument.events import ControlChange, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
@@ -165,7 +165,7 @@ class MidiControl(QObject):
 
         While a controller is waited for, one with a function of its own goes both ways.
         """
-        if isinstance(event, Controller) and (
+        if isinstance(event, ControlChange) and (
             self._learning is not None or event.number in self.choices.controllers.values()
         ):
             self._received.emit(event)
@@ -176,7 +176,7 @@ class MidiControl(QObject):
         elif isinstance(event, NoteOn) and event.velocity > 0:
             self._play_note(event, self.choices.notes)
 
-    def _answer(self, event: Controller) -> None:
+    def _answer(self, event: ControlChange) -> None:
         """Assign, in the window's thread, a controller that is waited for, and apply its value."""
         if self._learning is not None:
             if does := fixed_function(event.number):

@@ -20,7 +20,7 @@ from app.instrument.events import (
     SLIDE_TIME,
     STRUM,
     TREMOLO,
-    Controller,
+    ControlChange,
     NoteOff,
     NoteOn,
     TimedEvent,
@@ -40,7 +40,7 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
+from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
@@ -58,7 +58,7 @@ from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from app.window.recordings import Recordings
-from app.window.song import Song
+from app.window.song import SongPlayer
 from engine.plain_text import one_line
 from engine.result_file import WriteError
 from engine.schema import explained
@@ -118,7 +118,7 @@ class PatchDesk(QObject):
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
-        self._song = Song(self._playback, strip)
+        self._song = SongPlayer(self._playback, strip)
         self._note_timer = QTimer(self, interval=NOTE_REPORTED_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
         self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
@@ -573,13 +573,13 @@ class PatchDesk(QObject):
     def _choose_touch(self, touch: str) -> None:
         """Choose the effect of a key on the screen or of the computer while another is held."""
         for number, down in ((LEGATO, touch != "pluck"), (PORTAMENTO, touch == "slide")):
-            self._instruments.play(Controller(number, 127 * down, KEYS))
-        self._instruments.play(Controller(SLIDE_TIME, SCREEN_SLIDE, KEYS))
+            self._instruments.play(ControlChange(number, 127 * down, KEYS))
+        self._instruments.play(ControlChange(SLIDE_TIME, SCREEN_SLIDE, KEYS))
 
     def _switch_technique(self, name: str, on: bool) -> None:
         """Switch a technique on or off for keys of the screen and of the computer."""
         number = {"strum": STRUM, "tremolo": TREMOLO, "harmonics": HARMONICS}[name]
-        self._instruments.play(Controller(number, 127 * on, KEYS))
+        self._instruments.play(ControlChange(number, 127 * on, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
@@ -592,7 +592,11 @@ class PatchDesk(QObject):
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
             body_fields = {**dict(self.patch.body), "name": name}
-            body = Body(**body_fields) if body_fields["mix"] > 0 else Body(name=name, size=body_fields["size"])
+            body = (
+                BodyChoice(**body_fields)
+                if body_fields["mix"] > 0
+                else BodyChoice(name=name, size=body_fields["size"])
+            )
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
 
 

@@ -18,14 +18,14 @@ from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import PluckRange
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import PluckedString, Session
+from app.session.choices import Session, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
@@ -39,7 +39,7 @@ from app.window.render_signals import RenderSignals
 from engine.plain_text import name_text
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
+PLACED = {"instrument", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 class Performance(QObject):
@@ -61,7 +61,7 @@ class Performance(QObject):
         self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self._asked: RenderRequest | None = None
         self._shown: Playhead[Take] = Playhead()
-        self._next_turn: Note | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
+        self._next_turn: PluckVoices | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
         mail.started.connect(self._take_started)
@@ -256,7 +256,7 @@ class Performance(QObject):
     def _buffering_words(self) -> str:
         """The time until a model that is rendered ahead will sound, in words; "" where none waits."""
         latest = self.notes.latest
-        if not isinstance(latest, Note) or not latest.waits_s:
+        if not isinstance(latest, PluckVoices) or not latest.waits_s:
             return ""
         entry = self._library.find(name_text(path_of(latest.request.preset).stem))
         name = model_word(entry.info.model) if entry else "model"
@@ -343,7 +343,7 @@ class Performance(QObject):
         """Show in the header how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
-    def _is_chosen(self, note: Note | KeyNote) -> bool:
+    def _is_chosen(self, note: PluckVoices | KeyNote) -> bool:
         """Return True if a note is of the chosen pluck."""
         chosen_request, request = self._asked, note.request
         return (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from app.playing.key_note import KeyNote
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.rendering import BlowTake, Take
 
 Shown = TypeVar("Shown", Take, BlowTake)
@@ -21,7 +21,7 @@ class Playhead(Generic[Shown]):
     """
 
     take: Shown | None = None
-    note: Note | KeyNote | None = None
+    note: PluckVoices | KeyNote | None = None
     parked_s: float = 0.0
     finished: bool = False
 

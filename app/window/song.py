@@ -12,7 +12,7 @@ from app.playing.playback import Playback
 from app.views.controls.song_strip import SongStrip
 
 
-class Song(QObject):
+class SongPlayer(QObject):
     """A song, which lives in the window's thread. Times are in s from the beginning of the file."""
 
     def __init__(self, playback: Playback, strip: SongStrip) -> None:

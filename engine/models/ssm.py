@@ -209,7 +209,7 @@ class DiagonalSSM(nn.Module, ABC):
         return torch.addcmul(self.output(states), self.D, inputs), last
 
 
-class Block(nn.Module):
+class GatedBlock(nn.Module):
     """Batch norm, state-space layer, GELU, gate, skip: (steps, batch, features) to the same.
 
     Batch norm is over batch and time in training and uses the stored statistics in evaluation.
@@ -315,7 +315,7 @@ class SSMString(StringModel[SSMState], ABC):
         super().__init__()
         self.grid_points = grid_points = first_layer.C.shape[0]
         self.first_layer = first_layer
-        self.layers = nn.ModuleList([Block(seq, grid_points) for seq in blocks])
+        self.layers = nn.ModuleList([GatedBlock(seq, grid_points) for seq in blocks])
 
     def encode(self, displacement: Tensor) -> SSMState:
         origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
@@ -358,7 +358,7 @@ class SSMString(StringModel[SSMState], ABC):
         first.C.zero_()
         first.C[:, :modes, 0] = (torch.from_numpy(physics.resonator.shapes).T / first.conjugates).to(first.C)
         for block in self.layers:
-            assert isinstance(block, Block)
+            assert isinstance(block, GatedBlock)
             block.gate.weight[:points].zero_()
 
     def _ssms(self) -> list[DiagonalSSM]:
@@ -368,16 +368,18 @@ class SSMString(StringModel[SSMState], ABC):
         # batch statistics need the whole time at once
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
-        layers = cast("Iterable[Block]", self.layers)
+        layers = cast("Iterable[GatedBlock]", self.layers)
         folded = (state.folded or tuple(block.fold() for block in layers)) if rendering else ()
-        blocks: Sequence[Block | FoldedBlock] = folded or list(layers)
+        blocks: Sequence[GatedBlock | FoldedBlock] = folded or list(layers)
         parts = []
         for done in range(0, steps, at_once):
             part, state = self._stretch(blocks, state, min(at_once, steps - done))
             parts.append(part if readout is None else part @ readout.to(part))
         return torch.cat(parts).transpose(0, 1), SSMState(state.latents, folded)
 
-    def _stretch(self, blocks: Sequence[Block | FoldedBlock], state: SSMState, steps: int) -> tuple[Tensor, SSMState]:
+    def _stretch(
+        self, blocks: Sequence[GatedBlock | FoldedBlock], state: SSMState, steps: int
+    ) -> tuple[Tensor, SSMState]:
         """Frames, time-major, and the state after them."""
         first = self.first_layer
         states, last = evolve(first.log_eigenvalues(), state.latents[0], steps, first.B.dtype.to_complex())

@@ -58,7 +58,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Report:
+class NoteReport:
     """The report of what became of a note.
 
     Attributes:
@@ -277,7 +277,7 @@ class CompiledPlayer:
 
     # What there is
 
-    def reports(self) -> list[Report]:
+    def reports(self) -> list[NoteReport]:
         """The reports since this was asked for the last time; of very many only the latest. One thread asks."""
         with self._lock:
             self._flush()
@@ -291,7 +291,7 @@ class CompiledPlayer:
                 continue
             known = {name: record[name].item() for name in REPORTED}
             struck = record["kind"] == of.BEGAN and record["modes"] > 0
-            new_reports.append(Report(**known, parameters=_string(record["own"]) if struck else None))
+            new_reports.append(NoteReport(**known, parameters=_string(record["own"]) if struck else None))
         with self._lock:
             for report in new_reports:
                 self._struck.pop(report.id, None)
@@ -336,7 +336,7 @@ class CompiledPlayer:
         rings = {int(note["id"]) for note in self._notes() if note["state"] == of.RINGS}
         return [id for id in ids if id not in rings]
 
-    def playing(self, report: Report) -> Playing | None:
+    def playing(self, report: NoteReport) -> Playing | None:
         """The progress of a note that `report` says to have begun; None: it has ended. Any thread."""
         note = self.record["notes"][report.note].copy()
         if note["state"] != of.RINGS or note["id"] != report.id:

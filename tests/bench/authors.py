@@ -16,7 +16,7 @@ import torch
 
 from engine.models.base import count_parameters
 from tests.bench import train
-from training.cli.console import Failure, Report
+from training.cli.console import Failure, ProgressReport
 
 MODELS = ("koopman_var", "koopman", "s5", "lru")
 DRIVER = Path(__file__).with_name("physmodjax_step.py")
@@ -42,7 +42,7 @@ class AuthorsTiming:
     processor_ratio: float
 
 
-def measure(python: Path, source: Path, report: Report) -> dict[str, Any]:
+def measure(python: Path, source: Path, report: ProgressReport) -> dict[str, Any]:
     """Take steps of ours and of theirs in turns, on as many threads, with AdamW and the loss of the paper's text.
 
     Args:

@@ -15,7 +15,7 @@ import typer
 
 from app.commands.cli import carry_out
 from training.cli.arguments import Json
-from training.cli.console import Failure, Report, progress, say
+from training.cli.console import Failure, ProgressReport, progress, say
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
@@ -47,7 +47,7 @@ PLAIN = {  # benchmarks without options, on one thread, as in the app, where win
 
 
 def run(
-    name: str, work: Callable[[Report], Mapping[str, Any]], json: bool, threads: int | None = None
+    name: str, work: Callable[[ProgressReport], Mapping[str, Any]], json: bool, threads: int | None = None
 ) -> Mapping[str, Any]:
     """Carry out a benchmark with its progress, and print its figures below the machine.
 

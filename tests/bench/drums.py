@@ -22,7 +22,7 @@ from engine.values.drum import Mallet
 from engine.values.ear import Ear
 from engine.voices import Mixer
 from tests.bench.machine import RATE_HZ, Shares, shares, times_s
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 VELOCITY = 110
 INSTRUMENTS = ("concert_toms", "tuned_toms", "frame_drum", "conga", "timpani", "soft_plate", "thin_bars")
@@ -87,7 +87,7 @@ class ChoiceCost:
     choice_s: float
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure drums of several sizes, struck by a stick and by something small and hard, and kits."""
     costs: list[DrumCost] = []
     kit, guitar = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", STRING_PATCH))

@@ -20,7 +20,7 @@ from engine.kernels.mixer_records import WINDOW, WINDOW_QUANTA
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 from tests.bench.machine import RATE_HZ
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 SECONDS = 10.0  # measured, after `FILLING_S`
 FILLING_S = 6.5  # until the longest response is full of sound
@@ -49,7 +49,7 @@ class EffectsCost:
     quantum_us: float
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure body and rooms."""
     costs = []
     empty_us = float(np.median(_quanta_us(None)))

@@ -26,7 +26,7 @@ from engine.kernels import cache
 from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Instance, Library, note_on
 from tests.bench.machine import RATE_HZ
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")
 NOTES, VELOCITY = 30, 102
@@ -51,7 +51,7 @@ class PluginCost:
     ratio: float
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Build a plug-in of all INSTRUMENTS, and play each."""
     patches = [find_patch(name).patch for name in INSTRUMENTS]
     presets = [load_preset(SHIPPED / f"{patch.preset}.safetensors") for patch in patches]

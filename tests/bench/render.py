@@ -16,7 +16,7 @@ from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.bench.machine import median_s, times_s
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 FIRST_BLOCK = 256  # frames
 AUDIO_S = 2.0
@@ -50,7 +50,7 @@ class RenderTiming:
     worst_first_block_s: float
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure every model, untrained, as its cost does not depend on its weights."""
     found = []
     for number, (name, rate_hz, modes, sizes) in enumerate(CASES):

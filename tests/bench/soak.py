@@ -25,7 +25,7 @@ from tests.bench.play.program import Program, program
 from tests.bench.play.recording import CardClock
 from tests.bench.play.sound_server import RATE_HZ
 from tests.bench.printing import target
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 RATE_OF_PLAYING_HZ = 12.0
 PART_S = 60.0  # of one instrument alone
@@ -84,7 +84,9 @@ class _Played:
     memory_mib: float
 
 
-def measure(seconds: float, seed: int, buffer: Buffer, patches: Sequence[Patch], report: Report) -> dict[str, Any]:
+def measure(
+    seconds: float, seed: int, buffer: Buffer, patches: Sequence[Patch], report: ProgressReport
+) -> dict[str, Any]:
     """Play for so long; each of several patches for its share of the time."""
     part_s = min(PART_S, seconds / 2) if len(patches) == 1 else seconds / len(patches)
     parts = list(patches) if len(patches) > 1 else list(patches) * round(seconds / part_s)

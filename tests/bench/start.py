@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tests.bench.printing import target
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 if TYPE_CHECKING:
     from app.window.controller import Controller
@@ -41,7 +41,7 @@ class Starts:
     slowest_sound_s: float
 
 
-def measure(count: int, report: Report) -> dict[str, Any]:
+def measure(count: int, report: ProgressReport) -> dict[str, Any]:
     """Time `count` starts, after one that fills the caches.
 
     Raises:

@@ -13,11 +13,11 @@ from typing import Any
 
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
-from app.rendering.job import Job
+from app.rendering.job import PluckJob
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
 from engine.values.ear import Ear
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 PRESETS = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_ds3", "studio_steel_e4")
 SECONDS = 10.0
@@ -59,7 +59,7 @@ class _Nobody:
     def render_failed(self, message: str, detail: str) -> None: ...
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure PRESETS."""
     found = []
     with ThreadPoolExecutor(1) as helper:
@@ -72,8 +72,8 @@ def measure(report: Report) -> dict[str, Any]:
 def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     sources = Sources()
     request = RenderRequest(path, Pluck(), SECONDS, EARS[0], SPEED)
-    _finish(Job(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
-    job = Job(request, sources.load, _Nobody(), helper)
+    _finish(PluckJob(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
+    job = PluckJob(request, sources.load, _Nobody(), helper)
     rendered_s, _ = _finish(job)
     take = job.take
     assert take is not None
@@ -86,7 +86,7 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     return TakeCost(path.stem, SECONDS, take.picture_hz, rendered_s, megabytes, moved_s, moved_wall_s)
 
 
-def _finish(job: Job) -> tuple[float, float]:
+def _finish(job: PluckJob) -> tuple[float, float]:
     """Finish the job; return processor time and wall-clock time in s."""
     began_s, began_wall_s = time.process_time(), time.perf_counter()
     while not job.idle:

@@ -18,12 +18,12 @@ from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.bench.machine import REPEATS, median_s
 from training.cell import Cell, configuration_of
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 from training.configuration import Recipe
 from training.data.batches import Batch
 from training.data.dataset import Dataset
 from training.fitting import recorded
-from training.fitting.fit import Run, Steps, take_step
+from training.fitting.fit import Steps, TrainingState, take_step
 from training.fitting.losses import backward, training_loss
 
 BATCH = 50
@@ -72,7 +72,7 @@ class SeedsTiming:
     prepare_s: float
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure each model at the paper's size, on random data, on which its cost does not depend."""
     found = []
     for number, name in enumerate(MODELS):
@@ -83,7 +83,7 @@ def measure(report: Report) -> dict[str, Any]:
     return {"models": tuple(found)}
 
 
-def measure_on_gpu(report: Report) -> dict[str, Any]:
+def measure_on_gpu(report: ProgressReport) -> dict[str, Any]:
     """Measure steps of several seeds at once on the GPU."""
     found = []
     for number, (name, seeds) in enumerate(SEEDS.items()):
@@ -99,8 +99,8 @@ def _seeds_timing(name: str, seeds: int) -> SeedsTiming:
     modes = torch.randn(1000, FRAMES + 1, configurations[0].data.modes, generator=torch.Generator().manual_seed(0))
     dataset = Dataset(configurations[0].data, modes / 1000, 1e-3)
 
-    def made() -> list[Run]:
-        return [Run(each, dataset, torch.device("cuda")) for each in configurations]
+    def made() -> list[TrainingState]:
+        return [TrainingState(each, dataset, torch.device("cuda")) for each in configurations]
 
     with patch.object(recorded, "PRECISION", "highest"):
         launched, repeated = made(), made()
@@ -116,7 +116,7 @@ def _seeds_timing(name: str, seeds: int) -> SeedsTiming:
     return SeedsTiming(name, seeds, FRAMES, 1000 * launched_s, 1000 * step_s, difference, prepare_s)
 
 
-def _launch(runs: list[Run]) -> None:
+def _launch(runs: list[TrainingState]) -> None:
     for run in runs:
         run.begin_step()
     take_step(runs)

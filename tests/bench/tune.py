@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
-from app.patches.patch import Body, Patch
+from app.patches.patch import BodyChoice, Patch
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY
 from engine.kernels.loudness import k_weight
 from engine.presets import Preset
 from engine.values.effects import Room
 from tests.bench.machine import RATE_HZ
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 QUIET_MM = 0.03  # amplitude at which the pitch is measured, above the level at which a voice ends
 PITCH_S = 1.2  # of sound in which the pitch is measured, of which the first 0.1 s is left out
@@ -72,7 +72,7 @@ def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
     return float(10 * np.log10(max(total, 1e-30)))
 
 
-def measure(patches: Sequence[tuple[Patch, Preset]], every: int, report: Report) -> dict[str, Any]:
+def measure(patches: Sequence[tuple[Patch, Preset]], every: int, report: ProgressReport) -> dict[str, Any]:
     """Measure one of every so many keys of each patch."""
     found = []
     for number, (patch, preset) in enumerate(patches):
@@ -93,7 +93,7 @@ def _measure(patch: Patch, preset: Preset, every: int) -> TunedPatch:
     low, high = patch.range
     keys = [key for key in sorted({*range(low, high + 1, every), high}) if strings.of_key(key) is not None]
     pluck = {**dict(patch.pluck), "softest_mm": QUIET_MM}
-    dry = Patch.model_validate({**dict(patch), "pluck": pluck, "body": Body(), "room": Room()})
+    dry = Patch.model_validate({**dict(patch), "pluck": pluck, "body": BodyChoice(), "room": Room()})
     cents, levels = [], []
     for key in keys:
         string = strings.of_key(key)

@@ -20,7 +20,7 @@ from engine.resonators.sine_transform import project
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, model_program, truth_program
 from tests.bench.machine import RATE_HZ, Shares, shares
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 MODEL_SHARE, TRUTH_SHARE = 0.25, 0.5  # of a core, for voices of each kind
 MOST_KEYS = 64
@@ -60,7 +60,7 @@ class NotesCost:
     share: Shares
 
 
-def measure(report: Report) -> dict[str, Any]:
+def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure every studio preset, and INSTRUMENTS."""
     voices: list[VoiceCost] = []
     paths = [path for path in preset_files(SHIPPED) if path.stem.startswith(STUDIO)]

@@ -15,10 +15,10 @@ import soundfile
 import torch
 
 from app.audio.impulse_file import ImpulseError, read_impulse
-from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
+from app.export.recipe import InstrumentSound, RecipeError, SoundRecipe, read_recipe, request_of
 from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi, read_song
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
@@ -121,7 +121,7 @@ def wav(folder: Path, comment: str) -> bytes:
 
 
 def recipe_text(preset: Path) -> str:
-    return Recipe.of(SoundRequest(load_preset(preset), Pluck(), 0.37, 0.1), WavSettings()).model_dump_json()
+    return SoundRecipe.of(SoundRequest(load_preset(preset), Pluck(), 0.37, 0.1), WavSettings()).model_dump_json()
 
 
 def played_text() -> str:
@@ -232,7 +232,7 @@ SONG = midi_bytes(
         *(TimedEvent(0.1 * n, NoteOn(40 + n, 90, n % 3)) for n in range(12)),
         *(TimedEvent(0.1 * n + 0.05, Bend(n / 12, n % 3)) for n in range(12)),
         *(TimedEvent(0.1 * n + 0.3, NoteOff(40 + n, n % 3)) for n in range(12)),
-        TimedEvent(0.2, Controller(64, 127)),
+        TimedEvent(0.2, ControlChange(64, 127)),
     ]
 )
 PATCH = min(PATCHES.glob("*.json"))

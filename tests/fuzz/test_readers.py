@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.export.recipe import Recipe
+from app.export.recipe import SoundRecipe
 from app.instrument.bodies import own_bodies
 from app.instrument.midi_file import MOST_EVENTS, read_midi
 from app.patches.library import list_patches
@@ -192,9 +192,9 @@ def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(kind: str
 
 
 def test_numbers_of_many_digits_are_bounded_before_any_arithmetic() -> None:
-    assert Recipe.model_fields["preset_rate_hz"].metadata
+    assert SoundRecipe.model_fields["preset_rate_hz"].metadata
     with pytest.raises(ValueError, match="preset_rate_hz"):
-        Recipe.model_validate({"preset_rate_hz": 10**400})
+        SoundRecipe.model_validate({"preset_rate_hz": 10**400})
     for first in ("610000.", "-610000."):  # pitches that cannot be squared
         with pytest.raises(ValueError, match="scale"):
             Tuning(TuningChoice.model_validate({"scale": f"! a\na\n 2\n {first}\n 2/1\n"}))

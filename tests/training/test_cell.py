@@ -8,7 +8,7 @@ import pytest
 from engine.models import MODELS, OF_MANY_STRINGS
 from engine.models.configurations import LRUConfiguration
 from engine.schema import SchemaError
-from training.cell import Case, Cell, configuration_of, load, recipe_names
+from training.cell import Cell, RecipeCase, configuration_of, load, recipe_names
 from training.start import starts_of
 
 OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
@@ -107,10 +107,10 @@ def test_wrong_overrides_are_reported(data: dict[str, int], recipe: dict[str, in
 
 def test_a_case_matches_what_it_names() -> None:
     cell = Cell("koopman", True, "noise", 4000)
-    assert Case().matches(cell)
-    assert Case(model=("lru", "koopman"), rate_hz=(4000,), tension_modulated=True).matches(cell)
-    assert not Case(horizon=(400,)).matches(cell)
-    assert not Case(tension_modulated=False).matches(cell)
+    assert RecipeCase().matches(cell)
+    assert RecipeCase(model=("lru", "koopman"), rate_hz=(4000,), tension_modulated=True).matches(cell)
+    assert not RecipeCase(horizon=(400,)).matches(cell)
+    assert not RecipeCase(tension_modulated=False).matches(cell)
     with pytest.raises(ValueError, match="model 'koop' is not one of"):
-        Case(model=("koop",))
+        RecipeCase(model=("koop",))
     assert recipe_names() == ["blind", "hinted", "ours", "paper", "published"]

@@ -13,15 +13,15 @@ from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
-from training.fitting.fit import Progress
+from training.fitting.fit import FitProgress
 from training.fitting.log import Epoch, TrainingLog
 from training.results import Row
 from training.run import NamedRun, run_rows, trained_range
 
 
-def progress(epoch: int, loss: float = 1.0) -> Progress:
+def progress(epoch: int, loss: float = 1.0) -> FitProgress:
     validation = RelativeError(0.5, 0.25) if epoch % 2 == 0 else None
-    return Progress(2 * epoch, 18, epoch, 9, 150, 1e-3, loss, validation, 2.0 * epoch, 1.0)
+    return FitProgress(2 * epoch, 18, epoch, 9, 150, 1e-3, loss, validation, 2.0 * epoch, 1.0)
 
 
 def read(path: Path) -> list[list[str]]:

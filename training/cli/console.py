@@ -17,7 +17,7 @@ LINE_EVERY_S = 10.0  # between two lines of progress
 WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
 
 
-class Report(Protocol):
+class ProgressReport(Protocol):
     """The report that receives the progress of a piece of work."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
@@ -27,7 +27,7 @@ class Report(Protocol):
 class Shares:
     """Progress of several pieces of work of equal length, one after the other."""
 
-    def __init__(self, report: Report, pieces: int) -> None:
+    def __init__(self, report: ProgressReport, pieces: int) -> None:
         self._report = report
         self._pieces = pieces
         self._begun = 0
@@ -79,7 +79,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 
 @contextmanager
-def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], Report]]:
+def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], ProgressReport]]:
     """A function that begins the progress of a named piece of work; several may be under way.
 
     In a terminal each has a bar with the time left until its share is 1; elsewhere each prints lines.
@@ -101,7 +101,7 @@ def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], Report]]:
     )
     with rich.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
 
-        def begin(what: str) -> Report:
+        def begin(what: str) -> ProgressReport:
             task, started = bar.add_task(what, total=1.0, left="", text=""), time.monotonic()
 
             def report(share: float, text: str = "", left_s: float | None = None) -> None:
@@ -114,7 +114,7 @@ def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], Report]]:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Report]:
+def progress(what: str) -> Iterator[ProgressReport]:
     """A function that shows the progress of one piece of work, as `bars` does."""
     with bars() as begin:
         yield begin(what)

@@ -13,13 +13,13 @@ import typer
 from engine.bounds import MOST_RETRIES, MOST_WORKERS
 from engine.plain_text import duration, one_line
 from training.cli.arguments import Cache, Device, Json, Runs, check_range
-from training.cli.console import Failure, Report, bars, number, print_json, print_table, say
+from training.cli.console import Failure, ProgressReport, bars, number, print_json, print_table, say
 from training.cli.training import training_report
 
 if TYPE_CHECKING:
-    from training.fitting.fit import Progress
+    from training.fitting.fit import FitProgress
     from training.results import Row
-    from training.sweeping.plan import Plan, Run
+    from training.sweeping.plan import Plan, PlannedRun
 
 LINE_EVERY_S = 60.0  # between two lines of a run's progress
 MOST_MINUTES = 10_000.0
@@ -183,26 +183,26 @@ def _time(row: Row) -> str:
 class Shown:
     """Shows a sweep: the progress of each run, and a line for what is worth one."""
 
-    def __init__(self, begin: Callable[[str], Report], left: int, at_once: int) -> None:
+    def __init__(self, begin: Callable[[str], ProgressReport], left: int, at_once: int) -> None:
         """`left`: runs that have not ended; `at_once`: how many run at a time."""
         self._begin = begin
         self._left = left
         self._at_once = at_once
-        self._reports: dict[str, Report] = {}
-        self._shown: dict[str, Callable[[Progress], None]] = {}
-        self._last: dict[str, Progress] = {}  # of each run that is under way
+        self._reports: dict[str, ProgressReport] = {}
+        self._shown: dict[str, Callable[[FitProgress], None]] = {}
+        self._last: dict[str, FitProgress] = {}  # of each run that is under way
         self._seconds: list[float] = []  # that finished runs took
         self._ended: Counter[str] = Counter(done=0)
 
-    def started(self, run: Run) -> None:
+    def started(self, run: PlannedRun) -> None:
         self._reports[run.name] = self._begin(run.name)
         self._shown[run.name] = training_report(self._reports[run.name])
 
-    def progressed(self, run: Run, progress: Progress) -> None:
+    def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
         self._last[run.name] = progress
         self._shown[run.name](progress)
 
-    def failed(self, run: Run, error: str) -> None:
+    def failed(self, run: PlannedRun, error: str) -> None:
         say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:

@@ -17,10 +17,10 @@ from training.cli.console import Failure, number, progress, say
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from training.cli.console import Report
+    from training.cli.console import ProgressReport
     from training.configuration import DatasetConfiguration, TrainingConfiguration
     from training.data.dataset import Dataset
-    from training.fitting.fit import Progress
+    from training.fitting.fit import FitProgress
     from training.results import Row
     from training.run import NamedRun
 
@@ -73,7 +73,7 @@ def train(
             "is of one preset; several --seeds write into their runs' folders", param_hint="--output"
         )
     folder = runs or default_runs()
-    begun: list[Progress] = []  # empty where all was finished already
+    begun: list[FitProgress] = []  # empty where all was finished already
     with_seeds = [_with_seed(config, seed, number) for number in range(seeds)]
     if threads is not None:
         torch.set_num_threads(threads)
@@ -82,7 +82,7 @@ def train(
         with progress("train") as report:
             shown = training_report(report)
 
-            def follow(latest: Progress) -> None:
+            def follow(latest: FitProgress) -> None:
                 begun.append(latest)
                 shown(latest)
 
@@ -133,7 +133,7 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
 
 
 def _named(
-    name: str, configuration: TrainingConfiguration, output: Path | None, report: Callable[[Progress], None]
+    name: str, configuration: TrainingConfiguration, output: Path | None, report: Callable[[FitProgress], None]
 ) -> NamedRun:
     from training.cell import Cell
     from training.run import NamedRun
@@ -171,11 +171,11 @@ def known_errors(run: TrainingConfiguration) -> Known:
     """Relative MSE and MAE on validation: the "paper"'s of the same cell, the "project"'s results of the same run."""
     from training.cell import follows_protocol
     from training.results import RESULTS, read_results
-    from training.tables.paper import Column, paper_errors
+    from training.tables.paper import DatasetColumn, paper_errors
 
     known_by_source: Known = {}
     kind = "nonlinear" if run.data.tension_modulated else "linear"
-    place = (kind, run.steps, run.model, Column(run.data.initial, run.data.rate_hz))
+    place = (kind, run.steps, run.model, DatasetColumn(run.data.initial, run.data.rate_hz))
     paper = paper_errors().get(place) if follows_protocol(run.data) else None
     if paper is not None and paper.rel_mse and paper.rel_mae:
         known_by_source["paper"] = paper.rel_mse.mean, paper.rel_mae.mean
@@ -222,11 +222,11 @@ def _device(wanted: Device) -> str:
     return "cpu"
 
 
-def training_report(report: Report) -> Callable[[Progress], None]:
+def training_report(report: ProgressReport) -> Callable[[FitProgress], None]:
     """Step, epoch, horizon, loss and the last validation as progress."""
     last = ""
 
-    def reported(p: Progress) -> None:
+    def reported(p: FitProgress) -> None:
         nonlocal last
         if p.validation:
             last = f", val. MAE {number(p.validation.rel_mae)}"

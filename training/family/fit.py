@@ -28,7 +28,7 @@ DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)  # times the last that was best
 
 
 @dataclass(frozen=True)
-class Case:
+class FitCase:
     """A string and its true motion, (steps, modes) in m."""
 
     plucked: PluckedString
@@ -38,8 +38,8 @@ class Case:
 @torch.no_grad()
 def fit_curves(
     model: KoopmanTension,
-    train: Sequence[Case],
-    validation: Sequence[Case],
+    train: Sequence[FitCase],
+    validation: Sequence[FitCase],
     rate_hz: int,
     *,
     steps: int,
@@ -104,7 +104,7 @@ def fit_curves(
     return best
 
 
-def errors(model: KoopmanTension, cases: Sequence[Case], rate_hz: int, frames: int) -> Tensor:
+def errors(model: KoopmanTension, cases: Sequence[FitCase], rate_hz: int, frames: int) -> Tensor:
     """Relative squared error of each string's first frames, over the whole grid, (strings,)."""
     shares = [error_to_signal(_motion(model, case, rate_hz, frames), case.truth[:frames]) for case in cases]
     return torch.tensor(shares, dtype=torch.float64)
@@ -115,7 +115,7 @@ def geometric_mean(errors: Tensor) -> float:
 
 
 @torch.no_grad()
-def _motion(model: KoopmanTension, case: Case, rate_hz: int, frames: int) -> Tensor:
+def _motion(model: KoopmanTension, case: FitCase, rate_hz: int, frames: int) -> Tensor:
     """Modal amplitudes in m, (frames, modes): sines are orthogonal, so that their errors are the grid's."""
     of_string = model.for_resonator(Physics(case.plucked.resonator, rate_hz))
     return of_string.amplitudes(of_string.encode(displacement_m(case.plucked)[None]), frames)[0]

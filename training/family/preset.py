@@ -20,7 +20,7 @@ from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, read_toml, write
 from engine.values.string import StringParameters
 from training.family.errors import SCALE_M, player
-from training.family.fit import Case, fit_curves
+from training.family.fit import FitCase, fit_curves
 from training.family.motions import solve
 from training.family.strings import FAMILY, GRID_POINTS, draw_string
 
@@ -81,12 +81,12 @@ def train_preset(
     c, started = configuration, time.monotonic()
     steps = round(c.seconds * c.rate_hz)
     counts = {"train": c.strings, "validation": c.validation_strings, "test": c.test_strings}
-    cases: dict[str, list[Case]] = {split: [] for split in counts}
+    cases: dict[str, list[FitCase]] = {split: [] for split in counts}
     for split, count in counts.items():
         for number in range(count):
             plucked = draw_string("inside", split, number, c.seed)
             # as a data set keeps them, in single precision: 4e-15 of the energy
-            cases[split].append(Case(plucked, solve(plucked, c.rate_hz, steps).float().double()))
+            cases[split].append(FitCase(plucked, solve(plucked, c.rate_hz, steps).float().double()))
             report(0.5 * sum(map(len, cases.values())) / sum(counts.values()), "true motions", None)
     sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
     model = build_model("koopman_tension", sizes)
@@ -138,7 +138,7 @@ def train_preset(
 
 
 @torch.inference_mode()
-def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple[float, float]:
+def mean_errors(model: KoopmanTension, cases: list[FitCase], rate_hz: int) -> tuple[float, float]:
     """Relative MSE and MAE of displacement on the grid, each string's own, and their mean over the strings."""
     play = player(model)
     errors = []

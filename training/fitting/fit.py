@@ -46,7 +46,7 @@ class Diverged(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Progress:
+class FitProgress:
     """The progress of a run, reported at the end of every epoch, and within long ones.
 
     Attributes:
@@ -97,7 +97,7 @@ def fit(
     run_folder: Path,
     *,
     device: torch.device | str = "cpu",
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Callable[[FitProgress], None] = lambda progress: None,
     checkpoint_every_s: float | None = None,
 ) -> FitResult:
     """Train, or continue the run in `run_folder`; what has a closed form (DMD) is computed at once.
@@ -123,7 +123,7 @@ class Seed:
 
     configuration: TrainingConfiguration
     run_folder: Path
-    report: Callable[[Progress], None] = lambda progress: None
+    report: Callable[[FitProgress], None] = lambda progress: None
 
 
 def fit_seeds(
@@ -175,7 +175,7 @@ class _UnderWay:
 
     def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
         begun = time.monotonic()
-        self.run = Run(seed.configuration, dataset, device)
+        self.run = TrainingState(seed.configuration, dataset, device)
         self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
         self.diverged: Diverged | None = None
         if self._path.exists():
@@ -237,10 +237,10 @@ class Steps:
     """The steps of runs that are at the same one: in one pass where their model allows it, recorded on a GPU."""
 
     def __init__(self) -> None:
-        self._runs: list[Run] = []
+        self._runs: list[TrainingState] = []
         self._work: Callable[[], None] = lambda: None
 
-    def take(self, runs: list[Run]) -> None:
+    def take(self, runs: list[TrainingState]) -> None:
         """Take the next step of `runs`."""
         if runs != self._runs:
             self._runs = runs
@@ -254,7 +254,7 @@ class Steps:
             run.end_step()
 
 
-def take_step(runs: Sequence[Run]) -> None:
+def take_step(runs: Sequence[TrainingState]) -> None:
     """Move the weights of runs by the step that was begun: all of it that a GPU does."""
     if any(run.learns_latents for run in runs):
         for run in runs:
@@ -269,7 +269,7 @@ def take_step(runs: Sequence[Run]) -> None:
         run.descend(error)
 
 
-class Run:
+class TrainingState:
     """A training between two steps: all that a checkpoint holds."""
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
@@ -413,13 +413,13 @@ class Run:
         share = (self.step - latent_steps) / max(1, recipe.epochs * self._per_epoch - latent_steps)
         return horizon_at(recipe, share, self._configuration.steps), learning_rate_at(recipe, share)
 
-    def progress(self, validation: RelativeError | None, step_s: float) -> Progress:
+    def progress(self, validation: RelativeError | None, step_s: float) -> FitProgress:
         """`step_s`: what a step has taken."""
         epochs, (horizon, learning_rate) = self.recipe.epochs, self._schedules()
         steps = epochs * self._per_epoch
         left_s = step_s * (steps - self.step)
         at = (self.step, steps, self.epoch, epochs, horizon, learning_rate)
-        return Progress(*at, self.loss, validation, self.seconds, left_s)
+        return FitProgress(*at, self.loss, validation, self.seconds, left_s)
 
     def validate(self) -> RelativeError:
         """The validation error; the best model so far is kept."""
@@ -494,7 +494,7 @@ class Run:
 
 
 def _fit_at_once(
-    configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[Progress], None]
+    configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[FitProgress], None]
 ) -> FitResult:
     """Fit a model whose start is all there is."""
     started = time.monotonic()
@@ -508,7 +508,7 @@ def _fit_at_once(
     truth = dataset.split("train")[:100, : configuration.steps + 1] @ synthesis
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
-    report(Progress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
+    report(FitProgress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
     return FitResult(model.eval(), sums, 1, 1, seconds)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from engine.schema import SchemaError
 from engine.table import append_record, read_table, write_table
-from training.fitting.fit import Progress
+from training.fitting.fit import FitProgress
 
 LARGEST_BYTES = 2**24
 DIGITS = 6  # of a figure in the log
@@ -47,7 +47,7 @@ class TrainingLog:
         self.path = path
         self._trimmed = False
 
-    def add(self, progress: Progress) -> None:
+    def add(self, progress: FitProgress) -> None:
         """Add the epoch that has ended; later ones of an earlier run are dropped."""
         validation = progress.validation
         ended = Epoch(

@@ -57,7 +57,7 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
         sigma = np.array([max(guess[1], slowest) for guess in guesses])
         integrals = energies[rows] * -np.expm1(-2 * sigma * times[:, None]) / (2 * sigma)
         for mode, guess in enumerate(guesses):
-            motion = Motion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
+            motion = ModeMotion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
             guesses[mode] = motion.fitted(guess)
         if last == frames - 1:
             break
@@ -98,7 +98,7 @@ def upright(guess: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ModeMotion:
     """A mode's samples: start and displacement there, time, and the energies' integrals, (samples, modes)."""
 
     start: Floats

@@ -20,7 +20,7 @@ from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json, read, write
 from training.recording.glide import TIMES_S, Glide
 from training.recording.note import Note
-from training.recording.numbering import Series
+from training.recording.numbering import PartialSeries
 from training.recording.refine import Fit, Pole
 from training.recording.sweeps import Takes
 
@@ -67,7 +67,7 @@ class State:
     takes: tuple[TakeState, ...]
 
 
-def checkpoint_of(folder: Path, notes: Sequence[tuple[Note, Series]]) -> Path:
+def checkpoint_of(folder: Path, notes: Sequence[tuple[Note, PartialSeries]]) -> Path:
     """The file of a fit of these notes: its name is a digest of all that the fit depends on."""
     digest = hashlib.sha256(json.dumps(VERSION).encode())
     for note, series in notes:

@@ -16,7 +16,7 @@ from training.recording.checkpoint import restore, save
 from training.recording.glide import Glide, glide_of_phases
 from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
-from training.recording.numbering import Series
+from training.recording.numbering import PartialSeries
 from training.recording.refine import Fit, Pole
 from training.recording.slow import settle_slow
 from training.recording.sweeps import FIRST_DAMPING, Takes
@@ -56,7 +56,7 @@ class LearnedNote:
 
 def fit_note(
     note: Note,
-    series: Series,
+    series: PartialSeries,
     *,
     seconds: float = FIT_LASTS_S,
     poles_a_partial: int = 2,
@@ -84,7 +84,7 @@ def fit_note(
 
 
 def fit_takes(
-    notes: Sequence[tuple[Note, Series]],
+    notes: Sequence[tuple[Note, PartialSeries]],
     *,
     seconds: float = FIT_LASTS_S,
     poles_a_partial: int = 2,
@@ -174,7 +174,9 @@ def _steps(
     return [*steps, (1.0, takes.sweep)]
 
 
-def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, seconds: float, glides: bool) -> Fit:
+def _fit_of(
+    note: Note, series: PartialSeries, first: PartialSeries, hz: Array, edges: Array, seconds: float, glides: bool
+) -> Fit:
     samples, rate = note.fitted(seconds), note.rate_hz
     tuned = series is not first
     pitch = series.f0_hz / first.f0_hz - 1 if tuned else 0.0
@@ -184,7 +186,7 @@ def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, 
     return Fit(samples, rate, edges, hz, glide, tuned=tuned)
 
 
-def _learned(note: Note, series: Series, fit: Fit, intervals: dict[int, Spread]) -> LearnedNote:
+def _learned(note: Note, series: PartialSeries, fit: Fit, intervals: dict[int, Spread]) -> LearnedNote:
     """The learned note, with its own pitch in its poles."""
     higher = 1 + fit.glide.pitch
     poles = (replace(pole, s=pole.s * higher) if pole.partial else pole for pole in fit.every())
@@ -204,7 +206,7 @@ def _plain(hz: float, number: int) -> Pole:
     return Pole(complex(-3.0, 2 * math.pi * hz), partial=number)
 
 
-def _partials(note: Note, series: Series) -> int:
+def _partials(note: Note, series: PartialSeries) -> int:
     last = max(series.present, default=1) + 2
     hz = series.partials_hz(MOST_PARTIALS)
     inside = int((hz < min(HIGHEST_HZ, 0.42 * note.rate_hz)).sum())

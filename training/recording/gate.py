@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, signal
 
 from training.recording.note import Note, envelope
-from training.recording.numbering import SPECTRUM_S, Peaks, Series, followed, number, peaks_of
+from training.recording.numbering import SPECTRUM_S, PartialSeries, Peaks, followed, number, peaks_of
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Finding:
     refused: bool = False
 
 
-def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding, ...]:
+def examine(samples: Array, note: Note, series: PartialSeries | None) -> tuple[Finding, ...]:
     """The findings against a recording; empty: nothing speaks against it."""
     findings = [
         clipped(samples, note),
@@ -135,7 +135,7 @@ def slow_attack(note: Note) -> Finding | None:
     )
 
 
-def reverberant(note: Note, series: Series | None) -> Finding | None:
+def reverberant(note: Note, series: PartialSeries | None) -> Finding | None:
     """Sound between the partials half a second after the attack, well above the noise: the room's."""
     if series is None or note.seconds < 0.9 or len(series.present) < LEAST_PARTIALS:
         return None
@@ -156,7 +156,7 @@ def reverberant(note: Note, series: Series | None) -> Finding | None:
     return Finding("reverberant", "a room rings between its partials", "record closer, or in a drier room")
 
 
-def too_short(note: Note, series: Series | None) -> Finding | None:
+def too_short(note: Note, series: PartialSeries | None) -> Finding | None:
     """The finding that a note rings too briefly, or stands too little above its noise; None: neither."""
     remedy = "let the note ring for two seconds or more"
     level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
@@ -201,7 +201,7 @@ def looped(note: Note) -> Finding | None:
     )
 
 
-def more_onsets(note: Note, series: Series | None) -> Finding | None:
+def more_onsets(note: Note, series: PartialSeries | None) -> Finding | None:
     """A rise of level after the first attack, in any of four bands that together hold the note."""
     rate = note.rate_hz
     sound = note.samples[note.onset : note.onset + round(6 * rate)]
@@ -235,7 +235,7 @@ def more_onsets(note: Note, series: Series | None) -> Finding | None:
     return None
 
 
-def no_series(series: Series | None) -> Finding | None:
+def no_series(series: PartialSeries | None) -> Finding | None:
     """Peaks that are not the partials of one stiff string."""
     words = "its peaks are not the partials of one string"
     remedy = "give one plucked note; drums, slaps and strums are no strings"
@@ -249,7 +249,7 @@ def no_series(series: Series | None) -> Finding | None:
     return None
 
 
-def second_series(note: Note, series: Series) -> Finding | None:
+def second_series(note: Note, series: PartialSeries) -> Finding | None:
     """Sound off the law of one string, once the body is silent: another note's, or a drum's.
 
     A body's mode loses its energy within a number of periods, so the higher a peak is, the less may be left of it.
@@ -279,7 +279,7 @@ def second_series(note: Note, series: Series) -> Finding | None:
     return Finding("off the law", words, remedy, refused=True)
 
 
-def _two_in(peaks: Peaks, series: Series) -> tuple[float, float] | None:
+def _two_in(peaks: Peaks, series: PartialSeries) -> tuple[float, float] | None:
     """The pitches of two strings that were numbered as one: of a fifth, only multiples of 2 and of 3 sound."""
     numbers = series.numbers_of(peaks.hz)
     power = np.where(peaks.near(series), peaks.power, 0.0)

@@ -15,10 +15,10 @@ from training.recording.checkpoint import checkpoint_of
 from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
 from training.recording.note import Note, RecordingError, note_of
-from training.recording.numbering import Series, apart_cents, number_note
-from training.recording.physics import Kind, Physics, Strung, physics_of, strung
+from training.recording.numbering import PartialSeries, apart_cents, number_note
+from training.recording.physics import Kind, LearnedPhysics, Strung, physics_of, strung
 from training.recording.preset import Source
-from training.recording.report import Report, report_of
+from training.recording.report import FitReport, report_of
 from training.recording.verdict import Verdict, verdict_of
 
 Array = NDArray[np.float64]
@@ -51,11 +51,11 @@ class Learned:
 
     source: Source
     note: Note
-    series: Series
+    series: PartialSeries
     fitted: LearnedNote
-    physics: Physics
+    physics: LearnedPhysics
     strung: Strung
-    report: Report
+    report: FitReport
     verdict: Verdict
     findings: tuple[Finding, ...]
     seconds: float
@@ -66,7 +66,7 @@ class Examined:
     """A recording before it is learned: its note, its series of partials, and what speaks against it."""
 
     note: Note
-    series: Series | None
+    series: PartialSeries | None
     findings: tuple[Finding, ...]
 
     @property
@@ -156,7 +156,7 @@ def _part(progress: Progress, done: float, share: float, of_part: float) -> None
     progress(0.95 * (done + share * of_part))
 
 
-def usable(examined: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
+def usable(examined: Examined, anyway: bool, name: str) -> tuple[Note, PartialSeries]:
     """The note and series of what was examined. Raises Refused or RecordingError, which name its file."""
     if examined.refusals and not anyway:
         raise Refused(name, examined.refusals)

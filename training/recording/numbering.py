@@ -32,7 +32,7 @@ GLIDES_CENTS = np.arange(-60.0, 31.0, 5.0)  # down from a loud attack, or a litt
 
 
 @dataclass(frozen=True)
-class Series:
+class PartialSeries:
     """The partials of a string.
 
     Attributes:
@@ -60,7 +60,7 @@ class Series:
         return np.maximum(1, np.round(_number(hz, self.f0_hz, self.stiffness))).astype(int)
 
 
-def apart_cents(first: Series, other: Series) -> float:
+def apart_cents(first: PartialSeries, other: PartialSeries) -> float:
     """The interval of two series."""
     return abs(1200 * math.log2(other.f0_hz / first.f0_hz))
 
@@ -94,12 +94,12 @@ class Peaks:
     def power(self) -> Array:
         return np.asarray(10 ** (self.level_db / 10), np.float64)
 
-    def near(self, series: Series) -> NDArray[np.bool_]:
+    def near(self, series: PartialSeries) -> NDArray[np.bool_]:
         """The peaks that a series explains, as a mask."""
         distance = distances(self.hz, series.f0_hz, series.stiffness)
         return np.abs(distance) <= tolerance(self.hz, series.f0_hz, self.width_hz)
 
-    def without(self, series: Series, least_above_db: float = 0.0, least_level_db: float = -np.inf) -> Peaks:
+    def without(self, series: PartialSeries, least_above_db: float = 0.0, least_level_db: float = -np.inf) -> Peaks:
         """The peaks that a series does not explain, of those so clear and so loud."""
         kept = ~self.near(series) & (self.above_db >= least_above_db) & (self.level_db >= least_level_db)
         return replace(self._of(kept), hidden_hz=series.partials_hz(MOST_PARTIALS))
@@ -164,13 +164,13 @@ def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
     return Peaks((bins + shift) * step, at - floor[bins], at, width_hz, highest_hz)
 
 
-def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:
+def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:
     """The series that explains most; None where there are no peaks."""
     if len(peaks.hz) == 0:
         return None
     candidates = _candidates(peaks, f0_range_hz)
     scored = sorted(((max(_score(peaks, f0, b)[0] for b in COARSE), f0) for f0 in candidates), reverse=True)
-    best: Series | None = None
+    best: PartialSeries | None = None
     for _, f0 in scored[:40]:
         for stiffness in STIFFNESSES:
             tried = series_at(peaks, f0, float(stiffness))
@@ -179,19 +179,19 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Seri
     return None if best is None else _best_refined(peaks, best)
 
 
-def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
+def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
     """A series of given f0 and B with its score."""
     score, explained, missing, present = _score(peaks, f0_hz, stiffness)
-    return Series(f0_hz, stiffness, present, explained, missing, score)
+    return PartialSeries(f0_hz, stiffness, present, explained, missing, score)
 
 
-def followed(peaks: Peaks, series: Series) -> Series:
+def followed(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     """The same string's series in other peaks of its note, where it may have glided."""
     tried = (series_at(peaks, series.f0_hz * 2 ** (cents / 1200), series.stiffness) for cents in GLIDES_CENTS)
     return _best_refined(peaks, max(tried, key=lambda candidate: candidate.score))
 
 
-def _best_refined(peaks: Peaks, series: Series) -> Series:
+def _best_refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     for _ in range(3):
         series = max((_refined(peaks, series), series), key=lambda candidate: candidate.score)
     return series
@@ -247,7 +247,7 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     return score, explained, missing, tuple(int(number_present) for number_present in present)
 
 
-def _refined(peaks: Peaks, series: Series) -> Series:
+def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     """f0 and B by least squares on the peaks that it has, weighted by strength, outliers left out."""
     k = np.maximum(1, np.round(_number(peaks.hz, series.f0_hz, series.stiffness)))
     off = np.abs(distances(peaks.hz, series.f0_hz, series.stiffness))
@@ -269,9 +269,9 @@ def _refined(peaks: Peaks, series: Series) -> Series:
     return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
 
 
-def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:
+def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:
     """The series of a note, from spectra of two lengths; the shorter serves notes that end soon or glide."""
-    best: Series | None = None
+    best: PartialSeries | None = None
     for begin, length in ((0.06, SPECTRUM_S), (0.03, 0.25)):
         length = min(length, 0.9 * (note.seconds - begin))
         if length < 0.05:

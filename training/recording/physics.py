@@ -75,7 +75,7 @@ class Partial:
 
 
 @dataclass(frozen=True)
-class Physics:
+class LearnedPhysics:
     """The physics that the sound gives.
 
     Attributes:
@@ -153,7 +153,7 @@ def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
     return numbered
 
 
-def physics_of(learned: LearnedNote) -> Physics:
+def physics_of(learned: LearnedNote) -> LearnedPhysics:
     """Fit f0, B and the decay over frequency to a note's partials.
 
     Those pulled by the body count little for it.
@@ -185,7 +185,7 @@ def physics_of(learned: LearnedNote) -> Physics:
     of_string = weight * np.where(np.abs(cents) > MOST_OFF_CENTS, PULLED_WEIGHT, 1.0)
     smooth_hz, smooth = _smooth(hz, np.array([partial.decay for partial in partials]), of_string)
     rise = float(learned.glide.shares.sum())
-    return Physics(f0, f0_error, stiffness, stiffness_error, partials, smooth_hz, smooth, max(0.0, rise))
+    return LearnedPhysics(f0, f0_error, stiffness, stiffness_error, partials, smooth_hz, smooth, max(0.0, rise))
 
 
 def _smooth(hz: Array, decay: Array, weight: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -201,7 +201,9 @@ def _smooth(hz: Array, decay: Array, weight: Array) -> tuple[tuple[float, ...], 
     return tuple(float(node) for node in nodes), tuple(values)
 
 
-def strung(physics: Physics, kind: Kind, length_m: float | None = None, gauge_mm: float | None = None) -> Strung:
+def strung(
+    physics: LearnedPhysics, kind: Kind, length_m: float | None = None, gauge_mm: float | None = None
+) -> Strung:
     """The string in a gauge.
 
     Args:
@@ -245,7 +247,7 @@ def strung(physics: Physics, kind: Kind, length_m: float | None = None, gauge_mm
     return Strung(string, amplitude, position, tuple(assumed))
 
 
-def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float]:
+def _damping(physics: LearnedPhysics, mass: float, length: float) -> tuple[float, float]:
     """d₁ and d₃ with σ = (d₁ + d₃ η²)/2ρA, neither below 0, nearest to the smooth decay in its own measure."""
     hz, sigma = np.array(physics.smooth_hz), np.array(physics.smooth_decay)
     eta = 2 * math.pi * hz / (2 * length * physics.f0_hz)  # of a flexible string
@@ -257,7 +259,7 @@ def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float
     return float(max(d1, least)), float(d3)
 
 
-def pluck_place(physics: Physics) -> float:
+def pluck_place(physics: LearnedPhysics) -> float:
     """The place of a triangle's pluck, below one half, by the comb of the partials' amplitudes; it is a guess.
 
     Of places that fit nearly alike, that whose nodes cost the instrument least: it cannot make up for a node.
@@ -280,7 +282,7 @@ def pluck_place(physics: Physics) -> float:
     return round(min((missing, place) for left, missing, place in candidates if left <= most)[1], 3)
 
 
-def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
+def corrections(physics: LearnedPhysics, string: StringParameters) -> dict[str, tuple[float, ...]]:
     """The corrections by the note's partials to the law of its string, as `engine.resonators.recorded` keeps them."""
     count = max(partial.number for partial in physics.partials)
     omega = undamped_frequencies(string, count)

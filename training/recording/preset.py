@@ -17,7 +17,7 @@ from engine.resonators.recorded import RecordedNote, RecordedString
 from training.recording.fit import LearnedNote
 from training.recording.glide import TIMES_S
 from training.recording.note import FIT_BEGINS_S, Note
-from training.recording.physics import COMB_FLOOR, Physics, Strung, corrections
+from training.recording.physics import COMB_FLOOR, LearnedPhysics, Strung, corrections
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def recorded_note(note: Note, learned: LearnedNote, source: Source) -> RecordedN
 
 def recorded_string(
     note: RecordedNote,
-    physics: Physics,
+    physics: LearnedPhysics,
     strung: Strung,
     source: Source,
     settings: dict[str, Any],
@@ -117,7 +117,7 @@ def listening_point(partials: int) -> float:
     return 0.5 / (partials + 1)
 
 
-def body_response(physics: Physics, strung: Strung, partials: int, rate_hz: int) -> Array:
+def body_response(physics: LearnedPhysics, strung: Strung, partials: int, rate_hz: int) -> Array:
     """A minimum-phase impulse response, (frames,): what the instrument makes of the string's partials.
 
     Its magnitude is that of the recorded partials over those of the same pluck of the bare string, at their

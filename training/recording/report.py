@@ -17,7 +17,7 @@ from engine.compare.spectra import log_spectral_distance, spectral_distances
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
 from training.recording.numbering import partial_hz
-from training.recording.physics import Physics
+from training.recording.physics import LearnedPhysics
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ BANDS_HZ = (31.5, 63.0, 125.0, 250.0, 500.0, 1_000.0, 2_000.0, 4_000.0, 8_000.0)
 
 
 @dataclass(frozen=True)
-class Errors:
+class FitErrors:
     """The errors of one sound against another.
 
     Attributes:
@@ -81,27 +81,27 @@ class PartialReport:
 
 
 @dataclass(frozen=True)
-class Report:
+class FitReport:
     """The report on one learned note."""
 
-    errors: Errors
+    errors: FitErrors
     noise_esr: float
     bands: tuple[Band, ...]
     partials: tuple[PartialReport, ...]
 
 
-def report_of(note: Note, learned: LearnedNote, physics: Physics) -> Report:
+def report_of(note: Note, learned: LearnedNote, physics: LearnedPhysics) -> FitReport:
     """Compare a note with its recording."""
     truth = note.fitted()
     model = learned.render(np.arange(len(truth)) / note.rate_hz)
     errors = errors_of(truth, model, note.rate_hz, note.noise_power)
     noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
-    return Report(
+    return FitReport(
         errors, noise, bands_of(truth, model, note.rate_hz, note.noise_power), partials_in(learned, physics)
     )
 
 
-def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, ...]:
+def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialReport, ...]:
     """The partials of a note that have an interval."""
     spreads = learned.spreads
     levels = {number: sum(spread.level_db) / 2 for number, spread in spreads.items()}
@@ -124,12 +124,12 @@ def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, 
     return tuple(rows)
 
 
-def errors_of(truth: Array, model: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
+def errors_of(truth: Array, model: Array, rate_hz: int, noise_power: float = 0.0) -> FitErrors:
     """The errors between sounds of one length that begin 8 ms after the onset."""
     moved, gain, delay = aligned(truth, model, rate_hz)
     late = round((LATE_S - FIT_BEGINS_S) * rate_hz)
     convergence, log_db = spectral_distances(moved[None], truth[None], STFT_SIZES)
-    return Errors(
+    return FitErrors(
         error_to_signal(moved, truth),
         error_to_signal(moved[late:], truth[late:]),
         log_spectral_distance(truth, moved, noise_power),
@@ -195,7 +195,7 @@ def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
     return math.nan
 
 
-def figures(report: Report) -> dict[str, float]:
+def figures(report: FitReport) -> dict[str, float]:
     """The report's main numbers, by name."""
     e = report.errors
     return {

@@ -13,8 +13,8 @@ import numpy as np
 from engine.compare.relative import error_to_signal
 from training.recording.fit import LearnedNote, fit_note
 from training.recording.note import Note
-from training.recording.numbering import Series
-from training.recording.report import Report
+from training.recording.numbering import PartialSeries
+from training.recording.report import FitReport
 
 MOST_ESR = 0.15  # besides the recording's noise
 MOST_NOISE_ESR = 0.15
@@ -58,7 +58,7 @@ class Verdict:
         return f"no string found: {'; '.join(self.reasons)} ({errors})"
 
 
-def verdict_of(note: Note, series: Series, learned: LearnedNote, report: Report) -> Verdict:
+def verdict_of(note: Note, series: PartialSeries, learned: LearnedNote, report: FitReport) -> Verdict:
     """Judge a note's fit by its errors, against a linear fit, and by its partials."""
     truth = note.fitted()
     t = np.arange(len(truth)) / note.rate_hz

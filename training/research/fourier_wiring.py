@@ -458,7 +458,7 @@ def mean_motions(modes: Modes) -> StringModes:
         times = np.arange(1.0, last + 1)
         for mode, guess in enumerate(guesses):
             seen = mean[1 : last + 1, mode]
-            guesses[mode] = phases.Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
+            guesses[mode] = phases.ModeMotion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
         if last == frames - 1:
             break
         last = min(frames - 1, int(phases.MORE_FRAMES * last) + 1)

@@ -21,7 +21,7 @@ PLANS = Path(__file__).parent / "plans"
 
 
 @dataclass(frozen=True)
-class Block:
+class CellBlock:
     """Cells: the product of what is listed.
 
     Attributes:
@@ -62,7 +62,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Run:
+class PlannedRun:
     """A cell and the configuration that fills it."""
 
     cell: Cell
@@ -88,14 +88,14 @@ class Plan:
 
     name: str
     description: str
-    runs: tuple[Run, ...]
+    runs: tuple[PlannedRun, ...]
     trial: bool
 
 
 @dataclass(frozen=True)
 class _File:
     description: str
-    block: tuple[Block, ...]
+    block: tuple[CellBlock, ...]
     data: dict[str, Any] = field(default_factory=dict)  # fields of the data that differ from the protocol
     recipe_fields: dict[str, Any] = field(default_factory=dict)  # … and from the recipe
 
@@ -121,10 +121,10 @@ def load_plan(name_or_path: str) -> Plan:
     if not path.is_file():
         raise SchemaError(f"no plan {name_or_path!r}; give a .toml file or one of: {', '.join(plan_names())}")
     file = read(_File, read_toml(path), str(path))
-    runs: dict[str, Run] = {}
+    runs: dict[str, PlannedRun] = {}
     for cell in (cell for block in file.block for cell in block.cells()):
         try:
-            run = Run(cell, configuration_of(cell, file.data, file.recipe_fields))
+            run = PlannedRun(cell, configuration_of(cell, file.data, file.recipe_fields))
         except SchemaError as error:
             raise SchemaError(f"{path}: {error}") from error
         runs.setdefault(run.digest, run)

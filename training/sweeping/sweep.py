@@ -22,11 +22,11 @@ from training.cell import Cell
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
 from training.run import default_runs
-from training.sweeping.plan import Plan, Run
+from training.sweeping.plan import Plan, PlannedRun
 from training.sweeping.task import PROGRESS, Task, TaskRun, Workers, WorkersError, read_progress
 
 if TYPE_CHECKING:
-    from training.fitting.fit import Progress
+    from training.fitting.fit import FitProgress
 
 POLL_S = 1.0  # for progress, and for workers that came or went
 
@@ -57,14 +57,14 @@ class Options:
     def left_s(self) -> float:
         return math.inf if self.ends_s is None else self.ends_s - time.monotonic()
 
-    def pieces(self, runs: Iterable[Run]) -> list[tuple[Run, ...]]:
+    def pieces(self, runs: Iterable[PlannedRun]) -> list[tuple[PlannedRun, ...]]:
         """The pieces of work that runs are, each where its first run is."""
-        pieces: dict[Cell, list[Run]] = {}
+        pieces: dict[Cell, list[PlannedRun]] = {}
         for run in runs:
             pieces.setdefault(replace(run.cell, seed=0) if self.seeds_at_once else run.cell, []).append(run)
         return [tuple(piece) for piece in pieces.values()]
 
-    def task(self, plan: Plan, *runs: Run) -> Task:
+    def task(self, plan: Plan, *runs: PlannedRun) -> Task:
         return Task(
             runs=tuple(TaskRun(run.name, write(run.configuration), run.digest) for run in runs),
             recipe=runs[0].cell.recipe,
@@ -80,13 +80,13 @@ class Options:
 class Watch(Protocol):
     """Receives what happens in a sweep."""
 
-    def started(self, run: Run) -> None:
+    def started(self, run: PlannedRun) -> None:
         """A run was handed to the workers."""
 
-    def progressed(self, run: Run, progress: Progress) -> None:
+    def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
         """A run is under way."""
 
-    def failed(self, run: Run, error: str) -> None:
+    def failed(self, run: PlannedRun, error: str) -> None:
         """A run has failed and is tried again."""
 
     def finished(self, row: Row) -> None:
@@ -108,7 +108,7 @@ def is_finished(row: Row | None) -> bool:
     return row is not None and row.status in ("done", "diverged")
 
 
-def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
+def unfinished(plan: Plan, rows: Iterable[Row]) -> list[PlannedRun]:
     """The runs that are still to be done, in the plan's order."""
     known = {row.digest: row for row in rows}
     return [run for run in plan.runs if not is_finished(known.get(run.digest))]
@@ -131,7 +131,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
     folder = (options.runs or default_runs()) / group_of(plan)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(options.pieces(unfinished(plan, rows.values())))
-    running: dict[Future[dict[str, Any]], tuple[Run, ...]] = {}
+    running: dict[Future[dict[str, Any]], tuple[PlannedRun, ...]] = {}
     failures: Counter[str] = Counter()  # of pieces by their first run
     while (waiting or running) and options.left_s > 0:
         while waiting and len(running) < workers.capacity():
@@ -180,7 +180,7 @@ def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
         return [], f"its result makes no sense: {error}"
 
 
-def _failed(run: Run, error: str) -> Row:
+def _failed(run: PlannedRun, error: str) -> Row:
     configuration = run.configuration
     return Row(
         digest=run.digest,

@@ -23,7 +23,7 @@ from engine.schema import SchemaError, parse_json, read, write
 from engine.whole_file import whole_file
 
 if TYPE_CHECKING:
-    from training.fitting.fit import Progress
+    from training.fitting.fit import FitProgress
     from training.results import Row
 
 TELL_EVERY_S = 1.0  # of a run's progress
@@ -110,12 +110,12 @@ def perform(plain: Mapping[str, Any]) -> dict[str, Any]:
             return {"rows": [], "error": f"{type(error).__name__}: {error}"}
 
 
-def read_progress(folder: Path) -> Progress | None:
+def read_progress(folder: Path) -> FitProgress | None:
     """The progress in a run's folder; None where there is none, or one that is not finite."""
-    from training.fitting.fit import Progress
+    from training.fitting.fit import FitProgress
 
     with suppress(OSError, SchemaError):
-        return read(Progress, parse_json((folder / PROGRESS).read_bytes(), PROGRESS), PROGRESS)
+        return read(FitProgress, parse_json((folder / PROGRESS).read_bytes(), PROGRESS), PROGRESS)
     return None
 
 
@@ -146,11 +146,11 @@ def _train(task: Task) -> list[Row]:
     )
 
 
-def _reporter(folder: Path) -> Callable[[Progress], None]:
+def _reporter(folder: Path) -> Callable[[FitProgress], None]:
     """A function that writes a run's progress now and then."""
     reported = -TELL_EVERY_S
 
-    def report(progress: Progress) -> None:
+    def report(progress: FitProgress) -> None:
         nonlocal reported
         now = time.monotonic()
         if now - reported >= TELL_EVERY_S:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from training.cell import MODEL_NAMES
 from training.results import Row
-from training.tables.paper import COLUMNS, HORIZONS, Column, Figure, factor, mark
-from training.tables.sections import NOT_RUN, Line, Section, rows_of, sections
+from training.tables.paper import COLUMNS, HORIZONS, DatasetColumn, MeanFigure, factor, mark
+from training.tables.sections import NOT_RUN, Section, TableLine, rows_of, sections
 
 NONE = "—"
 METRIC_NAMES = {"rel_mse": "MSE", "rel_mae": "MAE"}
@@ -41,7 +41,7 @@ def as_compact(rows: Sequence[Row], recipe: str = "all", metric: str = "rel_mse"
     return "\n\n".join(parts) + "\n"
 
 
-def given(line: Line) -> str:
+def given(line: TableLine) -> str:
     """The knowledge of the string that a line's runs started from, in words."""
     if line.model == "dmd":
         return "fitted"
@@ -52,7 +52,7 @@ def given(line: Line) -> str:
     return f"{words}, hinted" if line.hints else words
 
 
-def own_lines(section: Section) -> list[Line]:
+def own_lines(section: Section) -> list[TableLine]:
     """The lines of a section that were trained on its own horizon, by model."""
     same_horizon = [line for line in section.lines if line.trained == section.horizon]
     return [line for model in section.models for line in same_horizon if line.model == model]
@@ -71,17 +71,17 @@ def _lines(section: Section, metric: str) -> list[list[str]]:
     return table
 
 
-def _not_run(section: Section, model: str, column: Column, metric: str) -> str:
+def _not_run(section: Section, model: str, column: DatasetColumn, metric: str) -> str:
     paper = section.paper(model, column, metric)
     return f"{NOT_RUN} ({paper.mean:.4f})" if paper else NOT_RUN
 
 
-def _seeds(section: Section, line: Line) -> str:
+def _seeds(section: Section, line: TableLine) -> str:
     counts = sorted({len(entry.done) for entry in section.lines[line].values()})
     return str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
-def _cell(section: Section, line: Line, column: Column, metric: str) -> str:
+def _cell(section: Section, line: TableLine, column: DatasetColumn, metric: str) -> str:
     entry = section.lines[line].get(column)
     if entry is None:
         return NOT_RUN
@@ -94,7 +94,7 @@ def _cell(section: Section, line: Line, column: Column, metric: str) -> str:
     return "; ".join(parts)
 
 
-def _against(ours: Figure, paper: Figure | None) -> str:
+def _against(ours: MeanFigure, paper: MeanFigure | None) -> str:
     if paper is None:
         return f"{ours.mean:.2g} ({NONE})"
     words = f"{ours.mean:.2g} ({paper.mean:.4f}) {factor(ours, paper)}"

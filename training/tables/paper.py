@@ -27,7 +27,7 @@ MODEL_ORDER = ("dmd", "koopman", "koopman_var", "lru", "s5", "fgru", "frnn", "ko
 Mark = Literal["better", "worse", "equal"]
 
 
-class Column(NamedTuple):
+class DatasetColumn(NamedTuple):
     """A data set of the tables."""
 
     initial: str
@@ -37,10 +37,10 @@ class Column(NamedTuple):
         return f"{self.initial.capitalize()} {self.rate_hz // 1000} kHz"
 
 
-COLUMNS = tuple(Column(initial, rate_hz) for initial in ("gaussian", "noise") for rate_hz in (4000, 16000))
+COLUMNS = tuple(DatasetColumn(initial, rate_hz) for initial in ("gaussian", "noise") for rate_hz in (4000, 16000))
 
 
-class Figure(NamedTuple):
+class MeanFigure(NamedTuple):
     """A mean and what it may be off by.
 
     Attributes:
@@ -60,29 +60,29 @@ class Figure(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Errors:
+class PaperErrors:
     """A cell of the tables: a figure of each metric, None where there is none."""
 
-    rel_mse: Figure | None
-    rel_mae: Figure | None
+    rel_mse: MeanFigure | None
+    rel_mae: MeanFigure | None
 
-    def figure(self, metric: str) -> Figure | None:
+    def figure(self, metric: str) -> MeanFigure | None:
         return self.rel_mse if metric == "rel_mse" else self.rel_mae
 
 
 @cache
-def paper_errors() -> dict[tuple[str, int, str, Column], Errors]:
+def paper_errors() -> dict[tuple[str, int, str, DatasetColumn], PaperErrors]:
     """The paper's errors, by string, horizon, model and column."""
     errors = {}
     with PAPER.open(newline="", encoding="utf-8") as file:
         for line in csv.DictReader(file):
-            mse, mae = (Figure(float(line[metric]), float(line[f"{metric}_std"])) for metric in METRICS)
-            column = Column(line["initial"], int(line["rate_hz"]))
-            errors[line["string"], int(line["horizon"]), line["model"], column] = Errors(mse, mae)
+            mse, mae = (MeanFigure(float(line[metric]), float(line[f"{metric}_std"])) for metric in METRICS)
+            column = DatasetColumn(line["initial"], int(line["rate_hz"]))
+            errors[line["string"], int(line["horizon"]), line["model"], column] = PaperErrors(mse, mae)
     return errors
 
 
-def mark(ours: Figure, paper: Figure) -> Mark:
+def mark(ours: MeanFigure, paper: MeanFigure) -> Mark:
     """The mark of ours against the paper's.
 
     Equal: within one standard deviation of their difference, and never finer than the paper prints.
@@ -93,7 +93,7 @@ def mark(ours: Figure, paper: Figure) -> Mark:
     return "better" if ours.mean < paper.mean else "worse"
 
 
-def factor(ours: Figure, paper: Figure) -> str:
+def factor(ours: MeanFigure, paper: MeanFigure) -> str:
     """Our mean as a multiple of the paper's, "×0.0005"; "> ×0.1" where the paper's is printed as 0.0000."""
     times = ours.mean / (paper.mean or PRINTED)
     text = f"{times:.2g}" if times < 100 else f"{times:.0f}"

@@ -17,18 +17,18 @@ from training.tables.paper import (
     METRICS,
     MODEL_ORDER,
     STRINGS,
-    Column,
-    Errors,
-    Figure,
+    DatasetColumn,
+    MeanFigure,
+    PaperErrors,
     paper_errors,
 )
 
 NOT_RUN = "not run"  # what is said in place of a figure
-NO_ERRORS = Errors(None, None)
+NO_ERRORS = PaperErrors(None, None)
 
 
 @dataclass(frozen=True)
-class Line:
+class TableLine:
     """A row of a table: a model, and what its runs have in common.
 
     Attributes:
@@ -47,14 +47,14 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Entry(Errors):
+class TableEntry(PaperErrors):
     """A cell of ours, with the runs behind its figures.
 
     Attributes:
         test: the same of the test split; the figures themselves are of validation.
     """
 
-    test: Errors = NO_ERRORS
+    test: PaperErrors = NO_ERRORS
     done: tuple[Row, ...] = ()
     diverged: tuple[Row, ...] = ()
     failed: tuple[Row, ...] = ()
@@ -70,7 +70,7 @@ class Section:
 
     string: str
     horizon: int
-    lines: dict[Line, dict[Column, Entry]]
+    lines: dict[TableLine, dict[DatasetColumn, TableEntry]]
 
     @property
     def models(self) -> list[str]:
@@ -84,7 +84,7 @@ class Section:
     def place(self) -> tuple[str, int]:
         return self.string, self.horizon
 
-    def paper(self, model: str, column: Column, metric: str) -> Figure | None:
+    def paper(self, model: str, column: DatasetColumn, metric: str) -> MeanFigure | None:
         """The paper's figure there; None where it has nothing."""
         errors = paper_errors().get((self.string, self.horizon, model, column))
         return errors.figure(metric) if errors else None
@@ -118,9 +118,9 @@ def configuration_of(row: Row) -> TrainingConfiguration | None:
 
 
 def _section(rows: Sequence[Row], string: str, horizon: int) -> Section:
-    gathered: dict[Line, dict[Column, dict[int, Row]]] = {}
+    gathered: dict[TableLine, dict[DatasetColumn, dict[int, Row]]] = {}
     for row in rows:
-        column = Column(row.initial, row.rate_hz)
+        column = DatasetColumn(row.initial, row.rate_hz)
         if row.string != string or column not in COLUMNS or not _is_measured(row, horizon):
             continue
         gathered.setdefault(_line(row), {}).setdefault(column, {})[row.seed] = row
@@ -145,29 +145,29 @@ def _is_measured(row: Row, horizon: int) -> bool:
     return row.status != "done" or row.rel_mse_400 is not None
 
 
-def _line(row: Row) -> Line:
+def _line(row: Row) -> TableLine:
     how = "" if row.model == "dmd" else row.initialisation  # fitted: an initialisation is asked of it by nobody
-    return Line(row.model, row.recipe, how, row.structured, row.horizon, load(row.name).hints)
+    return TableLine(row.model, row.recipe, how, row.structured, row.horizon, load(row.name).hints)
 
 
-def _entry(rows: Sequence[Row], horizon: int) -> Entry:
+def _entry(rows: Sequence[Row], horizon: int) -> TableEntry:
     rows = sorted(rows, key=lambda row: row.seed)
     done, diverged, failed = (
         tuple(row for row in rows if row.status == status) for status in ("done", "diverged", "failed")
     )
     mse, mae = (_figure(done, metric, horizon) for metric in METRICS)
-    test = Errors(*(_figure(done, f"test_{metric}", horizon) for metric in METRICS))
-    return Entry(mse, mae, test, done, diverged, failed)
+    test = PaperErrors(*(_figure(done, f"test_{metric}", horizon) for metric in METRICS))
+    return TableEntry(mse, mae, test, done, diverged, failed)
 
 
-def _figure(rows: Sequence[Row], metric: str, horizon: int) -> Figure | None:
+def _figure(rows: Sequence[Row], metric: str, horizon: int) -> MeanFigure | None:
     name = metric if all(row.horizon == horizon for row in rows) else f"{metric}_{SHORT_HORIZON}"
     values, errors = _known(rows, name), _known(rows, f"{name}_se")
     if not values or len(values) < len(rows):  # of a split on which a seed runs away there is no mean
         return None
     # of the seeds' mean: they are measured on the same trajectories, whose draw moves them all alike
     split = math.sqrt(fmean(error**2 for error in errors)) if errors else None
-    return Figure(fmean(values), stdev(values) if len(values) > 1 else None, split)
+    return MeanFigure(fmean(values), stdev(values) if len(values) > 1 else None, split)
 
 
 def _known(rows: Sequence[Row], name: str) -> list[float]:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from training.results import Row
-from training.tables.paper import COLUMNS, METRICS, Column, mark
-from training.tables.sections import NOT_RUN, Entry, Line, Section, sections
+from training.tables.paper import COLUMNS, METRICS, DatasetColumn, mark
+from training.tables.sections import NOT_RUN, Section, TableEntry, TableLine, sections
 
 
 def as_csv(rows: Sequence[Row], recipe: str = "all") -> str:
@@ -28,19 +28,19 @@ def as_csv(rows: Sequence[Row], recipe: str = "all") -> str:
     return file.getvalue()
 
 
-def _lines(section: Section, model: str) -> Sequence[Line | None]:
+def _lines(section: Section, model: str) -> Sequence[TableLine | None]:
     """The lines of a model; a single None where nothing was run."""
     return [line for line in section.lines if line.model == model] or [None]
 
 
-def _record(section: Section, model: str, line: Line | None, column: Column) -> dict[str, Any]:
+def _record(section: Section, model: str, line: TableLine | None, column: DatasetColumn) -> dict[str, Any]:
     """The columns of a cell by name; None, which is empty, for what is not there.
 
-    trained: see `Line`. seeds: runs behind the figures; 0 where nothing was run. mse_mark …: of the validation figure
+    trained: see `TableLine`. seeds: runs behind the figures; 0 where none was run. mse_mark …: of validation
     against the paper's; test_… of the test split's. runs: their names, separated by spaces, with those that diverged
     or failed. rel_mse_std …: over seeds; rel_mse_se …: over the trajectories of the split; see `Figure`.
     """
-    entry = (section.lines[line].get(column) if line else None) or Entry(None, None)
+    entry = (section.lines[line].get(column) if line else None) or TableEntry(None, None)
     marks: dict[str, Any] = {}
     figures: dict[str, Any] = {}
     for prefix, errors in (("", entry), ("test_", entry.test)):

@@ -12,13 +12,13 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
 from app.export.struck import Struck, StruckKey
 from app.presets.library import PresetEntry
-from app.session.choices import Choices, PluckedString
+from app.session.choices import Choices, ShownString
 from app.session.listener import Listener
 from app.shared.version import program_version
 from engine.presets import preset_digest
 from engine.result_file import WriteError, explain, whole_file
 
-PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo", "solo"}
+PLUCK_FIELDS = {"seconds", *ShownString.model_fields, *Listener.model_fields} - {"listen_right", "stereo", "solo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
     f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "

@@ -63,7 +63,7 @@ class Trial(BaseModel):
 
 
 @dataclass(frozen=True)
-class Run:
+class ListeningTest:
     """A test under way: a value that each step replaces.
 
     Attributes:
@@ -85,11 +85,11 @@ class Run:
         """The sound, A or B, that is to be played for a choice of A, B or X."""
         return draw_order(self.seed, self.planned)[len(self.trials)] if sound == "X" else sound
 
-    def auditioned(self, sound: Sound) -> Run:
+    def auditioned(self, sound: Sound) -> ListeningTest:
         """The run after A, B or X has been heard."""
         return replace(self, x_heard=self.x_heard or sound == "X")
 
-    def answered(self, answer: Identity) -> Run:
+    def answered(self, answer: Identity) -> ListeningTest:
         """The run after an answer, at its next trial.
 
         Raises:
@@ -97,4 +97,4 @@ class Run:
         """
         if self.complete or not self.x_heard:
             raise ValueError("The test is complete." if self.complete else "X has not been heard in this trial.")
-        return Run(self.seed, self.planned, (*self.trials, Trial(x=self.heard_as("X"), answer=answer)))
+        return ListeningTest(self.seed, self.planned, (*self.trials, Trial(x=self.heard_as("X"), answer=answer)))

@@ -60,7 +60,7 @@ FORMATS: Mapping[str, Format] = {
 
 
 @dataclass(frozen=True)
-class Target:
+class System:
     """A system that plug-ins are built for.
 
     Attributes:
@@ -75,12 +75,12 @@ class Target:
 
 
 X64 = "x86-64-v2", "x86-64-v3"
-TARGETS: Mapping[str, Target] = {
-    "linux-x64": Target("x86_64-unknown-linux-gnu", X64, "x86_64-linux-gnu.2.17"),
-    "linux-arm64": Target("aarch64-unknown-linux-gnu", ("generic",), "aarch64-linux-gnu.2.17"),
-    "windows-x64": Target("x86_64-w64-windows-gnu", X64, "x86_64-windows-gnu"),
-    "macos-x64": Target("x86_64-apple-macosx11.0.0", X64, "x86_64-macos.11.0"),
-    "macos-arm64": Target("arm64-apple-macosx11.0.0", ("apple-m1",), "aarch64-macos.11.0"),
+TARGETS: Mapping[str, System] = {
+    "linux-x64": System("x86_64-unknown-linux-gnu", X64, "x86_64-linux-gnu.2.17"),
+    "linux-arm64": System("aarch64-unknown-linux-gnu", ("generic",), "aarch64-linux-gnu.2.17"),
+    "windows-x64": System("x86_64-w64-windows-gnu", X64, "x86_64-windows-gnu"),
+    "macos-x64": System("x86_64-apple-macosx11.0.0", X64, "x86_64-macos.11.0"),
+    "macos-arm64": System("arm64-apple-macosx11.0.0", ("apple-m1",), "aarch64-macos.11.0"),
 }
 
 

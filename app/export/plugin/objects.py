@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from app.export.plugin import texts
-from app.export.plugin.formats import TARGETS, Target
+from app.export.plugin.formats import TARGETS, System
 from engine.python_process import python_command, python_environment
 from engine.result_file import explain
 from engine.whole_file import whole_file
@@ -167,7 +167,7 @@ def _environment() -> dict[str, str]:
     return {**environment, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
 
 
-def _compiled(text: str, target: Target, number: int) -> bytes:
+def _compiled(text: str, target: System, number: int) -> bytes:
     """The object file for a processor of the target: entries "ls0_render" …, all else internal, nothing of Python."""
     import llvmlite.binding as llvm
 

@@ -19,7 +19,7 @@ KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as 
 
 
 @dataclass(frozen=True)
-class Entry:
+class MenuEntry:
     """An action: its name in the code, its words in the menu, its shortcut, and its effect for the help."""
 
     name: str
@@ -33,54 +33,56 @@ class Entry:
 
 
 # A shortcut works in the whole window. Enter is not the menu's: it presses the button that Tab went to, else plucks.
-MENUS: dict[str, tuple[Entry, ...]] = {
+MENUS: dict[str, tuple[MenuEntry, ...]] = {
     "&File": (
-        Entry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
-        Entry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
-        Entry("export", "Export …", "Ctrl+E", "export WAV"),
-        Entry(
+        MenuEntry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
+        MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
+        MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
+        MenuEntry(
             "sampler",
             "Export for samplers …",
             "Ctrl+Shift+E",
             "export the instrument for samplers (SFZ, SoundFont)",
         ),
-        Entry("plugin", "Export plug-in …"),
-        Entry("quit", "Quit", "Ctrl+Q", "quit"),
+        MenuEntry("plugin", "Export plug-in …"),
+        MenuEntry("quit", "Quit", "Ctrl+Q", "quit"),
     ),
     "&Edit": (
-        Entry("undo", "Undo", "Ctrl+Z", "undo: instrument and its knobs, preset, pluck, listening point, duration"),
-        Entry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
-        Entry("save", "Save instrument", "Ctrl+S", "save the instrument"),
-        Entry("revert", "Revert instrument"),
-        Entry("compare", "Hear saved instrument"),
+        MenuEntry(
+            "undo", "Undo", "Ctrl+Z", "undo: instrument and its knobs, preset, pluck, listening point, duration"
+        ),
+        MenuEntry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
+        MenuEntry("save", "Save instrument", "Ctrl+S", "save the instrument"),
+        MenuEntry("revert", "Revert instrument"),
+        MenuEntry("compare", "Hear saved instrument"),
     ),
     "&Play": (
-        Entry("play", "Pluck or stop", "Space", "pluck, or stop"),
-        Entry("pluck", "Pluck", "Return", "pluck"),
-        Entry("loop", "Loop", "Ctrl+L", "loop"),
-        Entry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),
-        Entry("browse", "Presets …", "Ctrl+P", "browse the presets"),
-        Entry("previous", "Previous preset", "PgUp", "previous preset"),
-        Entry("next", "Next preset", "PgDown", "next preset"),
-        Entry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
-        Entry("all_modes", "Play all modes", "Esc", "play all modes again"),
-        Entry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
+        MenuEntry("play", "Pluck or stop", "Space", "pluck, or stop"),
+        MenuEntry("pluck", "Pluck", "Return", "pluck"),
+        MenuEntry("loop", "Loop", "Ctrl+L", "loop"),
+        MenuEntry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),
+        MenuEntry("browse", "Presets …", "Ctrl+P", "browse the presets"),
+        MenuEntry("previous", "Previous preset", "PgUp", "previous preset"),
+        MenuEntry("next", "Next preset", "PgDown", "next preset"),
+        MenuEntry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
+        MenuEntry("all_modes", "Play all modes", "Esc", "play all modes again"),
+        MenuEntry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
     ),
     "&View": (
-        Entry("face", "Play or Lab", "F9", "switch between the faces Play and Lab"),
-        Entry("keys", "Keys in Lab", "Ctrl+K", "show or hide the keys in Lab"),
-        Entry("motion", "Motion", "M", "show or hide the string's motion"),
-        Entry("envelope", "Envelope", "N", "show or hide the envelope of the motion"),
+        MenuEntry("face", "Play or Lab", "F9", "switch between the faces Play and Lab"),
+        MenuEntry("keys", "Keys in Lab", "Ctrl+K", "show or hide the keys in Lab"),
+        MenuEntry("motion", "Motion", "M", "show or hide the string's motion"),
+        MenuEntry("envelope", "Envelope", "N", "show or hide the envelope of the motion"),
     ),
     "&Settings": (
-        Entry("audio", "Audio settings …", "Ctrl+,", "audio settings"),
-        Entry("midi", "MIDI …", "Ctrl+M", "MIDI"),
+        MenuEntry("audio", "Audio settings …", "Ctrl+,", "audio settings"),
+        MenuEntry("midi", "MIDI …", "Ctrl+M", "MIDI"),
     ),
     "&Help": (
-        Entry("help", "Help", "F1", "help"),
-        Entry("menu", "Menu", "F10", "menu"),
-        Entry("notices", "Notices …", "F8", "notices since the start"),
-        Entry("about", "About Learned Strings"),
+        MenuEntry("help", "Help", "F1", "help"),
+        MenuEntry("menu", "Menu", "F10", "menu"),
+        MenuEntry("notices", "Notices …", "F8", "notices since the start"),
+        MenuEntry("about", "About Learned Strings"),
     ),
 }
 ENTRIES = {entry.name: entry for entries in MENUS.values() for entry in entries}
@@ -107,7 +109,7 @@ class AppMenu(QMenu):
         if window is not None:
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
 
-    def _add(self, menu: QMenu, entry: Entry) -> None:
+    def _add(self, menu: QMenu, entry: MenuEntry) -> None:
         action = self.action[entry.name] = menu.addAction(_words(entry))
         if entry.key != "Return":
             action.setShortcut(QKeySequence(entry.key))
@@ -134,7 +136,7 @@ class AppMenu(QMenu):
             self._looks[field, value] = action
 
 
-def _words(entry: Entry) -> str:
+def _words(entry: MenuEntry) -> str:
     return f"{entry.text}\t{entry.key_name}" if entry.key == "Return" else entry.text
 
 

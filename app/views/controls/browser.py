@@ -27,7 +27,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.views.controls.browser_rows import STAR, TITLE, Column, Row, RowList, listed_rows
+from app.views.controls.browser_rows import STAR, TITLE, BrowserColumn, BrowserRow, RowList, listed_rows
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button
 from app.views.controls.plain import Label
@@ -77,7 +77,7 @@ class Browser(QFrame):
         self,
         what: str,
         searched: str,
-        columns: Sequence[Column],
+        columns: Sequence[BrowserColumn],
         filters: Sequence[tuple[str, str]],
         orders: Sequence[str],
         plays: str,
@@ -97,7 +97,7 @@ class Browser(QFrame):
         self._filling = False
         self._rest = QTimer(self, interval=REST_MS, singleShot=True)
         self._rest.timeout.connect(self.play)
-        self._rows: Sequence[Row] = ()
+        self._rows: Sequence[BrowserRow] = ()
         self._favourites: Collection[str] = ()
         self.search = QLineEdit(placeholderText=f"Search {what}")
         self.search.setAccessibleName(f"Search {what}")
@@ -136,7 +136,7 @@ class Browser(QFrame):
             parent.installEventFilter(self)
         self.hide()
 
-    def _build_list(self, columns: Sequence[Column]) -> RowList:
+    def _build_list(self, columns: Sequence[BrowserColumn]) -> RowList:
         rows = RowList(columns)
         rows.setAccessibleName(self.what.capitalize())
         rows.setToolTip("Arrows load, Space plays, Enter closes")
@@ -181,7 +181,7 @@ class Browser(QFrame):
 
     # What is shown
 
-    def show_rows(self, rows: Sequence[Row], favourites: Collection[str], loaded: str, folder: str) -> None:
+    def show_rows(self, rows: Sequence[BrowserRow], favourites: Collection[str], loaded: str, folder: str) -> None:
         """Show all rows there are; which are favourites; which one is loaded; the user's own folder."""
         self._folder = folder
         self._filling = True
@@ -387,7 +387,7 @@ class Browser(QFrame):
             self._rest.start()
 
     def _current_changed(self, index: QModelIndex) -> None:
-        if not self._filling and index.isValid() and isinstance(line := self.list.line(index), Row):
+        if not self._filling and index.isValid() and isinstance(line := self.list.line(index), BrowserRow):
             self.load(line.name)
 
     def _click_row(self, index: QModelIndex) -> None:
@@ -401,7 +401,7 @@ class Browser(QFrame):
             self._start_rest()
 
     def _double_click_row(self, index: QModelIndex) -> None:
-        if index.column() != STAR and isinstance(self.list.line(index), Row):
+        if index.column() != STAR and isinstance(self.list.line(index), BrowserRow):
             self.dismiss()
 
     def page(self) -> int:

@@ -19,7 +19,7 @@ RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 @dataclass(frozen=True)
-class Row:
+class BrowserRow:
     """An entry, as it is listed.
 
     Attributes:
@@ -47,7 +47,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Column:
+class BrowserColumn:
     """A further column: its heading, a tooltip, and whether it is aligned to the right."""
 
     title: str
@@ -56,20 +56,20 @@ class Column:
 
 
 def listed_rows(
-    rows: Sequence[Row],
+    rows: Sequence[BrowserRow],
     favourites: Collection[str],
     words: Collection[str] = (),
     kinds: Sequence[object] = (),
     starred: bool = False,
     order: int = 0,
-) -> list[Row]:
+) -> list[BrowserRow]:
     """The rows that pass the filter: under each heading favourites first, then in the chosen order.
 
     Args:
         words: all of them must occur, in lower case.
         kinds: for each filter the wanted value, "" for any.
         starred: only favourites.
-        order: which of `Row.ranks`.
+        order: which of `BrowserRow.ranks`.
     """
     headings = list(dict.fromkeys(row.heading for row in rows))
     hits = [
@@ -85,7 +85,7 @@ def listed_rows(
 class RowList(QTreeWidget):
     """Rows under headings, which cannot be selected; the first column has a star."""
 
-    def __init__(self, columns: Sequence[Column]) -> None:
+    def __init__(self, columns: Sequence[BrowserColumn]) -> None:
         super().__init__()
         self.setIndentation(0)
         self.setItemsExpandable(False)
@@ -94,9 +94,9 @@ class RowList(QTreeWidget):
         self.setHeaderLabels(["", *(column.title for column in columns)])
         for place, column in enumerate(columns, TITLE):
             self.headerItem().setToolTip(place, column.tip)
-        self._lines: list[Row | str] = []  # a row, or a heading's text
+        self._lines: list[BrowserRow | str] = []  # a row, or a heading's text
 
-    def show_rows(self, rows: Sequence[Row], favourites: Collection[str]) -> None:
+    def show_rows(self, rows: Sequence[BrowserRow], favourites: Collection[str]) -> None:
         """List rows in their order, each heading before the first of its own."""
         self.clear()
         self._lines = []
@@ -120,14 +120,14 @@ class RowList(QTreeWidget):
                         item.setTextAlignment(place, RIGHT)
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[BrowserRow]:
         """The rows in the order that is shown, without the headings."""
-        return [line for line in self._lines if isinstance(line, Row)]
+        return [line for line in self._lines if isinstance(line, BrowserRow)]
 
-    def line(self, index: QModelIndex) -> Row | str:
+    def line(self, index: QModelIndex) -> BrowserRow | str:
         return self._lines[index.row()]
 
     def index_of(self, name: str) -> QModelIndex:
         """The index of a listed row's title; the invalid one for any other."""
-        names = [line.name if isinstance(line, Row) else "" for line in self._lines]
+        names = [line.name if isinstance(line, BrowserRow) else "" for line in self._lines]
         return self.model().index(names.index(name), TITLE) if name and name in names else QModelIndex()

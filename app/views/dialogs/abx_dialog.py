@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QVBoxLayout,
 
 from app.analysis.abx.record import AbxRecord, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
-from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound
+from app.analysis.abx.trials import AbxChoices, Identity, ListeningTest, Sound
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
@@ -73,7 +73,7 @@ class AbxDialog(QDialog):
         self._pair: Pair | None = None
         self._stimuli: Stimuli | None = None
         self._silence = RENDERING  # why there are no stimuli
-        self._run: Run | None = None
+        self._run: ListeningTest | None = None
         self._sounding: Sound | None = None
         self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
         self._record: AbxRecord | None = None
@@ -176,7 +176,7 @@ class AbxDialog(QDialog):
             return
         restarts = self._setup.restart.isChecked()
         self._through = {**_device_of(status), "volume_db": self._volume_db, "restart_at_switch": restarts}
-        self._run = Run(self._seed(), self._setup.trials.value())
+        self._run = ListeningTest(self._seed(), self._setup.trials.value())
         self._pages.setCurrentWidget(self._trial)
         self._trial.setFocus()
         self._begin_trial()

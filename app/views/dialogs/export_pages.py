@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
-from app.export.note import HeardNote, Note, NoteExport
+from app.export.note import ExportedPluck, HeardNote, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
 from app.export.plugin.formats import FORMATS, PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
@@ -492,7 +492,7 @@ def _note_words(subject: HeardNote, alone: bool) -> str:
     return subject.words if struck is None else f"Note: {struck.words}, held, with the present settings"
 
 
-def _through_words(note: Note, alone: bool, source: Chosen) -> str:
+def _through_words(note: ExportedPluck, alone: bool, source: Chosen) -> str:
     """The parts of an instrument that are in the file."""
     if note.struck is None:
         return "None: the string alone, as it is heard"

@@ -18,7 +18,7 @@ from app.presets.words import (
     string_word,
 )
 from app.views.controls.browser import Browser
-from app.views.controls.browser_rows import Column, Row
+from app.views.controls.browser_rows import BrowserColumn, BrowserRow
 from engine.plain_text import duration
 from engine.schema import SchemaError
 from training.cell import load
@@ -27,10 +27,10 @@ from training.heard_words import HEARD_TIP, heard_sentence, heard_word
 HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}
 STRINGS = {"linear": "Linear", "nonlinear": "With pitch glide"}
 COLUMNS = (
-    Column("Preset"),
-    Column("Rate", "Sample rate of the model", right=True),
-    Column("Error", "Relative mean absolute error of the model on validation data", right=True),
-    Column("Heard", HEARD_TIP),
+    BrowserColumn("Preset"),
+    BrowserColumn("Rate", "Sample rate of the model", right=True),
+    BrowserColumn("Error", "Relative mean absolute error of the model on validation data", right=True),
+    BrowserColumn("Heard", HEARD_TIP),
 )
 
 
@@ -49,7 +49,7 @@ def preset_browser(parent: QWidget | None = None) -> Browser:
     )
 
 
-def preset_row(entry: PresetEntry) -> Row:
+def preset_row(entry: PresetEntry) -> BrowserRow:
     """The row of a preset in the browser: studio presets before research ones; unknown errors come last."""
     info, test_result = entry.info, heard_word(entry.heard)
     model, rate = model_word(info.model), rate_word(info.rate_hz)
@@ -59,7 +59,7 @@ def preset_row(entry: PresetEntry) -> Row:
         *(initial_word(info.initial), rate, f"{info.rate_hz}", test_result),
     )
     distance_db = None if entry.heard is None else entry.heard.distance_db
-    return Row(
+    return BrowserRow(
         entry.name,
         entry.title,
         HEADINGS[entry.studio],

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.patches.library import PatchEntry
 from app.shared.key_names import note_name
 from app.views.controls.browser import Browser
-from app.views.controls.browser_rows import Column, Row
+from app.views.controls.browser_rows import BrowserColumn, BrowserRow
 
 MODES = {"guitar": "one MIDI channel per string", "mpe": "MPE"}
 
@@ -18,7 +18,7 @@ def patch_browser(parent: QWidget | None = None) -> Browser:
     return Browser(
         "instruments",
         "name, category, description, author",
-        (Column("Instrument"),),
+        (BrowserColumn("Instrument"),),
         (("Category", "All categories"), ("Bank", "Factory + User")),
         ("By category",),
         "Play a note",
@@ -29,11 +29,11 @@ def patch_browser(parent: QWidget | None = None) -> Browser:
     )
 
 
-def patch_row(entry: PatchEntry) -> Row:
+def patch_row(entry: PatchEntry) -> BrowserRow:
     """The row of a patch in the browser, under its category."""
     patch = entry.patch
     bank = ("user", "User") if entry.own else ("factory", "Factory")
-    return Row(
+    return BrowserRow(
         entry.name,
         f"{patch.name}{'   (own)' if entry.own else ''}",
         patch.category.upper(),

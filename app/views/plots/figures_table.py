@@ -29,7 +29,7 @@ NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260
 
 
 @dataclass(frozen=True)
-class Column:
+class FigureColumn:
     """A column: the field it shows, its heading, its tooltip, how a value is written, and whose colour it has."""
 
     field: str
@@ -39,7 +39,7 @@ class Column:
     source: str = ""  # a key of `theme.SOURCE_COLOURS`; "": no colour of its own
 
 
-def values_of(row: object, columns: Sequence[Column]) -> tuple[Value, ...]:
+def values_of(row: object, columns: Sequence[FigureColumn]) -> tuple[Value, ...]:
     """The values of a record in the order of the columns."""
     return tuple(getattr(row, column.field) for column in columns)
 
@@ -64,7 +64,7 @@ class FiguresTable(QTableWidget):
     row_deleted = Signal(object)  # by Delete
     escaped = Signal()
 
-    def __init__(self, name: str, columns: Sequence[Column], parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, columns: Sequence[FigureColumn], parent: QWidget | None = None) -> None:
         super().__init__(0, len(columns), parent)
         self.setAccessibleName(name)
         self._columns, self._dimmed = columns, False
@@ -174,7 +174,7 @@ class FiguresTable(QTableWidget):
 class _Cell(QTableWidgetItem):
     """A value of a row."""
 
-    def __init__(self, column: Column, row: TableRow, value: Value, dimmed: bool) -> None:
+    def __init__(self, column: FigureColumn, row: TableRow, value: Value, dimmed: bool) -> None:
         super().__init__("–" if value is None else column.text(value))
         self.row_shown, self._value = row, value
         self.setTextAlignment(_alignment(column))
@@ -200,7 +200,7 @@ class _OwnColours(QStyledItemDelegate):
         option.palette.setBrush(QPalette.ColorRole.HighlightedText, index.data(Qt.ItemDataRole.ForegroundRole))
 
 
-def _alignment(column: Column) -> Qt.AlignmentFlag:
+def _alignment(column: FigureColumn) -> Qt.AlignmentFlag:
     side = Qt.AlignmentFlag.AlignLeft if column.text is str else Qt.AlignmentFlag.AlignRight
     return side | Qt.AlignmentFlag.AlignVCenter
 

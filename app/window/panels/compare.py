@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QMenu, QToolButton
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets import words
 from app.presets.library import Library, PresetEntry
-from app.session.choices import PluckedString, Session
+from app.session.choices import Session, ShownString
 from app.session.slots import other_preset
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
+from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 SETTLED_S = 0.5  # a pluck that is still being moved is not computed
@@ -49,17 +49,17 @@ _TRAINED, _PAST = "over the trained time and the whole string", "from the end of
 _NULL = "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck"
 _SPEED = "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time"
 COLUMNS = (
-    Column("title", "Preset", "Double-click or Enter loads the preset"),
-    Column("mae", "MAE", f"Relative mean absolute error {_TRAINED}", percent),
-    Column("past_mae", "MAE past", f"Relative mean absolute error {_PAST}", percent),
-    Column("null_db", "Null, dB", _NULL, decibels),
-    Column("real_time", "Speed", _SPEED, times),
-    Column("parameters", "Parameters", "Trainable parameters", lambda n: f"{n:,}"),
-    Column("mse", "MSE", f"Relative mean squared error {_TRAINED}", scientific),
-    Column("past_mse", "MSE past", f"Relative mean squared error {_PAST}", scientific),
-    Column("rate_hz", "Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
-    Column("model", "Model", "Model architecture"),
-    Column("note", "Note", "Why there are no figures"),
+    FigureColumn("title", "Preset", "Double-click or Enter loads the preset"),
+    FigureColumn("mae", "MAE", f"Relative mean absolute error {_TRAINED}", percent),
+    FigureColumn("past_mae", "MAE past", f"Relative mean absolute error {_PAST}", percent),
+    FigureColumn("null_db", "Null, dB", _NULL, decibels),
+    FigureColumn("real_time", "Speed", _SPEED, times),
+    FigureColumn("parameters", "Parameters", "Trainable parameters", lambda n: f"{n:,}"),
+    FigureColumn("mse", "MSE", f"Relative mean squared error {_TRAINED}", scientific),
+    FigureColumn("past_mse", "MSE past", f"Relative mean squared error {_PAST}", scientific),
+    FigureColumn("rate_hz", "Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    FigureColumn("model", "Model", "Model architecture"),
+    FigureColumn("note", "Note", "Why there are no figures"),
 )
 
 
@@ -106,7 +106,7 @@ class ComparePanel(Panel):
         lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"preset", "seconds", "listen", *PluckedString.model_fields}:
+        if names & {"preset", "seconds", "listen", *ShownString.model_fields}:
             self._unchanged_s = 0.0
             if self._tried != self._wanted_key():
                 self._abandon()

@@ -10,7 +10,7 @@ from app.rendering import BlowTake, Take
 from app.session.choices import Session
 from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
+from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.compare.partials import LEAST_DECAY_DB
 
@@ -39,15 +39,19 @@ def hundredths(value: float) -> str:
 _OF_MODEL = "of the model relative to the truth"
 _NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
-    Column("mode", "Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
-    Column("truth_hz", "Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
-    Column("model_hz", "Model, Hz", "Frequency of the model in Hz", hertz, "model"),
-    Column("cents", "Cents", f"Frequency {_OF_MODEL}, in cents (hundredths of a semitone)", hundredths),
-    Column("level_db", "Level, dB", f"Level {_OF_MODEL}, in dB", hundredths),
-    Column("t60_error_percent", "T60, %", "Error of the model's decay time T60, in %", signed),
-    Column("truth_t60_s", "Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
-    Column("model_t60_s", "Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
-    Column("note", "Note", "Why a row is grey"),
+    FigureColumn("mode", "Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
+    FigureColumn("truth_hz", "Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    FigureColumn("model_hz", "Model, Hz", "Frequency of the model in Hz", hertz, "model"),
+    FigureColumn("cents", "Cents", f"Frequency {_OF_MODEL}, in cents (hundredths of a semitone)", hundredths),
+    FigureColumn("level_db", "Level, dB", f"Level {_OF_MODEL}, in dB", hundredths),
+    FigureColumn("t60_error_percent", "T60, %", "Error of the model's decay time T60, in %", signed),
+    FigureColumn(
+        "truth_t60_s", "Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"
+    ),
+    FigureColumn(
+        "model_t60_s", "Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"
+    ),
+    FigureColumn("note", "Note", "Why a row is grey"),
 )
 
 

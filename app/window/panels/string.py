@@ -13,7 +13,7 @@ from app.presets.library import Library
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
-from app.session.choices import Choices, PluckedString, Session
+from app.session.choices import Choices, Session, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
@@ -31,7 +31,7 @@ from engine.presets import PresetInfo, outside_training
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
-PLUCK_FIELDS = {"preset", *PluckedString.model_fields}
+PLUCK_FIELDS = {"preset", *ShownString.model_fields}
 WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.model_fields}
 
 

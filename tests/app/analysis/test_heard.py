@@ -9,7 +9,7 @@ import pytest
 
 from app.analysis.heard import HeardMotion, HeardSignal
 from app.rendering import Take
-from app.rendering.take import Motion, Signal
+from app.rendering.take import Pictures, Signal
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
@@ -57,7 +57,7 @@ def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Ta
     motion, signal = HeardMotion(take, "preset:other"), HeardSignal(take.listened, "preset:other")
     assert not motion.there
     assert not signal.there
-    take.motions["preset:other"] = Motion(1_000, 11, 0.5)
+    take.motions["preset:other"] = Pictures(1_000, 11, 0.5)
     take.listened.signals["preset:other"] = Signal(16_000, 1, 0.5)
     assert not motion.there
     assert not signal.there

@@ -7,7 +7,7 @@ import torch
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
 from app.rendering import Take
-from app.rendering.take import Motion
+from app.rendering.take import Pictures
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
@@ -62,7 +62,7 @@ def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None
 def test_the_difference_and_another_preset_move_too() -> None:
     """The difference with its gain; the other at its own rate and on its own grid, once there is something of it."""
     take = sine_take()
-    take.motions["preset:other"] = Motion(1_000, 11, 1.0)
+    take.motions["preset:other"] = Pictures(1_000, 11, 1.0)
     motions = [HeardMotion(take, DIFFERENCE, 10.0), HeardMotion(take, "preset:other")]
     assert set(frame_at(take, motions, 0.5, 1.0).shapes) == {DIFFERENCE}
     take.motions["preset:other"].append(

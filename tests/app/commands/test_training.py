@@ -29,7 +29,7 @@ from training.cli.sweep import Shown
 from training.cli.training import known_errors
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Progress
+from training.fitting.fit import FitProgress
 from training.heard_file import read_heard
 from training.heard_words import heard_sentence
 from training.results import Row, add_rows, read_results
@@ -292,8 +292,8 @@ def test_files_of_other_machines_are_merged(run: Run, tmp_path: Path, full_disk:
     assert here.read_bytes() == before
 
 
-def progress_of(seconds: float, seconds_left: float, validation: RelativeError | None = None) -> Progress:
-    return Progress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left)
+def progress_of(seconds: float, seconds_left: float, validation: RelativeError | None = None) -> FitProgress:
+    return FitProgress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left)
 
 
 def named(name: str) -> Any:

@@ -17,7 +17,7 @@ from app.export.files import (
     export_sound,
     export_sounds,
 )
-from app.export.recipe import Recipe
+from app.export.recipe import SoundRecipe
 from app.export.sound import SoundRequest, Voices, render_sound
 from app.export.wav import WavSettings
 from app.playing.ahead import AheadVoice
@@ -103,7 +103,7 @@ def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: Bit
     assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
     assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
     assert report.size_bytes == path.stat().st_size
-    assert recipe == json.loads(Recipe.of(request_, settings).model_dump_json())
+    assert recipe == json.loads(SoundRecipe.of(request_, settings).model_dump_json())
     assert recipe["preset_sha256"] == hashlib.sha256(request_.preset.path.read_bytes()).hexdigest()
     assert Pluck(**recipe["pluck"]) == request_.pluck
 

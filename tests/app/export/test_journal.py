@@ -13,7 +13,7 @@ from app.export.journal import Journal, left_journals
 from app.instrument.events import (
     KEYS,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -46,7 +46,7 @@ def drawn(draw: random.Random) -> Event:
             NoteOn(draw.randrange(128), draw.randrange(128), channel, place, string, pluck),
             NoteOff(draw.randrange(128), channel, string),
             Bend(draw.uniform(-1, 1), channel),
-            Controller(draw.randrange(128), draw.randrange(128), channel),
+            ControlChange(draw.randrange(128), draw.randrange(128), channel),
             PatchTurned(draw.choice([patch, turned, tuned])),
         ]
     )

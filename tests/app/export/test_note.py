@@ -11,7 +11,7 @@ import soundfile
 
 from app.export.choices import ExportChoices
 from app.export.files import export_sound
-from app.export.note import HeardNote, Note, NoteExport, musical_name
+from app.export.note import ExportedPluck, HeardNote, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
 from app.export.sound import SoundRequest, Through, render_sound
 from app.export.struck import Struck
@@ -32,8 +32,8 @@ GUITAR = read_patch(PATCHES / "classical_guitar.json")
 FIXED = ExportChoices(until_decayed=False, seconds=0.3, bits="32f", normalise=False)
 
 
-def a_note(**more: object) -> Note:
-    return Note(PRESET, 4_000, Pluck(0.35, 4.0), 0.37, **more)  # type: ignore[arg-type]
+def a_note(**more: object) -> ExportedPluck:
+    return ExportedPluck(PRESET, 4_000, Pluck(0.35, 4.0), 0.37, **more)  # type: ignore[arg-type]
 
 
 def of_an_earlier_version(source: str = "model") -> SoundRequest:
@@ -43,7 +43,7 @@ def of_an_earlier_version(source: str = "model") -> SoundRequest:
     return SoundRequest(load_preset(PRESET), Pluck(0.35, 4.0), 0.37, 0.3, source, through=through)  # type: ignore[arg-type]
 
 
-def write(note: Note, path: Path, choices: ExportChoices = FIXED, source: str = "model") -> np.ndarray:
+def write(note: ExportedPluck, path: Path, choices: ExportChoices = FIXED, source: str = "model") -> np.ndarray:
     NoteExport(note, {source: path}, choices).run(lambda *_: None)  # type: ignore[dict-item]
     return soundfile.read(path, dtype="float32", always_2d=True)[0]
 
@@ -159,7 +159,7 @@ def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) 
     assert electric.amp.drive_db > 0
     event = NoteOn(52, 100)
     preset = SHIPPED / "studio_any_string.safetensors"
-    note = Note(preset, 48_000, Pluck(), 0.1, struck=Struck(electric, event))
+    note = ExportedPluck(preset, 48_000, Pluck(), 0.1, struck=Struck(electric, event))
     found = write(note, tmp_path / "a.wav", source="difference")
     dry = {
         source: np.concatenate(

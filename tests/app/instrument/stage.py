@@ -18,7 +18,7 @@ from engine.kernels import constants as of
 from engine.kernels.constants import QUANTUM
 from engine.presets import Preset
 from engine.voices import Mixer
-from engine.voices.player import Report
+from engine.voices.player import NoteReport
 from tests.app.instrument.conftest import STEEL
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
@@ -102,7 +102,7 @@ class Stage:
         self.player = InstrumentPlayer(patch, preset, RATE_HZ, gains, most_notes=most, varied=varied)
         self.mixer.set_player(self.player.compiled)
         self.struck: list[Note] = []
-        self.reports: list[Report] = []
+        self.reports: list[NoteReport] = []
 
     def play(self, *events: Event) -> list[Note]:
         """Events, each taken up at once; return all notes that were struck."""
@@ -134,7 +134,7 @@ class Stage:
         return self.mixer.render(frames)[:, 0].astype(np.float64)
 
     @property
-    def begun(self) -> list[Report]:
+    def begun(self) -> list[NoteReport]:
         """What began, in order."""
         self.reports += self.player.reports()
         return [each for each in self.reports if each.kind == of.BEGAN]

@@ -12,7 +12,7 @@ from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import body_digest, body_names, body_titles, install_body, own_bodies, own_impulse
 from app.instrument.effects import body_curves, body_problem, effects_of
 from app.instrument.offline import render_note
-from app.patches.patch import Body, Patch
+from app.patches.patch import BodyChoice, Patch
 from engine.effects import BODIES
 from engine.presets import Preset
 from tests.app.instrument.stage import RATE_HZ
@@ -35,7 +35,7 @@ def late(path: Path, frames: int = LATE_FRAMES) -> Path:
 
 
 def on(patch: Patch, name: str, mix: float = 1.0) -> Patch:
-    return patch.model_copy(update={"body": Body(name=name, mix=mix)})
+    return patch.model_copy(update={"body": BodyChoice(name=name, mix=mix)})
 
 
 def test_a_file_becomes_a_body_whole_and_by_a_safe_name(tmp_path: Path) -> None:

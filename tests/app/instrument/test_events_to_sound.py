@@ -39,7 +39,7 @@ from app.instrument.events import (
     VALUE,
     VOLUME,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -132,7 +132,7 @@ def events_of(text: str, patch: Patch) -> list[Timed]:
         case "another":
             found = [PatchTurned(changed(patch, name="another", damping={"release_t60_s": 0.2}))]
         case _:
-            found = [Controller(CONTROLS[word], first, channel)]
+            found = [ControlChange(CONTROLS[word], first, channel)]
     return [(float(time), event) for event in found]
 
 
@@ -533,7 +533,7 @@ def test_a_short_key_of_a_chord_is_as_short_when_its_turn_comes(patch: Patch, pr
 def test_one_key_on_two_strings_is_two_courses(guitar: Patch, preset: Preset) -> None:
     """Legato moves the course of the string that is given, and a release ends that alone."""
     stage = Stage(changed(guitar, course=Course(strings=2)), preset)
-    events = [(0, Controller(LEGATO, 127)), *((64 * n, NoteOn(59, 60, string=n)) for n in (1, 2))]
+    events = [(0, ControlChange(LEGATO, 127)), *((64 * n, NoteOn(59, 60, string=n)) for n in (1, 2))]
     stage.run([*events, (960, NoteOn(61, 60, string=1))], 1_920)
     assert sorted(note.key for note in seen(stage.player)) == [59, 59, 61, 61]
     stage.run([(0, NoteOff(59, string=2))], 640)

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from app.instrument import events
-from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import KEYS, Bend, ControlChange, Event, NoteOff, NoteOn, PatchTurned
 from app.patches.library import read_patch
 from app.patches.patch import Patch, Pickup
 from engine.kernels.constants import QUANTUM
@@ -87,9 +87,9 @@ def drawn(patch: Patch, other: Patch, seed: int, seconds: float, count: int = 60
         elif kind < 0.97:
             number = int(draw.choice(CONTROLLERS))
             chooses = number in (events.REGISTERED, events.FINE_REGISTERED)
-            found.append((frame, Controller(number, 0 if chooses else value, channel)))
+            found.append((frame, ControlChange(number, 0 if chooses else value, channel)))
         elif kind < 0.98:
-            found.append((frame, Controller(events.SOUND_OFF, 0, channel)))
+            found.append((frame, ControlChange(events.SOUND_OFF, 0, channel)))
         else:
             name = str(draw.choice(KNOBS))
             turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
@@ -106,7 +106,7 @@ def released_once(played: list[tuple[int, Event]]) -> list[tuple[int, Event]]:
             strokes[event.key, event.channel] += 1
         elif isinstance(event, NoteOff):
             found += [(frame, event)] * (strokes.pop((event.key, event.channel), 1) - 1)
-        elif isinstance(event, Controller) and event.number == events.RESET:
+        elif isinstance(event, ControlChange) and event.number == events.RESET:
             event = replace(event, value=events.AT_REST)
         found.append((frame, event))
     return found
@@ -171,7 +171,7 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[s
         elif number % 3 == 0:
             burst.append((frame, Bend(float(draw.uniform(-1, 1)))))
         else:
-            burst.append((frame, Controller(int(draw.choice([events.MOD_WHEEL, events.SUSTAIN])), number % 128)))
+            burst.append((frame, ControlChange(int(draw.choice([events.MOD_WHEEL, events.SUSTAIN])), number % 128)))
     assert compared("burst", patch, preset, released_once(burst), 100) < CLOSE
 
 

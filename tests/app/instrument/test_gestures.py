@@ -17,7 +17,7 @@ from app.instrument.events import (
     PORTAMENTO,
     SLIDE_TIME,
     SOFT,
-    Controller,
+    ControlChange,
     NoteOff,
     NoteOn,
     TimedEvent,
@@ -25,7 +25,7 @@ from app.instrument.events import (
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
 from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Body, Course, Fretted, Noise, Patch, Pickup
+from app.patches.patch import BodyChoice, Course, Fretted, Noise, Patch, Pickup
 from engine.excitation import blow_factor
 from engine.kernels import constants as of
 from engine.kernels.constants import PART_S, QUANTUM, REFERENCE_VELOCITY, WANTED_DB
@@ -129,7 +129,9 @@ def test_a_key_is_as_loud_on_every_string_of_a_guitar(guitar: Patch, preset: Pre
 @pytest.mark.parametrize(("name", "key"), [("test", 45), ("classical_guitar", 40)])
 def test_a_tremolo_keeps_its_level(patch: Patch, preset: Preset, name: str, key: int, source: str) -> None:
     """16 plucks a second of a string that rings on: within ±1 dB; added to the motion they climb and wobble."""
-    plucked = changed(patch if name == "test" else read_patch(SHIPPED / f"{name}.json"), body=Body(), room=Room())
+    plucked = changed(
+        patch if name == "test" else read_patch(SHIPPED / f"{name}.json"), body=BodyChoice(), room=Room()
+    )
     strokes = [(number / 16, NoteOn(key, 90)) for number in range(16)]
     spreads = []
     for each in (plucked, changed(plucked, pluck={"stops": False})):
@@ -239,7 +241,7 @@ def test_during_the_touch_partials_decay_as_the_finger_damps_them(patch: Patch, 
 
 @SOURCES
 def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(patch: Patch, preset: Preset, source: str) -> None:
-    soft, pressed = (0.0, NoteOn(KEY, 10)), (0.0, Controller(SOFT, 64))
+    soft, pressed = (0.0, NoteOn(KEY, 10)), (0.0, ControlChange(SOFT, 64))
     plain, muted = (play(patch, preset, 0.6, *each, source=source) for each in ((soft,), (pressed, soft)))
     for number in (1, 2, 4):
         turn = 2 * math.pi * number * MUTED_M / LENGTH_M
@@ -255,7 +257,7 @@ def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(patch: Patch, preset
 @pytest.mark.parametrize("bend_by", ["tension", "length"])
 def test_vibrato_is_as_wide_and_as_quick_as_it_says(patch: Patch, preset: Preset, bend_by: str, source: str) -> None:
     wheeled = changed(patch, mod_wheel="technique.vibrato_cents", bend_by=bend_by)
-    sound = play(wheeled, preset, 2.0, (0.0, Controller(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 20)), source=source)
+    sound = play(wheeled, preset, 2.0, (0.0, ControlChange(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 20)), source=source)
     near = scipy.signal.butter(2, [0.7 * hz_of(KEY), 1.4 * hz_of(KEY)], "bandpass", fs=RATE_HZ, output="sos")
     phase = np.unwrap(np.angle(scipy.signal.hilbert(scipy.signal.sosfiltfilt(near, sound))))
     slow = scipy.signal.butter(2, 30, fs=RATE_HZ, output="sos")
@@ -270,7 +272,7 @@ def test_a_slide_squeaks_at_the_windings_that_pass(patch: Patch, preset: Preset)
     found = []
     for heavier, time in ((1.0, 80), (5.0, 80), (5.0, 100)):
         slid = [
-            (0.0, Controller(number, value))
+            (0.0, ControlChange(number, value))
             for number, value in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, time))
         ]
         slid += [(0.0, NoteOn(KEY, 60)), (0.3, NoteOn(KEY + 7, 60))]

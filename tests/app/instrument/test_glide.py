@@ -9,7 +9,7 @@ from app.instrument.events import NoteOn
 from app.instrument.glide import START_S, glides_cents
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
-from app.patches.patch import Body, Patch
+from app.patches.patch import BodyChoice, Patch
 from app.patches.tuning import TuningChoice
 from engine.presets import Preset
 from engine.values.effects import Amp, Room
@@ -24,7 +24,7 @@ from tests.app.instrument.stage import cents, pitch_hz, play
 def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, source: str, preset: Preset) -> None:
     """Of the string alone. Keys high enough for many periods in START_S: partials of a lower one overlap."""
     patch = find_patch(name).patch.with_values({"noise.onset_db": -60.0})
-    patch = patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
+    patch = patch.model_copy(update={"amp": Amp(), "body": BodyChoice(), "room": Room()})
     string = Strings(patch).of_key(key)
     assert string is not None
     wanted = glides_cents(patch)[key, velocity]

@@ -17,7 +17,7 @@ import pytest
 from app.instrument.events import (
     KEYS,
     Bend,
-    Controller,
+    ControlChange,
     Event,
     NoteOff,
     NoteOn,
@@ -27,7 +27,7 @@ from app.instrument.events import (
     channels_in,
     release_all,
 )
-from app.instrument.midi_file import MidiFileError, Song, event_of, midi_bytes, read_midi, read_song
+from app.instrument.midi_file import MidiFileError, SongPart, event_of, midi_bytes, read_midi, read_song
 from app.instrument.midi_messages import NotMidi, read_messages
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
@@ -220,7 +220,7 @@ def test_values_above_127_cost_no_more_than_their_message() -> None:
 PLAYED = [
     TimedEvent(0.0, NoteOn(60, 90, 2)),
     TimedEvent(0.25, Bend(-0.5, 2)),
-    TimedEvent(0.5, Controller(64, 127, 2)),
+    TimedEvent(0.5, ControlChange(64, 127, 2)),
     TimedEvent(0.75, Bend(1.0, 2)),
     TimedEvent(1.5, NoteOff(60, 2)),
 ]
@@ -255,7 +255,10 @@ def test_what_is_written_is_read_again_also_by_another_program(file: Path, patch
         (mido.Message("pitchwheel", pitch=-8192), Bend(-1.0)),
         (mido.Message("pitchwheel", pitch=8191), Bend(1.0)),
         (mido.Message("note_on", note=3, velocity=0, channel=4), NoteOff(3, 4)),
-        (mido.Message("control_change", control=121, value=127), Controller(121, 0)),  # others are the program's own
+        (
+            mido.Message("control_change", control=121, value=127),
+            ControlChange(121, 0),
+        ),  # others are the program's own
     ],
 )
 def test_messages_are_events_or_nothing(message: mido.Message, event: Event | None) -> None:
@@ -301,13 +304,16 @@ def test_a_recording_lets_go_of_its_channels(file: Path) -> None:
     let_go = [TimedEvent(0.3, event) for event in release_all([1])]
     file.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(50, 90, 1)), *OWN_RANGE, *let_go], NARROW))
     found = [each.event for each in read_midi(file)]
-    assert found[-8:] == [Controller(121, 0, 1), *bend_range(2, 1), Controller(7, 100, 1), Controller(123, 0, 1)][-8:]
+    assert (
+        found[-8:]
+        == [ControlChange(121, 0, 1), *bend_range(2, 1), ControlChange(7, 100, 1), ControlChange(123, 0, 1)][-8:]
+    )
 
 
 # Songs
 
 
-def notes_of(song: Song) -> list[tuple[int, int]]:
+def notes_of(song: SongPart) -> list[tuple[int, int]]:
     return [(each.event.key, each.event.channel) for each in song.events if isinstance(each.event, NoteOn)]
 
 
@@ -344,7 +350,7 @@ def test_a_song_is_its_notes_and_what_is_left_out(
     """Each note has a pedal of its channel beside it, which goes where it goes."""
     timed: list[TimedEvent] = []
     for place, (key, channel) in enumerate(notes):
-        timed += [TimedEvent(0.5 * place, each) for each in (NoteOn(key, 90, channel), Controller(64, 9, channel))]
+        timed += [TimedEvent(0.5 * place, each) for each in (NoteOn(key, 90, channel), ControlChange(64, 9, channel))]
     file.write_bytes(midi_bytes(timed))
     found = read_song(file, patch)
     assert (notes_of(found), found.left_out) == (kept, left_out)
@@ -372,8 +378,8 @@ def test_what_a_song_is_played_without_is_reported_once(file: Path, raw: bytes, 
 
 
 def test_controllers_long_after_the_last_note_are_no_music(file: Path) -> None:
-    timed = [TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.5, NoteOff(50)), TimedEvent(1.0, Controller(64, 0))]
-    file.write_bytes(midi_bytes([*timed, TimedEvent(600.0, Controller(64, 0)), TimedEvent(5_000.0, Bend(0.0))]))
+    timed = [TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.5, NoteOff(50)), TimedEvent(1.0, ControlChange(64, 0))]
+    file.write_bytes(midi_bytes([*timed, TimedEvent(600.0, ControlChange(64, 0)), TimedEvent(5_000.0, Bend(0.0))]))
     assert [each.time_s for each in read_midi(file)] == [0.0, 0.5, 1.0]
     assert read_song(file, None).length_s == 0.5
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.instrument.events import KEYS, LEGATO, SOUND_OFF, SUSTAIN, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, LEGATO, SOUND_OFF, SUSTAIN, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import Fretted, Noise, Patch
@@ -118,7 +118,7 @@ def test_what_lands_on_a_string_is_as_loud_as_its_motion(patch: Patch, preset: P
         found[velocity, time_s] = tick_db(patch, preset, kind, (0.0, NoteOn(KEY, velocity)), (time_s, NoteOff(KEY)))
         expected = held_db(patch, preset, velocity, time_s) - held_db(patch, preset, 127, 0.1)
         assert found[velocity, time_s] - found[127, 0.1] == pytest.approx(expected, abs=2.0)
-    down, up = (0.0, Controller(SUSTAIN, 127)), (1.0, Controller(SUSTAIN, 0))
+    down, up = (0.0, ControlChange(SUSTAIN, 127)), (1.0, ControlChange(SUSTAIN, 0))
     kept = tick_db(patch, preset, kind, down, (0.0, NoteOn(KEY, 127)), (0.1, NoteOff(KEY)), up)
     assert kept == pytest.approx(found[127, 1.0], abs=0.5)
 
@@ -138,7 +138,7 @@ def test_what_lands_on_a_string_at_rest_is_hardly_heard(patch: Patch, preset: Pr
 
 
 def test_a_finger_that_moves_along_a_string_lands_on_its_motion(patch: Patch, preset: Preset) -> None:
-    legato, found = (0.0, Controller(LEGATO, 127)), []
+    legato, found = (0.0, ControlChange(LEGATO, 127)), []
     for velocity in (30, 110):
         moved = (0.0, NoteOn(KEY, velocity)), (0.2, NoteOn(KEY + 2, velocity))
         found.append(tick_db(patch, preset, "finger", legato, *moved))
@@ -174,7 +174,7 @@ def test_strings_that_are_let_ring_have_no_noise_of_release(patch: Patch, preset
 
 
 def test_a_stop_silences_noise(patch: Patch, preset: Preset) -> None:
-    stop = (0.002, Controller(SOUND_OFF, 0, KEYS))
+    stop = (0.002, ControlChange(SOUND_OFF, 0, KEYS))
     noise = noise_of(patch, preset, ON, stop, seconds=0.2, kind="hammer", onset_db=6.0)
     assert np.abs(noise[:400]).max() > 0.01 and not noise[round(0.04 * RATE_HZ) :].any()
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.events import HARMONICS, MOD_WHEEL, SLIDE, Controller, Event, NoteOn, PatchTurned
+from app.instrument.events import HARMONICS, MOD_WHEEL, SLIDE, ControlChange, Event, NoteOn, PatchTurned
 from app.instrument.strings import KNOBS
 from app.instrument.table import wheeled
 from app.patches.drums import Drums
@@ -25,7 +25,7 @@ from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.strike import Strike
 from engine.values.ear import Ear
-from engine.voices.player import Report
+from engine.voices.player import NoteReport
 from tests.app.instrument.stage import RATE_HZ, Stage, changed
 
 STROKES = 40
@@ -90,7 +90,7 @@ def test_no_knob_makes_a_string_or_a_blow_impossible(patch: Patch) -> None:
         assert strings.possible(found), (knobs, found)
 
 
-def plucks(stage: Stage, *events: Event) -> list[Report]:
+def plucks(stage: Stage, *events: Event) -> list[NoteReport]:
     """What the notes of events began with, each note with a quantum of its own."""
     before = len(stage.begun)
     for event in events:
@@ -124,7 +124,7 @@ def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset, m
     for field in random.Random(1).sample(fields, 6):
         stage = Stage(changed(extreme, pluck={"variation": 1.0}, mod_wheel=field, mode=mode), preset)
         for value in (0, 127, 128):
-            switches = [Controller(number, value) for number in (MOD_WHEEL, SLIDE, HARMONICS)]
+            switches = [ControlChange(number, value) for number in (MOD_WHEEL, SLIDE, HARMONICS)]
             assert len({each.id for each in plucks(stage, *switches, *scattered(8))}) == 8
         found = {each.id: each for each in plucks(stage, *(NoteOn(50, 90, pluck=pluck) for pluck in wild))}
         assert [(each.position, each.width) for each in found.values()] == [(p.position, p.width) for p in wild]

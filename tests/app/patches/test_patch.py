@@ -11,7 +11,17 @@ import pytest
 from pydantic import ValidationError
 
 from app.patches.library import SHIPPED, find_patch, list_patches
-from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target, Technique
+from app.patches.patch import (
+    ASSIGNABLE,
+    Macro,
+    MacroTarget,
+    OpenString,
+    Patch,
+    Pickup,
+    PluckChoices,
+    StringSet,
+    Technique,
+)
 from app.shared.parameters import OF_PATCHES
 from engine.schema import explained
 from tests.app.patches.conftest import STRING
@@ -65,7 +75,9 @@ def test_impossible_values_are_refused_by_name(make_patch: Make, field: str, cha
 
 def test_a_patch_survives_json(make_patch: Make) -> None:
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
-    whole = make_patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])
+    whole = make_patch(
+        strings=strings, macros=[Macro(name="m", targets=(MacroTarget(field="level_db", low=-3, high=3),))]
+    )
     assert Patch.model_validate_json(whole.model_dump_json()) == whole
 
 
@@ -155,7 +167,10 @@ def test_a_string_or_drum_is_given_whole(make_patch: Make) -> None:
 
 
 def test_a_macro_writes_its_targets(make_patch: Make) -> None:
-    targets = (Target(field="knobs.decay", low=0.5, high=2.5), Target(field="pluck.position", low=0.4, high=0.1))
+    targets = (
+        MacroTarget(field="knobs.decay", low=0.5, high=2.5),
+        MacroTarget(field="pluck.position", low=0.4, high=0.1),
+    )
     first = make_patch(macros=(Macro(name="age", targets=targets),))
     turned = first.turned(0, 0.25)
     assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)

@@ -14,7 +14,7 @@ import pytest
 from app.instrument.events import PluckAt
 from app.patches.instrument import SingleString
 from app.playing.keyboard import PluckRange
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
@@ -102,7 +102,7 @@ class Lab:
         alone: bool = False,
         begin_frame: int = 0,
         **options: Any,
-    ) -> Note:
+    ) -> PluckVoices:
         """Chooses a pluck and plays it: as an event, or from some time or frame on."""
         request = plucked if isinstance(plucked, RenderRequest) else self.pluck_of(plucked, **options)
         self.notes.choose(request)

@@ -27,7 +27,7 @@ from app.instrument.events import (
     SUSTAIN,
     TREMOLO,
     Bend,
-    Controller,
+    ControlChange,
     NoteOff,
     NoteOn,
     PatchTurned,
@@ -35,7 +35,7 @@ from app.instrument.events import (
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Patch
+from app.patches.patch import BodyChoice, Patch
 from app.playing import recorder
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
@@ -55,7 +55,7 @@ EAR = Ear((0.3,))
 FRAME_DRUM, HARP = (read_patch(PATCHES / f"{name}.json") for name in ("frame_drum", "concert_harp"))
 SHIPPED = read_patch(PATCHES / "steel_string_acoustic.json")
 PATCH = SHIPPED.model_copy(  # its other strings stay silent, so that silence can be heard
-    update={"body": Body(), "sympathy_s_kg": 0.0, "pluck": SHIPPED.pluck.model_copy(update={"variation": 0.0})}
+    update={"body": BodyChoice(), "sympathy_s_kg": 0.0, "pluck": SHIPPED.pluck.model_copy(update={"variation": 0.0})}
 )
 
 
@@ -136,7 +136,7 @@ def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(played: Play
 
 def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(played: Played) -> None:
     for number, value in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, 64)):
-        played.handle(Controller(number, value))
+        played.handle(ControlChange(number, value))
     played.handle(NoteOn(43, 100))  # the third fret of the lowest string
     played.hear(4_800)
     (struck,) = played.keys.sounding_notes()
@@ -309,19 +309,19 @@ def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(
     played: Played, pedal: bool, loaded: bool
 ) -> None:
     held = played.strike(NoteOn(45, 60))
-    for event in (Controller(SUSTAIN, 127), NoteOff(45)) if pedal else ():
+    for event in (ControlChange(SUSTAIN, 127), NoteOff(45)) if pedal else ():
         played.handle(event)
     assert not played.now(held).damped
     played.notes.set_instrument(FRAME_DRUM, EAR)
     if loaded:
         played.choose(FRAME_DRUM)
-    played.handle(Controller(SUSTAIN, 0) if pedal else NoteOff(45))
+    played.handle(ControlChange(SUSTAIN, 0) if pedal else NoteOff(45))
     assert played.now(held).damped
 
 
 def test_switches_hold_for_another_instruments_player_too(played: Played) -> None:
-    switches = [Controller(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
-    for event in (*switches, Controller(STRUM, 127), Controller(RESET, 0)):
+    switches = [ControlChange(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
+    for event in (*switches, ControlChange(STRUM, 127), ControlChange(RESET, 0)):
         played.handle(event)
     for other in (FRAME_DRUM, PATCH):
         played.choose(other)
@@ -332,7 +332,7 @@ def test_switches_hold_for_another_instruments_player_too(played: Played) -> Non
 # Body and room
 
 
-WOODEN = PATCH.model_copy(update={"body": Body(name="guitar", mix=0.4)})
+WOODEN = PATCH.model_copy(update={"body": BodyChoice(name="guitar", mix=0.4)})
 
 
 def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are_compared(played: Played) -> None:
@@ -355,7 +355,7 @@ def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are
 def test_the_modulation_wheel_brings_the_room(played: Played) -> None:
     played.choose(WOODEN.model_copy(update={"mod_wheel": "room.mix"}))
     for value, mix in ((127, 1.0), (0, PATCH.room.mix)):
-        played.handle(Controller(MOD_WHEEL, value))
+        played.handle(ControlChange(MOD_WHEEL, value))
         played.settle()
         effects = played.effects[-1]
         assert effects is not None
@@ -365,7 +365,7 @@ def test_the_modulation_wheel_brings_the_room(played: Played) -> None:
 def test_a_body_that_is_not_here_is_reported_once_however_its_knobs_are_turned(played: Played) -> None:
     del played.effects[:]
     for mix in (0.2, 0.3, 0.4):
-        played.choose(PATCH.model_copy(update={"body": Body(name="a cello", mix=mix)}))
+        played.choose(PATCH.model_copy(update={"body": BodyChoice(name="a cello", mix=mix)}))
     (reported,) = played.reported
     assert "is played without its body: the body a cello is not here" in reported
     assert all(effects is None or effects.body is None for effects in played.effects)
@@ -389,7 +389,7 @@ def test_with_another_device_keys_go_out_and_new_ones_sound_alone(
     played: Played, rate_hz: int, channels: int
 ) -> None:
     made = played.strike(NoteOn(45, 127))
-    played.handle(Controller(SUSTAIN, 127))
+    played.handle(ControlChange(SUSTAIN, 127))
     played.hear(4_800)
     played.sound.mixer = Mixer(rate_hz, channels)
     played.notes.poll()
@@ -421,7 +421,7 @@ def test_notes_end_though_their_reports_were_missed(played: Played) -> None:
 
 def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> None:
     """As if each had come at its time; the first of them when all have been handed over."""
-    off, begin = Controller(SOUND_OFF, 0), 1_024
+    off, begin = ControlChange(SOUND_OFF, 0), 1_024
     events = (NoteOn(45, 90), Bend(0.5), Bend(1.0), NoteOff(45), NoteOn(45, 60), off)
     frames = (0, 4_800, 9_600, 14_400, 17_280, 24_000)
     for frame, event in zip(frames, events, strict=True):
@@ -490,14 +490,20 @@ def test_what_is_played_is_recorded_from_its_first_note_on(played: Played) -> No
 
 def test_a_recording_begins_and_ends_as_the_hands_are(played: Played) -> None:
     """With the pedal down and a wheel moved; and no key of it is down for ever."""
-    for event in (Controller(SUSTAIN, 127), Bend(0.5), Controller(101, 0), Controller(100, 0), Controller(6, 12)):
+    for event in (
+        ControlChange(SUSTAIN, 127),
+        Bend(0.5),
+        ControlChange(101, 0),
+        ControlChange(100, 0),
+        ControlChange(6, 12),
+    ):
         played.handle(event)
     played.strike(NoteOn(50, 60))
     played.keys.begin_recording()
     for event in (NoteOn(45, 60), NoteOff(45), NoteOn(52, 60)):
         played.handle(event)
     events, heard, mixer = played.recorded(), played.player, Mixer(48_000)
-    assert events[-2:] == [Controller(SUSTAIN, 0), NoteOff(52)]
+    assert events[-2:] == [ControlChange(SUSTAIN, 0), NoteOff(52)]
     again = InstrumentPlayer(heard.patch, heard.preset, 48_000, {"model": 1.0, "truth": 0.0}, heard.ear)
     for event in events[:-2]:
         again.handle(event)
@@ -540,7 +546,7 @@ def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Played, clock:
     soon = Due(played.sound.mixer, played.sound.mixer.frames + 2_000, clock.now_s + 0.04)
     later = [played.strike(NoteOn(key, 127), soon) for key in (45, 50)]
     played.notes.cancel()
-    played.handle(Controller(NOTES_OFF, 0))
+    played.handle(ControlChange(NOTES_OFF, 0))
     played.hear(2_000)
     assert all(each.over and each.began_frame == 0 for each in later)
     assert played.now(ringing).damped and not ringing.over

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, release_all
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, release_all
 from app.instrument.midi_file import event_of
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
@@ -44,7 +44,7 @@ def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_pa
         pytest.skip("JACK does not start here")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
-    came = [NoteOn(60, 100, 2), Bend(-1.0), Controller(64, 127), NoteOff(60, 2)]
+    came = [NoteOn(60, 100, 2), Bend(-1.0), ControlChange(64, 127), NoteOff(60, 2)]
     assert found["came"] == [repr(each) for each in came]
     assert found["closed"] == 20 and found["streamed"]
     gone, back = [each for each in found["looks"] if each]
@@ -245,7 +245,7 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
         choices = choices.learned(field, number)
     for number, field in enumerate(learned, 16):
         for value, expected in zip((0, 127), OF_CHOICES[field].limits, strict=True):
-            turns = turns_of(Controller(number, value), choices, None)
+            turns = turns_of(ControlChange(number, value), choices, None)
             assert turns == {field: pytest.approx(expected)}
             Choices(**turns)  # allowed to the last bit
     assert OF_CHOICES["speed"].value(64 / 127) == pytest.approx(0.001**0.5, rel=0.05)
@@ -255,9 +255,9 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
 def test_a_controller_turns_every_parameter_of_the_patch(field: str) -> None:
     patch = GUITAR.model_copy(update={"pickup": Pickup(points=(0.3, 0.7))})
     patch = patch.with_value("pluck.softest_mm", 0.001)  # which may not be above the hardest
-    turns = turns_of(Controller(16, 64), MidiChoices().learned(field, 16), patch)
+    turns = turns_of(ControlChange(16, 64), MidiChoices().learned(field, 16), patch)
     assert turns["patch"].value(field) == pytest.approx(OF_PATCHES[field].value(64 / 127))
-    assert turns_of(Controller(16, 64), MidiChoices().learned(field, 16), None) == {}
+    assert turns_of(ControlChange(16, 64), MidiChoices().learned(field, 16), None) == {}
 
 
 def test_a_controller_turns_a_macro_and_leaves_what_is_impossible() -> None:
@@ -267,7 +267,7 @@ def test_a_controller_turns_a_macro_and_leaves_what_is_impossible() -> None:
         ("macros.7", GUITAR, GUITAR),  # it has fewer
         ("pluck.softest_mm", soft, soft),  # it may not be above the hardest
     ):
-        assert turns_of(Controller(16, 127), MidiChoices().learned(field, 16), patch)["patch"] == expected
+        assert turns_of(ControlChange(16, 127), MidiChoices().learned(field, 16), patch)["patch"] == expected
 
 
 def test_learn_and_forget() -> None:

@@ -27,7 +27,7 @@ from app.playing.dropping import DROPPED
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
@@ -44,7 +44,7 @@ RATE_HZ = 48_000
 QUANTUM_S = QUANTUM / RATE_HZ
 
 
-def gains(note: Note) -> dict[str, float]:
+def gains(note: PluckVoices) -> dict[str, float]:
     """With which its voices sound, or fade to."""
     return {source: float(voice.record["wanted_gain"]) for source, voice in note.voices.items()}
 
@@ -143,7 +143,7 @@ def test_a_seek_begins_in_the_middle_alone(lab: Lab, which: str, request: Any) -
 
 
 def test_strikes_come_from_many_threads(lab: Lab) -> None:
-    struck: list[Note] = []
+    struck: list[PluckVoices] = []
     plucks = [lab.pluck_of(position=0.3 + 0.02 * number) for number in range(12)]
     threads = [threading.Thread(target=lambda pluck=pluck: struck.append(lab.strike(pluck))) for pluck in plucks]
     for thread in threads:
@@ -438,7 +438,7 @@ def test_keys_of_a_single_string_are_places_along_it_and_ring(lab: Lab) -> None:
     """As a pluck by hand at that place, which stays where it is; no release damps it."""
     reach, by_hand = lab.play_string(), Pluck(0.44, 3.0)
     struck = (NoteOn(LOWEST_PLACE, 64), NoteOn(HIGHEST_PLACE, 64), NoteOn(60, 90, pluck=by_hand))
-    plucks = [note.request.pluck for event in struck if isinstance(note := lab.notes.handle(event), Note)]
+    plucks = [note.request.pluck for event in struck if isinstance(note := lab.notes.handle(event), PluckVoices)]
     assert [pluck.position for pluck in plucks[:2]] == list(reach.position) and plucks[2] == by_hand
     assert {pluck.amplitude_mm for pluck in plucks[:2]} == {reach.amplitude_of(64)}
     assert lab.notes.handle(NoteOff(LOWEST_PLACE)) is lab.notes.handle(NoteOn(LOWEST_PLACE, 0)) is None
@@ -517,7 +517,7 @@ def test_a_key_that_fails_costs_its_own_note(lab: Lab, monkeypatch: Any, kind: t
     [
         (Voice, "set_gain", lambda notes: notes.set_monitor(hears("truth"))),
         (Voice, "listen", lambda notes: (notes.listen(Ear((0.2,))), notes.poll())),
-        (Note, "release", lambda notes: notes.stop()),
+        (PluckVoices, "release", lambda notes: notes.stop()),
     ],
 )
 def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
@@ -554,7 +554,7 @@ PLUCK = RenderRequest(Path("a"), Pluck(), 2.0, Ear((0.4,)), others=(Path("b.safe
 
 
 def test_a_source_belongs_to_its_preset() -> None:
-    note = Note(PLUCK, SOURCES)
+    note = PluckVoices(PLUCK, SOURCES)
     assert [note.subject(source) for source in SOURCES] == [Path("a"), Path("a"), Path("b.safetensors")]
 
 
@@ -571,5 +571,5 @@ def test_a_source_belongs_to_its_preset() -> None:
 )
 def test_levels_depend_on_all_that_is_heard(changes: dict[str, object], same: bool) -> None:
     other = replace(PLUCK, **changes)  # type: ignore[arg-type]
-    assert (Note(other, SOURCES).matching_key == Note(PLUCK, SOURCES).matching_key) == same
-    assert Note(PLUCK, SOURCES[:2]).matching_key != Note(PLUCK, SOURCES).matching_key
+    assert (PluckVoices(other, SOURCES).matching_key == PluckVoices(PLUCK, SOURCES).matching_key) == same
+    assert PluckVoices(PLUCK, SOURCES[:2]).matching_key != PluckVoices(PLUCK, SOURCES).matching_key

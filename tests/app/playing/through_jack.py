@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn
 from app.instrument.midi_file import messages_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
@@ -63,7 +63,7 @@ def measured(backend: RtMidi) -> dict[str, Any]:
     name = tried(lambda: port("hands"))
     tried(lambda: midi.open(name))
     until(lambda: send(Bend(0.0)) or came)  # until the server has connected them
-    events = [NoteOn(60, 100, 2), Bend(-1.0), Controller(64, 127), NoteOff(60, 2)]
+    events = [NoteOn(60, 100, 2), Bend(-1.0), ControlChange(64, 127), NoteOff(60, 2)]
     send(*events)
     until(lambda: came[-4:] == events)
     found["came"] = [repr(event) for event in came[-4:]]

@@ -16,7 +16,7 @@ import torch
 from app.playing.sources import Sources
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
-from app.rendering.line import Line
+from app.rendering.line import SourceLine
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.values.ear import Ear
@@ -212,13 +212,13 @@ def test_another_presets_model_moves_beside_it(
 def test_another_pluck_does_not_wait_for_the_one_before(
     small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    advance = Line.advance
+    advance = SourceLine.advance
 
-    def slow(line: Line, samples: int) -> None:
+    def slow(line: SourceLine, samples: int) -> None:
         time.sleep(2 * samples / line.rate_hz)
         advance(line, samples)
 
-    monkeypatch.setattr(Line, "advance", slow)
+    monkeypatch.setattr(SourceLine, "advance", slow)
     worker.submit(request_of(small_preset, seconds=30.0))
     wait_until(lambda: bool(heard.started))
     worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))

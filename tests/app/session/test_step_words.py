@@ -8,7 +8,7 @@ import pytest
 
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import ASSIGNABLE, Body, Patch
+from app.patches.patch import ASSIGNABLE, BodyChoice, Patch
 from app.patches.tuning import TuningChoice
 from app.session.history import RECORDED
 from app.session.step_words import SEVERAL, step_words
@@ -42,7 +42,7 @@ def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
     assert words(guitar, with_part(guitar, name="Mine")) == "name of the instrument"
     assert words(guitar, guitar.with_value("knobs.stiffness", 2.0)) == "stiffness"
     assert words(guitar, guitar.with_value("pluck.position", 0.31)) == "pluck position"
-    assert words(guitar, with_part(guitar, body=Body(name="mine", mix=guitar.body.mix))) == "body"
+    assert words(guitar, with_part(guitar, body=BodyChoice(name="mine", mix=guitar.body.mix))) == "body"
     scale = "! a\n!\nhalves\n 2\n!\n 600.\n 2/1\n"
     assert words(guitar, with_part(guitar, tuning=TuningChoice(scale=scale))) == "scale"
     assert words(guitar, with_part(guitar, bend_by="length")) == "bend mode"

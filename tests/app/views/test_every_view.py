@@ -172,7 +172,7 @@ def with_text(label: QLabel) -> QLabel:
 MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     app_menu.AppMenu: app_menu.AppMenu,
     browser.Browser: patch_card.patch_browser,
-    browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.Column("Name"),))),
+    browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.BrowserColumn("Name"),))),
     deck.Deck: made_deck,
     drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
     elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
@@ -200,7 +200,7 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     song_strip.SongStrip: song_strip.SongStrip,
     transport_bar.TransportBar: transport_bar.TransportBar,
     figures_table.FiguresTable: lambda: figures_table.FiguresTable(
-        "Figures", [figures_table.Column("name", "name", "a name")]
+        "Figures", [figures_table.FigureColumn("name", "name", "a name")]
     ),
     kept_plot.KeptPlot: lambda: with_name(kept_plot.KeptPlot()),
     legend.Legend: made_legend,

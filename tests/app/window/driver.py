@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.rendering.subject import string_of
 from app.window.controller import Controller
 from app.window.panels import Panel
@@ -64,7 +64,7 @@ class Window:
         self.struck: list[Any] = []
         handle = self.notes.handle
 
-        def noted(event: Any, due: Any = None) -> Note | KeyNote | None:
+        def noted(event: Any, due: Any = None) -> PluckVoices | KeyNote | None:
             if (note := handle(event, due)) is not None:
                 self.struck.append(note)
             return note

@@ -24,7 +24,7 @@ from app.instrument.events import NoteOn
 from app.patches.library import list_patches
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.session.choices import Choices
 from app.shared.vocabulary import Source
 from app.views.dialogs.abx_dialog import AbxDialog
@@ -137,7 +137,7 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     lab.session.update(heard=slot)
     lab.pluck()
     note = lab.instruments.latest
-    assert isinstance(note, Note)
+    assert isinstance(note, PluckVoices)
     qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
     sound = take(lab, SECONDS)
     lab.performance.stop()

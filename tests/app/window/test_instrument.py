@@ -19,11 +19,11 @@ from app.instrument.strings import Strings
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
-from app.patches.patch import Macro, Patch, Pickup, Target
+from app.patches.patch import Macro, MacroTarget, Patch, Pickup
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices
 from app.shared.key_names import note_name
@@ -129,7 +129,7 @@ def test_the_switch_of_keys_is_remembered_and_places_are_prepared_for_them_alone
     assert [len(set(positions)) for positions in prepared] == [PLACES, PLACES]
     guitar.wait(lambda: not guitar.keys.sounding())
     guitar.key(KEY.Key_A)
-    assert isinstance(guitar.struck[-1], Note) and guitar.keys.sounding() == {}
+    assert isinstance(guitar.struck[-1], PluckVoices) and guitar.keys.sounding() == {}
     pitches.trigger()
     guitar.qtbot.keyPress(guitar.window, KEY.Key_A)
     guitar.sounds(48)
@@ -158,7 +158,7 @@ def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_prese
     guitar.change(position=0.41)
     assert instruments.struck.event.pluck == guitar.choices.pluck, "an export has the pluck that is shown"
     guitar.change(b="preset:second")
-    assert instruments.struck is None and isinstance(guitar.pluck(), Note)
+    assert instruments.struck is None and isinstance(guitar.pluck(), PluckVoices)
 
 
 def test_each_turn_of_a_loop_stays_with_the_instrument_when_pluck_and_string_change(
@@ -250,7 +250,7 @@ def test_the_transport_changes_where_the_patch_is_heard(guitar: Window) -> None:
     assert guitar.window.instrument.bar.save.isEnabled() and guitar.keys.player.patch == guitar.patch  # type: ignore[union-attr]
     guitar.choose("concert_harp")
     assert (pickup.currentData(), stereo.isChecked()) == (HARP.pickup.kind, len(HARP.pickup.points) == 2)
-    macro = Macro(name="Width", targets=(Target(field="pickup.points.1", low=0.5, high=0.9),))
+    macro = Macro(name="Width", targets=(MacroTarget(field="pickup.points.1", low=0.5, high=0.9),))
     guitar.change(patch=HARP.model_copy(update={"pickup": Pickup(points=(0.2, 0.8)), "macros": (macro,)}))
     stereo.click()
     assert stereo.isChecked() and "stays in stereo: its macro Width" in guitar.window.notices.text

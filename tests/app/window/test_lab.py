@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QToolButton
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
 from app.instrument.events import PluckAt
-from app.playing.note import Note
+from app.playing.note import PluckVoices
 from app.session.choices import Choices
 from app.views.stage import MARGIN_X
 from app.views.string.view import StringView
@@ -62,7 +62,7 @@ def place(view: StringView, x: float, y: float) -> QPoint:
     return QPoint(round(MARGIN_X + x * (view.width() - 2 * MARGIN_X)), round(y * view.height()))
 
 
-def gains(note: Note) -> dict[str, float]:
+def gains(note: PluckVoices) -> dict[str, float]:
     """With which the voices of a note sound, or fade to; without those of matched levels."""
     match = note.match or {}
     wanted = {name: float(voice.record["wanted_gain"]) for name, voice in note.voices.items()}
@@ -360,11 +360,11 @@ def sounding(
     return made
 
 
-def begun(w: Window) -> Note:
+def begun(w: Window) -> PluckVoices:
     """A pluck that sounds."""
     note = w.pluck()
     w.wait(lambda: note.seconds > 0)
-    assert isinstance(note, Note)
+    assert isinstance(note, PluckVoices)
     return note
 
 

@@ -85,7 +85,7 @@ def test_the_test_keeps_its_pluck_and_volume_and_all_comes_back_as_it_was(
     taken: list[object] = []
     handle = heard.notes.handle
     monkeypatch.setattr(heard.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
-    released = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
+    released = [events.NoteOff(52), events.ControlChange(events.SUSTAIN, 0)]
     for event in (PluckAt(Pluck(0.6, 8.0)), events.NoteOn(60, 90), *released):
         heard.controller.instruments.play(event)  # a MIDI keyboard
     heard.key(KEY.Key_Space)

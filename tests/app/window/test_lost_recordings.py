@@ -16,7 +16,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.export.journal import left_journals
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, PatchTurned
 from app.window.signals import SIGNALS, asked_to_end
 
 ROOT = Path(__file__).parents[3]
@@ -26,10 +26,10 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs PO
 RECORDING = """
 import json
 from PySide6.QtCore import QTimer
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, PatchTurned
 from app.window import main
 
-EVENTS = [NoteOn(60, 100), Controller(64, 127), Bend(0.25), NoteOff(60), NoteOn(64, 80)]
+EVENTS = [NoteOn(60, 100), ControlChange(64, 127), Bend(0.25), NoteOff(60), NoteOn(64, 80)]
 
 def watch(controller):
     played, recorder = [], controller.performance.notes.keys.recorder
@@ -139,13 +139,13 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
     journal.close()
     assert played is not None
     kinds = [type(each.event) for each in played.events]
-    assert [kind for kind in kinds if kind is not PatchTurned][:5] == [NoteOn, Controller, Bend, NoteOff, NoteOn]
+    assert [kind for kind in kinds if kind is not PatchTurned][:5] == [NoteOn, ControlChange, Bend, NoteOff, NoteOn]
     assert [each.event.patch.level_db for each in played.events if isinstance(each.event, PatchTurned)][-1] == -7.5
     first_s = times_s[kinds.index(NoteOn)]
     wanted = [max(0.0, time_s - first_s) for time_s in sorted(times_s)]
     found = [each.time_s for each in played.events]
     assert found[: len(wanted)] == wanted
-    assert {type(each.event) for each in played.events[len(wanted) :]} <= {NoteOff, Controller}  # what was down
+    assert {type(each.event) for each in played.events[len(wanted) :]} <= {NoteOff, ControlChange}  # what was down
     if end != signal.SIGKILL:
         return
     for key, kept in (("Key_Escape", None), ("Key_Return", found)):

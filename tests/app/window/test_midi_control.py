@@ -12,7 +12,7 @@ from PySide6.QtCore import QCoreApplication
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, release_all
+from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn, release_all
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.playing.midi import MidiChoices
@@ -36,8 +36,8 @@ def test_an_input_is_found_again_under_new_numbers_and_faults_are_in_plain_words
     midi = MidiInput(heard.append, lambda: backend, released.append)
     midi.open("Pads:Pads 31:0")
     assert (midi.name, backend.open_name) == (PADS, PADS)
-    backend.send(Controller(1, 2), b"\xf8")  # the latter is a clock
-    assert heard == [Controller(1, 2)]
+    backend.send(ControlChange(1, 2), b"\xf8")  # the latter is a clock
+    assert heard == [ControlChange(1, 2)]
     with pytest.raises(MidiUnavailable, match="Strings is not connected"):
         midi.open("Strings")
     backend.busy = True
@@ -136,11 +136,11 @@ def test_notes_are_played_at_once_in_the_thread_that_brings_them_and_controllers
 ) -> None:
     """The window may be busy with anything; a taught controller turns what it was taught, and is not played."""
     keys = desk(controllers={"width": 74})
-    events = [NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3)]
+    events = [NoteOn(60, 90, 3), Bend(-1.0, 3), ControlChange(64, 127, 3), NoteOff(60, 3)]
     keys.backend.send(*events)
     assert keys.came == events and keys.performed == keys.played == []
     assert threading.main_thread() not in keys.threads
-    keys.backend.send(Controller(74, 0, 3))
+    keys.backend.send(ControlChange(74, 0, 3))
     qtbot.waitUntil(lambda: keys.performed == [{"width": pytest.approx(0.02)}])
     assert keys.came == events
     choose(find(keys.dialog, QComboBox, "MIDI notes control"), "position")
@@ -174,12 +174,12 @@ def test_a_controller_is_learned_in_the_dialog_and_forgotten_there(qtbot: QtBot,
     keys = desk()
     learn, forget = find(keys.dialog, QPushButton, WIDTH), find(keys.dialog, QPushButton, "Unassign pluck width")
     assert not forget.isEnabled()
-    keys.backend.send(Controller(1, 127, 1))  # a wheel that is assigned while it is turned does not stay there
+    keys.backend.send(ControlChange(1, 127, 1))  # a wheel that is assigned while it is turned does not stay there
     qtbot.mouseClick(learn, LEFT)
     assert "Move a control …" in keys.words()
-    keys.backend.send(Controller(1, 127, 1))
+    keys.backend.send(ControlChange(1, 127, 1))
     qtbot.waitUntil(lambda: keys.midi.choices.controllers == {"width": 1} and len(keys.performed) == 1)
-    assert keys.came == [Controller(1, 127, 1), *release_all([1])] and "Controller 1" in keys.words()
+    assert keys.came == [ControlChange(1, 127, 1), *release_all([1])] and "Controller 1" in keys.words()
     qtbot.mouseClick(forget, LEFT)
     assert keys.midi.choices.controllers == {}
     for waits in (True, False):  # thought better of it
@@ -196,15 +196,15 @@ def test_a_controller_with_a_function_of_its_own_is_played_and_not_learned(
     keys = desk(controllers=choices.controllers)
     learn = find(keys.dialog, QPushButton, LISTEN)
     qtbot.mouseClick(learn, LEFT)
-    keys.backend.send(Controller(number, 127, 1))
+    keys.backend.send(ControlChange(number, 127, 1))
     qtbot.waitUntil(lambda: any(f"Controller {number} " in each and "move another" in each for each in keys.words()))
-    assert keys.came == [Controller(number, 127, 1)]
+    assert keys.came == [ControlChange(number, 127, 1)]
     assert keys.midi.choices.controllers == {"volume_db": 7} and learn.isChecked()
-    keys.backend.send(Controller(20, 127, 1))
+    keys.backend.send(ControlChange(20, 127, 1))
     qtbot.waitUntil(lambda: keys.midi.choices.controllers == {"volume_db": 7, "listen": 20})
     assert "Controller 20" in keys.words() and not any("move another" in each for each in keys.words())
-    keys.backend.send(Controller(number, 0, 1))
-    assert keys.came[-1] == Controller(number, 0, 1)
+    keys.backend.send(ControlChange(number, 0, 1))
+    assert keys.came[-1] == ControlChange(number, 0, 1)
 
 
 def test_an_input_that_comes_and_goes_is_reported_shown_and_remembered(
@@ -265,7 +265,7 @@ def test_midi_plays_the_window_and_what_it_learned_is_saved(backend: FakeBackend
     assert not lab.controller.history.undo_words
     lab.wait(lambda: lab.performance.position_s > 0)
     find(dialog, QPushButton, WIDTH).click()
-    backend.send(Controller(74, 0))
+    backend.send(ControlChange(74, 0))
     lab.wait(lambda: lab.choices.width == pytest.approx(0.02))
     lab.close()
     assert load_settings(tmp_path / "settings.json")[0].midi == MidiChoices(port=KEYS, controllers={"width": 74})

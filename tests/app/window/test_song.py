@@ -8,13 +8,13 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import ControlChange, NoteOff, NoteOn, TimedEvent
 from app.playing.playback import Playback
 from app.views.controls.song_strip import SongStrip
 from app.window import song as module
-from app.window.song import Song, events_from
+from app.window.song import SongPlayer, events_from
 
-PEDAL, NOTE, END = Controller(64, 127, 0), NoteOn(60, 90, 0), NoteOff(60, 0)
+PEDAL, NOTE, END = ControlChange(64, 127, 0), NoteOn(60, 90, 0), NoteOff(60, 0)
 EVENTS = (TimedEvent(0.5, PEDAL), TimedEvent(1.0, NOTE), TimedEvent(4.0, END))
 
 
@@ -56,7 +56,7 @@ def test_from_a_time_on_pedals_are_chased_and_notes_are_not() -> None:
 
 def test_it_plays_stops_where_it_is_and_goes_elsewhere(qtbot: QtBot, strip: SongStrip, clock: list[float]) -> None:
     played = Played()
-    song = Song(played, strip)
+    song = SongPlayer(played, strip)
     assert strip.isHidden()
     song.load("song.mid", EVENTS)
     assert not strip.isHidden()
@@ -81,7 +81,7 @@ def test_it_plays_stops_where_it_is_and_goes_elsewhere(qtbot: QtBot, strip: Song
 
 def test_at_its_end_it_goes_back_and_can_be_closed(qtbot: QtBot, strip: SongStrip, clock: list[float]) -> None:
     played = Played()
-    song = Song(played, strip)
+    song = SongPlayer(played, strip)
     song.load("song.mid", EVENTS)
     clock[0] += 4.5
     played.events = None

@@ -21,7 +21,7 @@ from tests.bench.play.children import child
 from tests.bench.play.program import Program, program
 from tests.bench.play.sound_server import RATE_HZ
 from tests.bench.printing import target
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 SINGLES = 60
 RINGS_S, QUIET_S = 0.4, 0.3  # of a single pluck, before and after it is stopped
@@ -123,7 +123,13 @@ class _Played:
 
 
 def measure(
-    seconds: float, plucks_hz: float, buffer: Buffer, busy: bool, seed: int, instrument: Instrument, report: Report
+    seconds: float,
+    plucks_hz: float,
+    buffer: Buffer,
+    busy: bool,
+    seed: int,
+    instrument: Instrument,
+    report: ProgressReport,
 ) -> dict[str, Any]:
     """Play single plucks of an instrument, then for `seconds` so many notes per second."""
     random, keys = Random(seed), hands.keys_of(instrument)
@@ -141,7 +147,9 @@ def measure(
         return {"chosen": Chosen(name, buffer, plucks_hz, busy, load), "playing": _judged(app, played, idle_cores)}
 
 
-def _play(app: Program, random: Random, keys: Sequence[str], steps_s: Sequence[float], report: Report) -> _Played:
+def _play(
+    app: Program, random: Random, keys: Sequence[str], steps_s: Sequence[float], report: ProgressReport
+) -> _Played:
     singles_s = []
     for number in range(SINGLES):
         report(0.1 + 0.4 * number / SINGLES, "single plucks")

@@ -27,7 +27,7 @@ from tests.bench.play.control import steady_tone
 from tests.bench.play.recording import Recording, recording
 from tests.bench.play.screen import Screen, private_screen
 from tests.bench.play.sound_server import RATE_HZ, SoundServer, sound_server
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 
 PROGRAMS = ("pulseaudio", "pacat", "parec", "pactl", "Xvfb")
 TITLE = "Learned Strings"
@@ -89,7 +89,9 @@ class Program:
 
 
 @contextlib.contextmanager
-def program(instrument: Instrument, buffer: Buffer, report: Report, *, calibrated: bool = False) -> Iterator[Program]:
+def program(
+    instrument: Instrument, buffer: Buffer, report: ProgressReport, *, calibrated: bool = False
+) -> Iterator[Program]:
     """Start the program with an instrument, and wait until its first key is heard. A single string is in the Lab.
 
     Args:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tests.training.recording.synthetic import synthetic_note
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 from training.recording.fit import fit_note
 from training.recording.note import note_of
 from training.recording.numbering import number_note
@@ -20,7 +20,7 @@ FIRST_SEED = 3_000  # `intervals.MODEL_ERRORS` was measured on notes of seeds be
 UNITS = {"hz": 1200 / math.log(2), "decay": 1.0, "level_db": 1.0}  # of the errors: cents, a share, dB
 
 
-def measure(count: int, report: Report) -> dict[str, Any]:
+def measure(count: int, report: ProgressReport) -> dict[str, Any]:
     """Measure so many notes that no threshold was set on."""
     return {"intervals": coverage(range(FIRST_SEED, FIRST_SEED + count), lambda done: report(done / count))}
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.compare.relative import error_to_signal
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 from training.recording.fit import LearnedNote, fit_note
 from training.recording.gate import examine
 from training.recording.note import RecordingError, note_of
@@ -57,7 +57,9 @@ class Figure:
     count: int
 
 
-def measure(recordings: Mapping[str, tuple[NDArray[np.float64], int]], quick: bool, report: Report) -> dict[str, Any]:
+def measure(
+    recordings: Mapping[str, tuple[NDArray[np.float64], int]], quick: bool, report: ProgressReport
+) -> dict[str, Any]:
     """Learn all recordings.
 
     Args:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.training.recording.sounds import Case, Recordings, cases, is_judged
-from training.cli.console import Report
+from training.cli.console import ProgressReport
 from training.recording.fit import fit_note
 from training.recording.learn import examined
 from training.recording.note import RecordingError
@@ -44,7 +44,7 @@ class KindShare:
     kept: int
 
 
-def measure(recordings: Recordings, count: int, every: int, report: Report) -> dict[str, Any]:
+def measure(recordings: Recordings, count: int, every: int, report: ProgressReport) -> dict[str, Any]:
     """Examine judged recordings and seeds.
 
     Args:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from engine.models._ssm_kernel import stream
 from engine.models.s5 import S5Layer, hippo_normal
-from engine.models.ssm import Block, DiagonalSSM, SSMString, evolve, recur
+from engine.models.ssm import DiagonalSSM, GatedBlock, SSMString, evolve, recur
 from tests.engine.models.laws import Arrays, ModelLaws, relative, released
 
 Layer = tuple[np.ndarray, ...]
@@ -109,8 +109,8 @@ class StateSpaceLaws(ModelLaws):
     @torch.no_grad()
     def test_a_motion_keeps_the_weights_with_which_its_rendering_began(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """They are folded once, and nothing of it stays in the model."""
-        model, folds, fold = self.stirred(), [], Block.fold
-        monkeypatch.setattr(Block, "fold", lambda block: folds.append(block) or fold(block))
+        model, folds, fold = self.stirred(), [], GatedBlock.fold
+        monkeypatch.setattr(GatedBlock, "fold", lambda block: folds.append(block) or fold(block))
         first = model(released(), 40)
         state = model.encode(released())
         for _ in range(3):
@@ -124,7 +124,7 @@ class StateSpaceLaws(ModelLaws):
 def changed_by(model: SSMString, how: str) -> None:
     """Another weight, or another statistic of a batch norm."""
     block = model.layers[1]
-    assert isinstance(block, Block)
+    assert isinstance(block, GatedBlock)
     if how == "in place":
         with torch.no_grad():
             block.seq.C.mul_(2.0)

@@ -17,7 +17,7 @@ from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
 from training.family import untrained as players_of_physics
 from training.family.errors import FamilyErrors, StringError
-from training.family.fit import Case, errors, fit_curves, geometric_mean
+from training.family.fit import FitCase, errors, fit_curves, geometric_mean
 from training.family.motions import solve
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
 from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
@@ -25,9 +25,9 @@ from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string
 RATE_HZ, STEPS = 48_000, 1_200
 
 
-def cases(split: str, count: int) -> list[Case]:
+def cases(split: str, count: int) -> list[FitCase]:
     drawn = (draw_string("inside", split, number) for number in range(count))
-    return [Case(plucked, solve(plucked, RATE_HZ, STEPS)) for plucked in drawn]
+    return [FitCase(plucked, solve(plucked, RATE_HZ, STEPS)) for plucked in drawn]
 
 
 @pytest.mark.parametrize("column", COLUMNS)

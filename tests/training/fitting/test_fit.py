@@ -19,7 +19,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Diverged, Progress, Seed, fit, fit_seeds, horizon_at, learning_rate_at
+from training.fitting.fit import Diverged, FitProgress, Seed, fit, fit_seeds, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
 from training.fitting.start import new_model
 
@@ -52,7 +52,7 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
 @pytest.mark.parametrize("recipe", ["ours", "paper", "published"])
 @pytest.mark.parametrize("model", SMALL)
 def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
-    seen: list[Progress] = []
+    seen: list[FitProgress] = []
     horizon = 40 if model not in ("fgru", "frnn") else 12  # they take every frame one after the other
     configuration = small(model, recipe, horizon, epochs=6, patience=0, first_horizon=horizon // 2)
     found = fit(configuration, small_dataset, runs, report=seen.append)
@@ -84,7 +84,7 @@ def test_the_bound_of_the_gradient_can_leave_the_eigenvalues_out(small_dataset: 
 def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs: Path) -> None:
     """The start is epoch 0: a result is never worse."""
     configuration = small("koopman_integrated", epochs=2, peak_learning_rate=1.0, start="averaging")
-    seen: list[Progress] = []
+    seen: list[FitProgress] = []
     found = fit(configuration, small_dataset, runs, report=seen.append)
     assert found.start is not None
     assert all(p.validation is None or p.validation.rel_mae > found.start.rel_mae for p in seen)
@@ -127,8 +127,8 @@ def test_a_polish_is_too_and_lowers_the_error(
     assert losses[0] < 0.5 * losses[1]
 
 
-def cut_after(epoch: int) -> Callable[[Progress], None]:
-    def report(progress: Progress) -> None:
+def cut_after(epoch: int) -> Callable[[FitProgress], None]:
+    def report(progress: FitProgress) -> None:
         if progress.epoch == epoch:
             raise KeyboardInterrupt
 
@@ -152,19 +152,19 @@ def test_a_checkpoint_within_an_epoch_goes_on_within_it(
 ) -> None:
     monkeypatch.setattr(module, "TELL_EVERY_S", -1.0)
     configuration = small("lru", batch_size=3)  # six steps an epoch
-    whole: list[Progress] = []
+    whole: list[FitProgress] = []
     fit(configuration, small_dataset, runs / "whole", report=whole.append, checkpoint_every_s=-1)
     assert [p.step for p in whole] == list(range(1, 25))
     assert [p.step for p in whole if p.ends_epoch] == [6, 12, 18, 24]
 
-    def cut(progress: Progress) -> None:
+    def cut(progress: FitProgress) -> None:
         if progress.step == 10:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         fit(configuration, small_dataset, runs / "cut", report=cut, checkpoint_every_s=-1)
     assert Checkpoint.load(runs / "cut" / "checkpoint.safetensors").facts["step"] == 9
-    rest: list[Progress] = []
+    rest: list[FitProgress] = []
     fit(configuration, small_dataset, runs / "cut", report=rest.append, checkpoint_every_s=-1)
     assert [p.loss for p in rest] == [p.loss for p in whole[9:]]
     left, right = weights(runs / "whole"), weights(runs / "cut")
@@ -204,7 +204,7 @@ def test_early_stopping_ends_when_nothing_gets_better(
     small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "learning_rate_at", lambda recipe, share: 0.0)
-    seen: list[Progress] = []
+    seen: list[FitProgress] = []
     found = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
     assert (found.best_epoch, found.epochs, len(seen)) == (0, 3, 3)
     again = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
@@ -236,7 +236,7 @@ def test_a_loss_or_an_error_that_is_no_number_is_a_divergence(
 
 
 def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
-    seen: list[Progress] = []
+    seen: list[FitProgress] = []
     found = fit(small("dmd"), small_dataset, runs, report=seen.append)
     assert isinstance(found.model, DMD)
     assert len(seen) == 1 and seen[0].validation == found.validation.total()

@@ -19,7 +19,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
-from training.fitting.phases import Motion, fit_phases, upright
+from training.fitting.phases import ModeMotion, fit_phases, upright
 from training.fitting.start import begin
 from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES
 
@@ -67,7 +67,7 @@ def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
     assert other[0] == 0.01
     np.testing.assert_allclose(motion(other), motion(found), rtol=1e-12)
     np.testing.assert_array_equal(upright(other), other)
-    fitted = Motion(starts, motion(found), times, integrals).fitted(1.01 * found)
+    fitted = ModeMotion(starts, motion(found), times, integrals).fitted(1.01 * found)
     np.testing.assert_allclose(motion(fitted), motion(found), atol=1e-6)
 
 

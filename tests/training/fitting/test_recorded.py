@@ -16,7 +16,7 @@ from training.configuration import Recipe
 from training.data.batches import TrainingData
 from training.data.dataset import Dataset
 from training.fitting import recorded, together
-from training.fitting.fit import Run, Steps, take_step
+from training.fitting.fit import Steps, TrainingState, take_step
 from training.fitting.losses import backward
 
 CPU, META = torch.device("cpu"), torch.device("meta")
@@ -73,7 +73,7 @@ def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(
 ) -> None:
     cell = Cell("koopman_var", True, "gaussian", 4000, 400, recipe)  # type: ignore[arg-type]
     made = configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, {"batch_size": 4, **changes})
-    assert Run(made, small_dataset, CPU).repeats_itself is repeats
+    assert TrainingState(made, small_dataset, CPU).repeats_itself is repeats
 
 
 def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +106,9 @@ def test_a_repeated_step_is_the_launched_one(
     cells = [Cell(name, True, "gaussian", 4000, 20, "paper", seed) for seed in range(2)]
     changes = {"batch_size": 4, "schedule": "one_cycle"}
     made = [configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, changes) for cell in cells]
-    repeated, launched = ([Run(each, small_dataset, torch.device("cuda")) for each in made] for _ in range(2))
+    repeated, launched = (
+        [TrainingState(each, small_dataset, torch.device("cuda")) for each in made] for _ in range(2)
+    )
     steps = Steps()
     for _ in range(11):
         steps.take(repeated)

@@ -18,7 +18,7 @@ from training.recording.fit import LearnedNote
 from training.recording.glide import CENTS, Glide
 from training.recording.intervals import figures_of
 from training.recording.note import FIT_BEGINS_S, Note
-from training.recording.numbering import Series, partial_hz
+from training.recording.numbering import PartialSeries, partial_hz
 from training.recording.refine import Pole
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, .
 
 def modelled_note(
     seed: int, polarisations: int, seconds: float = 1.0, cents: float = 0.0, loudness: float = 1.0
-) -> tuple[LearnedNote, Note, Series]:
+) -> tuple[LearnedNote, Note, PartialSeries]:
     """A note of the form that a fit has, drawn by its seed, its recording with a faint noise, and its series.
 
     Args:
@@ -153,7 +153,7 @@ def modelled_note(
     learned = LearnedNote(rate_hz, f0 * higher, stiffness, glide, tuple(poles))
     samples = learned.render(np.arange(round(seconds * rate_hz)) / rate_hz - FIT_BEGINS_S)
     samples = samples + noise * random.standard_normal(len(samples))
-    series = Series(f0 * higher, stiffness, tuple(range(1, 9)), 1.0, 0.0, 1.0)
+    series = PartialSeries(f0 * higher, stiffness, tuple(range(1, 9)), 1.0, 0.0, 1.0)
     return learned, Note(samples, rate_hz, 0, noise**2), series
 
 

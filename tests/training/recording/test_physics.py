@@ -13,7 +13,7 @@ from engine.resonators.string import resonator_of
 from training.family.strings import string_of
 from training.recording.fit import LearnedNote
 from training.recording.glide import CENTS, Glide
-from training.recording.physics import BUILDS, Kind, Physics, corrections, physics_of, pluck_place, strung
+from training.recording.physics import BUILDS, Kind, LearnedPhysics, corrections, physics_of, pluck_place, strung
 from training.recording.refine import Pole
 
 F0_HZ, SIGMA = 110.0, 2.0
@@ -62,7 +62,7 @@ class Heard:
     resonator: Resonator
     stiffness: float
     place: float
-    physics: Physics
+    physics: LearnedPhysics
 
 
 @pytest.fixture(scope="module", params=range(6))

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from training.results import Row
-from training.sweeping.plan import Plan, Run, load_plan
+from training.sweeping.plan import Plan, PlannedRun, load_plan
 from training.sweeping.sweep import Options
 from training.sweeping.task import Task, TaskRun
 
@@ -68,7 +68,7 @@ def task(plan, options: Options) -> Task:
     return options.task(made, made.runs[0])
 
 
-def row_of(run: Run | TaskRun, **changes: Any) -> Row:
+def row_of(run: PlannedRun | TaskRun, **changes: Any) -> Row:
     fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
     fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "finished": "2026-01-01T00:00:00Z"}
     return Row(run.digest, run.name, **(fields | changes))

@@ -17,7 +17,7 @@ from filelock import FileLock
 
 from engine.schema import SchemaError, read, write
 from tests.training.sweeping.conftest import plan_in, row_of
-from training.fitting.fit import Progress
+from training.fitting.fit import FitProgress
 from training.results import RESULTS, Row, add_rows, read_results
 from training.sweeping.plan import Plan
 from training.sweeping.processes import Layout, fitted, process_workers
@@ -243,7 +243,7 @@ class Killer(Record):
         self.victim = ""
         self.kept: list[str] = []  # lines of the victim's log whose epochs its checkpoint had
 
-    def progressed(self, run: Any, progress: Progress) -> None:
+    def progressed(self, run: Any, progress: FitProgress) -> None:
         if self.victim:
             return
         wait_until(lambda: len(self.lines_of(run.name)) > 4)
@@ -346,7 +346,7 @@ def test_a_sweep_here_listens_to_nobody(plan, options: Options, monkeypatch: pyt
     seen: list[Any] = []
 
     class Look(Record):
-        def progressed(self, run: Any, progress: Progress) -> None:
+        def progressed(self, run: Any, progress: FitProgress) -> None:
             for one in [psutil.Process(), *psutil.Process().children(recursive=True)]:
                 with suppress(psutil.NoSuchProcess):  # `git`, which a worker asks for its commit, ends by itself
                     seen.append([port for port in one.net_connections("inet") if port.status == "LISTEN"])

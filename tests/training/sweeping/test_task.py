@@ -13,7 +13,7 @@ from filelock import FileLock
 from engine.compare.relative import RelativeError
 from engine.schema import read, write
 from training.data.dataset import dataset_folder, load_dataset
-from training.fitting.fit import Progress
+from training.fitting.fit import FitProgress
 from training.fitting.log import TrainingLog
 from training.results import Row
 from training.sweeping.sweep import Options
@@ -28,7 +28,7 @@ def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task, monkeypat
     seen = []
     add = TrainingLog.add
 
-    def followed(log: TrainingLog, progress: Progress) -> None:
+    def followed(log: TrainingLog, progress: FitProgress) -> None:
         add(log, progress)
         seen.append(read_progress(folder_of(task)))  # of the epoch before
 
@@ -67,7 +67,7 @@ def test_a_worker_of_another_version_trains_nothing(task: Task) -> None:
 
 @pytest.mark.parametrize("loss", [0.5, math.inf, math.nan])
 def test_a_progress_is_read_where_it_is_whole_and_finite(tmp_path: Path, loss: float) -> None:
-    progress = Progress(2, 8, 1, 4, 60, 1e-3, loss, RelativeError(0.5, 0.25), 1.0, 3.0)
+    progress = FitProgress(2, 8, 1, 4, 60, 1e-3, loss, RelativeError(0.5, 0.25), 1.0, 3.0)
     assert read_progress(tmp_path) is None
     (tmp_path / PROGRESS).write_text(json.dumps(write(progress)), encoding="utf-8")
     assert read_progress(tmp_path) == (progress if math.isfinite(loss) else None)

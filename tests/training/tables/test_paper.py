@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from training.tables.paper import METRICS, MODEL_ORDER, PRINTED, Column, Figure, factor, mark, paper_errors
+from training.tables.paper import METRICS, MODEL_ORDER, PRINTED, DatasetColumn, MeanFigure, factor, mark, paper_errors
 
 
 def test_the_papers_figures_are_all_there() -> None:
@@ -31,8 +31,8 @@ def test_the_papers_figures_are_all_there() -> None:
     ],
 )
 def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any, mse: Any, mae: Any) -> None:
-    entry = paper_errors()[string, horizon, model, Column(*column)]
-    assert (entry.rel_mse, entry.rel_mae) == (Figure(*mse), Figure(*mae))
+    entry = paper_errors()[string, horizon, model, DatasetColumn(*column)]
+    assert (entry.rel_mse, entry.rel_mae) == (MeanFigure(*mse), MeanFigure(*mae))
 
 
 @pytest.mark.parametrize(
@@ -56,13 +56,13 @@ def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any
     ],
 )
 def test_marks(ours: Any, paper: Any, expected: str) -> None:
-    assert mark(Figure(*ours), Figure(*paper)) == expected
+    assert mark(MeanFigure(*ours), MeanFigure(*paper)) == expected
 
 
 def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures() -> None:
-    assert Figure(1.0).total is None
-    assert Figure(1.0, 0.3).total == Figure(1.0, None, 0.3).total == 0.3
-    assert Figure(1.0, 0.3, 0.4).total == pytest.approx(0.5)
-    assert factor(Figure(5.65e-6), Figure(0.0113)) == "×0.0005"
-    assert factor(Figure(1.0), Figure(0.004)) == "×250"
-    assert factor(Figure(5e-6), Figure(0.0)) == "> ×0.1"
+    assert MeanFigure(1.0).total is None
+    assert MeanFigure(1.0, 0.3).total == MeanFigure(1.0, None, 0.3).total == 0.3
+    assert MeanFigure(1.0, 0.3, 0.4).total == pytest.approx(0.5)
+    assert factor(MeanFigure(5.65e-6), MeanFigure(0.0113)) == "×0.0005"
+    assert factor(MeanFigure(1.0), MeanFigure(0.004)) == "×250"
+    assert factor(MeanFigure(5e-6), MeanFigure(0.0)) == "> ×0.1"

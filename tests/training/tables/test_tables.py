@@ -11,11 +11,11 @@ from training.cell import Cell, configuration_of
 from training.results import Row
 from training.start import PHASES
 from training.tables.compact import as_compact
-from training.tables.paper import COLUMNS, Column, Figure
+from training.tables.paper import COLUMNS, DatasetColumn, MeanFigure
 from training.tables.sections import sections
 from training.tables.tidy_csv import as_csv
 
-G4 = Column("gaussian", 4000)
+G4 = DatasetColumn("gaussian", 4000)
 
 
 def row(cell: Cell | None = None, mse: float | None = 0.01, mae: float | None = 0.1, **changes: Any) -> Row:
@@ -130,7 +130,7 @@ def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_
         row(other),
     ]
     (section,) = (s for s in sections(rows) if s.place == ("nonlinear", 4000))
-    assert [entry[G4].rel_mse for entry in section.lines.values()] == [Figure(0.3)]
+    assert [entry[G4].rel_mse for entry in section.lines.values()] == [MeanFigure(0.3)]
     assert "2 of 3 rows of the results file are not shown" in as_compact(rows)
 
 

@@ -3,12 +3,12 @@ from __future__ import annotations
 import pytest
 
 from app.analysis.abx.record import AbxRecord, Candidate
-from app.analysis.abx.trials import Run
+from app.analysis.abx.trials import ListeningTest
 
 
-def finished(planned: int, right: int, answered: int | None = None) -> Run:
+def finished(planned: int, right: int, answered: int | None = None) -> ListeningTest:
     """A run in which the first `right` answers are right."""
-    run = Run(seed=5, planned=planned)
+    run = ListeningTest(seed=5, planned=planned)
     for place in range(planned if answered is None else answered):
         x = run.heard_as("X")
         other = "B" if x == "A" else "A"
@@ -16,7 +16,7 @@ def finished(planned: int, right: int, answered: int | None = None) -> Run:
     return run
 
 
-def record_of(run: Run) -> AbxRecord:
+def record_of(run: ListeningTest) -> AbxRecord:
     a, b = (
         Candidate(label=label, preset="nylon", preset_sha256="0f" * 32, gain_db=gain_db)
         for label, gain_db in (("Model", -0.5), ("Truth", 0.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from scipy.stats import binomtest
 
-from app.analysis.abx.trials import Run, Trial, draw_order, needed_correct, p_value
+from app.analysis.abx.trials import ListeningTest, Trial, draw_order, needed_correct, p_value
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_the_coin_is_fair() -> None:
 
 def test_a_run_keeps_what_happened_in_each_trial() -> None:
     order = draw_order(3, 2)
-    run = Run(seed=3, planned=2)
+    run = ListeningTest(seed=3, planned=2)
     assert run.heard_as("X") == order[0]
     assert (run.heard_as("A"), run.heard_as("B")) == ("A", "B")
     run = run.auditioned("A").auditioned("X").auditioned("X").answered(order[0])
@@ -66,4 +66,4 @@ def test_a_run_keeps_what_happened_in_each_trial() -> None:
 
 def test_without_hearing_x_there_is_no_answer() -> None:
     with pytest.raises(ValueError, match="X has not been heard"):
-        Run(seed=1, planned=3).auditioned("A").auditioned("B").answered("A")
+        ListeningTest(seed=1, planned=3).auditioned("A").auditioned("B").answered("A")

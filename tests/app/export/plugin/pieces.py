@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as INSTRUMENTS
 from app.patches.library import read_patch
@@ -57,7 +57,7 @@ def preset_of(name: str) -> Preset:
     return replace(preset, info=replace(preset.info, recorded=own))
 
 
-def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controller]]:
+def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | ControlChange]]:
     low = max(patch.range[0], min(52, patch.range[1] - 20))
     half = 4096 / 8191  # as 14 bits have it
     return [
@@ -67,16 +67,16 @@ def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controlle
         (0.3, Bend(half)),
         (0.45, NoteOn(low, 60)),
         (0.5, Bend(0.0)),
-        (0.55, Controller(64, 127)),
+        (0.55, ControlChange(64, 127)),
         (0.6, NoteOn(low + 12, 127)),
         (0.65, NoteOff(low + 12)),
         (0.7, NoteOff(low)),
-        (1.0, Controller(64, 0)),
+        (1.0, ControlChange(64, 0)),
         (1.1, NoteOff(low + 4)),
     ]
 
 
-def midi_bytes(event: NoteOn | NoteOff | Bend | Controller) -> tuple[int, int, int]:
+def midi_bytes(event: NoteOn | NoteOff | Bend | ControlChange) -> tuple[int, int, int]:
     """The message of an event."""
     if isinstance(event, NoteOn):
         return 0x90 | event.channel, event.key, event.velocity
@@ -88,7 +88,7 @@ def midi_bytes(event: NoteOn | NoteOff | Bend | Controller) -> tuple[int, int, i
     return 0xB0 | event.channel, event.number, event.value
 
 
-def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
+def to_host(event: NoteOn | NoteOff | Bend | ControlChange, frame: int) -> Event:
     if isinstance(event, NoteOn):
         return note_on(frame, event.key, event.velocity, event.channel)
     if isinstance(event, NoteOff):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from tests.app.export.plugin.host import Event, Library, brighten, midi, note_on, tune
 from tests.app.export.plugin.pieces import EQUAL_DB, MEMBERS, difference_db, patch_of, preset_of, to_host
@@ -19,23 +19,23 @@ pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs zigl
 SECONDS = 0.8
 SLIDE, SUSTAIN = 74, 64
 
-Timed = tuple[float, NoteOn | NoteOff | Bend | Controller]
+Timed = tuple[float, NoteOn | NoteOff | Bend | ControlChange]
 MEMBERS_PLAY: tuple[Timed, ...] = (
-    (0.0, Controller(SLIDE, 20, 1)),
-    (0.0, Controller(SLIDE, 110, 2)),
+    (0.0, ControlChange(SLIDE, 20, 1)),
+    (0.0, ControlChange(SLIDE, 110, 2)),
     (0.01, NoteOn(52, 100, 1)),
     (0.02, NoteOn(59, 90, 2)),
     (0.05, NoteOn(59, 110, 3)),  # the same key in another channel, without a slide
     (0.1, Bend(512 / 8191, 1)),  # three semitones of a member's 48
     (0.2, Bend(-0.03125, 2)),
-    (0.25, Controller(SLIDE, 64, 2)),  # for its next note
+    (0.25, ControlChange(SLIDE, 64, 2)),  # for its next note
     (0.3, NoteOff(59, 2)),
     (0.35, Bend(2048 / 8191, 0)),  # the master's wheel, for all
     (0.4, NoteOn(64, 100, 2)),
-    (0.45, Controller(SUSTAIN, 127, 0)),
+    (0.45, ControlChange(SUSTAIN, 127, 0)),
     (0.5, NoteOff(52, 1)),
     (0.6, Bend(0.0, 0)),
-    (0.65, Controller(SUSTAIN, 0, 0)),
+    (0.65, ControlChange(SUSTAIN, 0, 0)),
 )
 
 
@@ -60,7 +60,7 @@ def test_member_channels_bend_and_slide_as_in_the_app(bank: Library, rate_hz: in
     wanted = in_app(MEMBERS_PLAY, rate_hz)
     assert difference_db(in_host(bank, events, rate_hz), wanted) < EQUAL_DB
     still = [each for each in MEMBERS_PLAY if not isinstance(each[1], Bend)]
-    unslid = [each for each in MEMBERS_PLAY if not (isinstance(each[1], Controller) and each[1].number == SLIDE)]
+    unslid = [each for each in MEMBERS_PLAY if not (isinstance(each[1], ControlChange) and each[1].number == SLIDE)]
     for other in (still, unslid):  # both are heard
         assert difference_db(in_app(other, rate_hz), wanted) > -40
 
@@ -74,7 +74,12 @@ def test_pressure_changes_nothing_as_in_the_app(bank: Library) -> None:
 
 def test_expressions_of_notes_are_what_bend_and_slide_of_a_member_are(bank: Library) -> None:
     rate_hz = 48_000
-    timed = ((0.0, Controller(SLIDE, 57, 1)), (0.01, NoteOn(52, 100, 1)), (0.1, Bend(0.0625, 1)), (0.3, Bend(0.0, 1)))
+    timed = (
+        (0.0, ControlChange(SLIDE, 57, 1)),
+        (0.01, NoteOn(52, 100, 1)),
+        (0.1, Bend(0.0625, 1)),
+        (0.3, Bend(0.0, 1)),
+    )
     expressed = [
         brighten(0, 57 / 127, 1),
         note_on(480, 52, 100, 1, note_id=5),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
-from app.instrument.events import HARMONICS, STRUM, TREMOLO, Controller, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import HARMONICS, STRUM, TREMOLO, ControlChange, NoteOn, PatchTurned, TimedEvent
 from app.instrument.offline import render_events
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
@@ -221,10 +221,14 @@ def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library, images: li
     assert np.array_equal(bounced(), bounced())
 
 
-CONTROLLERS: dict[str, tuple[str, float, tuple[Controller, ...]]] = {
-    "the wheel": ("concert_harp", 0.3, (Controller(1, 100),)),
-    "techniques": (MOVED, 0.0, tuple(Controller(number, 127) for number in (HARMONICS, TREMOLO, STRUM))),
-    "the range of bends": ("electric_bass", 0.0, (Controller(101, 0), Controller(100, 0), Controller(6, 12))),
+CONTROLLERS: dict[str, tuple[str, float, tuple[ControlChange, ...]]] = {
+    "the wheel": ("concert_harp", 0.3, (ControlChange(1, 100),)),
+    "techniques": (MOVED, 0.0, tuple(ControlChange(number, 127) for number in (HARMONICS, TREMOLO, STRUM))),
+    "the range of bends": (
+        "electric_bass",
+        0.0,
+        (ControlChange(101, 0), ControlChange(100, 0), ControlChange(6, 12)),
+    ),
 }
 
 

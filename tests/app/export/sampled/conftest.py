@@ -13,7 +13,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from app.instrument.events import Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.patch import Fretted, Patch
 from engine.values.string import StringParameters
@@ -92,9 +92,9 @@ def by_fluidsynth(path: Path, events: Events, seconds: float) -> Sound:
     if program is None:
         pytest.skip("needs FluidSynth, as Debian's package fluidsynth brings it")
     song, out = path.with_name("song.mid"), path.with_name("song.wav")
-    timed = [TimedEvent(0.0, Controller(7, 127))]
+    timed = [TimedEvent(0.0, ControlChange(7, 127))]
     timed += [TimedEvent(at, NoteOn(key, velocity) if velocity else NoteOff(key)) for at, key, velocity in events]
-    song.write_bytes(midi_bytes([*timed, TimedEvent(seconds, Controller(7, 127))]))
+    song.write_bytes(midi_bytes([*timed, TimedEvent(seconds, ControlChange(7, 127))]))
     effects = "-R 0 -C 0 -g 1 -ni -q -O float -T wav"
     words = [program, *effects.split(), "-r", str(RATE_HZ), "-F", out, path, song]
     subprocess.run(words, check=True, capture_output=True)

@@ -14,7 +14,7 @@ from app.export.sampled.sf2 import release_timecents
 from app.export.sampled.sfz import release_s
 from app.instrument.offline import render_note
 from app.patches.library import find_patch
-from app.patches.patch import Body, Patch
+from app.patches.patch import BodyChoice, Patch
 from app.shared.parameters import OF_PATCHES
 from engine.presets import find_preset, load_preset
 from engine.values.effects import Amp, Room
@@ -173,7 +173,7 @@ def test_a_shipped_instrument_sounds_as_the_note_itself(kind: str, tmp_path: Pat
 @pytest.mark.parametrize(("key", "layers"), [(28, 2), (33, 4)])
 def test_a_note_starts_within_the_reported_error(key: int, layers: int, tmp_path: Path) -> None:
     """Rendered at the hardest velocity of its layer, a note would start about twice as far off."""
-    bass = find_patch("Electric bass").patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
+    bass = find_patch("Electric bass").patch.model_copy(update={"amp": Amp(), "body": BodyChoice(), "room": Room()})
     render, part = note_renderer(load_preset(find_preset(bass.preset)), "model"), slice(480, 12_000)
     plan = SampledPlan(bass, (key, key), layers=layers, seconds=0.5)
     export_sampled(plan, tmp_path / "a.sf2", render)

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QMenu, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Macro, Patch, Target
+from app.patches.patch import Macro, MacroTarget, Patch
 from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
 from tests.app.gestures import LEFT, named, press_keys, reported
@@ -60,14 +60,16 @@ def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, g
     press_keys(shown[1], Qt.Key.Key_Home)
     assert turned == [(1, 0.0)]
     for count in (8, 0):
-        macros = tuple(Macro(name=f"m{n}", targets=(Target(field="room.mix", low=0, high=1),)) for n in range(count))
+        macros = tuple(
+            Macro(name=f"m{n}", targets=(MacroTarget(field="room.mix", low=0, high=1),)) for n in range(count)
+        )
         bar.show_patch(guitar.model_copy(update={"macros": macros}), own=True)
         assert sum(knob.isVisible() for knob in bar.macros) == count
     for fields, words in (
         (("pluck.position", "knobs.brightness_decay"), "Tone: changes pluck position, HF loss"),
         (("pickup.points.0",), "Tone: changes listening point"),  # of the same name, with other targets
     ):
-        macro = Macro(name="Tone", targets=tuple(Target(field=field, low=0.2, high=0.4) for field in fields))
+        macro = Macro(name="Tone", targets=tuple(MacroTarget(field=field, low=0.2, high=0.4) for field in fields))
         bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
         assert bar.macros[0].toolTip().splitlines()[0] == words
 

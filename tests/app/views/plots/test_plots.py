@@ -18,7 +18,7 @@ from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
-from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow
 from app.views.plots.legend import SHARE, Legend
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.error_plane import ErrorPlanePanel
@@ -26,7 +26,7 @@ from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_
 
 Key = Qt.Key
 TICKS = [(float(place), f"{place}") for place in range(11)]
-COLUMNS = (Column("name", "name", "a name"), Column("level", "level", "in dB", lambda v: f"{v:.1f}"))
+COLUMNS = (FigureColumn("name", "name", "a name"), FigureColumn("level", "level", "in dB", lambda v: f"{v:.1f}"))
 
 
 @pytest.fixture

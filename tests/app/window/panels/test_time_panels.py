@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from app.analysis import heard as heard_module
 from app.rendering import Take
-from app.rendering.take import Motion
+from app.rendering.take import Pictures
 from app.views.string.view import StringView
 from app.window.panels import Moment, Panel, StringPanel
 from app.window.panels.error_time import ErrorTimePanel
@@ -287,7 +287,7 @@ def test_another_preset_is_drawn_at_its_rate_when_it_is_there(
     assert len(drawn(waveform, other)) == 0
     time_s = np.arange(16_001)[:, None] / 16_000
     motion = 1e-3 * np.cos(2 * np.pi * 3_000 * time_s) * np.sin(np.pi * np.linspace(0, 1, 51))
-    take.motions[source] = Motion(16_000, 51, 1.0)
+    take.motions[source] = Pictures(16_000, 51, 1.0)
     take.motions[source].append(motion.astype(np.float32))
     hear(take, waveform.session.choices.ear)
     watch(waveform, lambda: whole(waveform, other))
