@@ -111,7 +111,7 @@ def main(words: list[str]) -> int:
         if action == "docs":
             return documents()
         if action == "bench":
-            return subprocess.call([PYTHON, "-m", "tests.bench", *arguments], cwd=ROOT)
+            return subprocess.call([PYTHON, "-m", "bench", *arguments], cwd=ROOT)
         return start(arguments) if action == "start" else 0
     except KeyboardInterrupt:
         return fail("stopped", 130)

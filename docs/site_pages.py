@@ -82,7 +82,7 @@ def help_texts(command: Any, name: str, words: tuple[str, ...] = ()) -> list[tup
 
 
 def benchmarks() -> str:
-    from tests.bench.cli import bench
+    from bench.cli import bench
 
     commands = typer.main.get_command(bench).commands  # type: ignore[attr-defined]
     rows = [

@@ -17,7 +17,11 @@ ROOT = Path(__file__).parents[1]
 PROSE = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("app/**/*.md")])
 CODE = sorted(
     [
-        *(path for name in ("app", "engine", "training", "docs", "tests") for path in ROOT.glob(f"{name}/**/*.py")),
+        *(
+            path
+            for name in ("app", "bench", "engine", "training", "docs", "tests")
+            for path in ROOT.glob(f"{name}/**/*.py")
+        ),
         ROOT / "run.py",
     ]
 )

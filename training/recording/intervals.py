@@ -8,7 +8,7 @@ Three variances add up:
 - that of the model, which is not quite true (Kennedy, O'Hagan 2001): the root mean square that it is off on
   synthetic notes of the project's own solver, with body, noise and a second polarisation.
 
-`tests.bench.recordings.coverage` measures the last one, and tests the intervals on other notes.
+`bench.recordings.coverage` measures the last one, and tests the intervals on other notes.
 """
 
 from __future__ import annotations

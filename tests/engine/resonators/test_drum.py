@@ -86,7 +86,7 @@ def test_the_integral_of_the_air_has_converged(shape: DrumShape, monkeypatch: py
 
 
 def test_a_shell_lowers_the_first_mode_to_that_of_a_measured_tom() -> None:
-    """142 Hz where (1,1) has 305 Hz (Rossing, see tests/bench/drums.py); its size is not known, toms are alike."""
+    """142 Hz where (1,1) has 305 Hz (Rossing, see bench/drums.py); its size is not known, toms are alike."""
     for size_m, tension_n_m, shell_m in ((0.254, 1497, 0.165), (0.305, 2301, 0.203), (0.356, 3337, 0.203)):
         open_head = DrumParameters(length_m=size_m, width_m=size_m, tension_n_m=tension_n_m, air_kg_m3=1.2)
         found, flat = lowest(replace(open_head, shell_m=shell_m)), lowest(open_head)

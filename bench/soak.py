@@ -19,12 +19,12 @@ import numpy as np
 from app.audio.choices import Buffer
 from app.patches.patch import Patch
 from app.window.settings import load_settings
-from tests.bench.play import analysis, hands
-from tests.bench.play.measure import DECAY_PATIENCE_S, SILENCE_S, STOP
-from tests.bench.play.program import Program, program
-from tests.bench.play.recording import CardClock
-from tests.bench.play.sound_server import RATE_HZ
-from tests.bench.printing import target
+from bench.play import analysis, hands
+from bench.play.measure import DECAY_PATIENCE_S, SILENCE_S, STOP
+from bench.play.program import Program, program
+from bench.play.recording import CardClock
+from bench.play.sound_server import RATE_HZ
+from bench.printing import target
 from training.cli.console import ProgressReport
 
 RATE_OF_PLAYING_HZ = 12.0

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from app.audio.choices import Buffer
-from tests.bench.play.children import child
-from tests.bench.play.recording import Recording, recording
-from tests.bench.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
+from bench.play.children import child
+from bench.play.recording import Recording, recording
+from bench.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
 
 SINK = "control"
 TONE_HZ = 440
@@ -31,7 +31,7 @@ def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[R
     """Play and record it until the block ends."""
     load = ["pactl", "load-module", "module-null-sink", f"sink_name={SINK}", f"rate={RATE_HZ}", f"format={FORMAT}"]
     subprocess.run([*load, f"channels={CHANNELS}"], env=server.environment, check=True, capture_output=True)
-    command = [sys.executable, "-m", "tests.bench.play.control", str(buffer)]
+    command = [sys.executable, "-m", "bench.play.control", str(buffer)]
     environment = {**server.environment, "PULSE_SINK": SINK}
     with recording(server, folder / "control", SINK) as recorded, child(command, environment):
         recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does

@@ -54,8 +54,8 @@ def run(
     Args:
         threads: to which torch is limited.
     """
-    from tests.bench import machine
-    from tests.bench.printing import show
+    from bench import machine
+    from bench.printing import show
 
     with progress(f"bench {name}") as report, machine.threads(threads):
         found = {"machine": machine.Machine.here(), **work(report)}
@@ -65,7 +65,7 @@ def run(
 
 def _plain(name: str) -> Callable[[bool], None]:
     def command(json: Json = False) -> None:
-        run(name, lambda report: import_module(f"tests.bench.{name}").measure(report), json, threads=1)
+        run(name, lambda report: import_module(f"bench.{name}").measure(report), json, threads=1)
 
     return command
 
@@ -77,7 +77,7 @@ for _name, _help in PLAIN.items():
 @bench.command()
 def memory() -> None:
     """Resident memory of the running app: in Play, after 20 notes, in the Lab. Its window is open for 45 s."""
-    from tests.bench.memory import main as watch
+    from bench.memory import main as watch
 
     raise typer.Exit(watch())
 
@@ -97,8 +97,8 @@ def train(
 
     With --against and --source steps of both are taken in turns, on as many threads.
     """
-    from tests.bench import authors
-    from tests.bench import train as of_train
+    from bench import authors
+    from bench import train as of_train
 
     if (against is None) != (source is None):
         raise typer.BadParameter("--against and --source go together")
@@ -118,7 +118,7 @@ def tune(
 ) -> None:
     """Pitch and loudness of patches over their range, and the level of a chord."""
     from app.patches.library import list_patches
-    from tests.bench.tune import measure
+    from bench.tune import measure
     from training.cli.arguments import open_preset
 
     chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches()[0]]
@@ -145,8 +145,8 @@ def recordings(
     json: Json = False,
 ) -> None:
     """Errors of a folder's recordings: own note, linear baselines, unseen half; or which sounds the gate keeps."""
-    from tests.bench.recordings import coverage, evaluate
-    from tests.bench.recordings import gate as of_gate
+    from bench.recordings import coverage, evaluate
+    from bench.recordings import gate as of_gate
 
     if synthetic is not None:
         run("recordings", partial(coverage.measure, synthetic), json)
@@ -166,7 +166,7 @@ def app(
     starts: Annotated[int, typer.Option(min=1, help="Timed starts, after one that is not.")] = 3,
 ) -> None:
     """Time from the start until the window is shown, and until keys sound. Windows open."""
-    from tests.bench.start import measure
+    from bench.start import measure
 
     run("app", partial(measure, starts), json)
 
@@ -191,7 +191,7 @@ def play(
     The app runs on a private screen and is played by keys. Linux only. Needs PulseAudio and Xvfb; starts a sound
     server and a screen of its own, and leaves yours alone.
     """
-    from tests.bench.play.measure import measure
+    from bench.play.measure import measure
 
     instrument = _patch(patch) if preset is None else _single(preset)
     run("play", partial(measure, seconds, rate, _buffer(buffer), busy, seed, instrument), json)
@@ -214,7 +214,7 @@ def soak(
     It needs the same as `play`. Exit status 1 where there are faults.
     """
     from app.patches.library import SHIPPED, list_patches
-    from tests.bench.soak import measure
+    from bench.soak import measure
 
     patches = [_patch(name) for name in patch or ["concert_harp"]]
     if every:

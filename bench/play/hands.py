@@ -9,7 +9,7 @@ from random import Random
 from app.patches.drums import Drums
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
-from tests.bench.play.screen import Screen
+from bench.play.screen import Screen
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
 ROW = ("a", "s", "d", "f", "g", "h", "j", "k", "l", "semicolon")  # places along a single string

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from bench.machine import median_s, times_s
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
-from tests.bench.machine import median_s, times_s
 from training.cli.console import ProgressReport
 
 FIRST_BLOCK = 256  # frames

@@ -14,8 +14,8 @@ from typing import Any
 
 import torch
 
+from bench import train
 from engine.models.base import count_parameters
-from tests.bench import train
 from training.cli.console import Failure, ProgressReport
 
 MODELS = ("koopman_var", "koopman", "s5", "lru")

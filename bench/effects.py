@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.machine import RATE_HZ
 from engine.effects import Body, Effects
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import WINDOW, WINDOW_QUANTA
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
-from tests.bench.machine import RATE_HZ
 from training.cli.console import ProgressReport
 
 SECONDS = 10.0  # measured, after `FILLING_S`

@@ -13,13 +13,13 @@ from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Noise
 from app.presets.library import STUDIO
+from bench.machine import RATE_HZ, Shares, shares
 from engine.kernels.constants import MOST_NOTES, MOST_PAIRS
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED, load_preset, preset_files
 from engine.resonators.sine_transform import project
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, model_program, truth_program
-from tests.bench.machine import RATE_HZ, Shares, shares
 from training.cli.console import ProgressReport
 
 MODEL_SHARE, TRUTH_SHARE = 0.25, 0.5  # of a core, for voices of each kind

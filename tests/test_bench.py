@@ -9,9 +9,9 @@ from typing import Any
 
 import typer
 
-from tests.bench.cli import bench, main
+from bench.cli import bench, main
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.shared.thread_priority import put_first
-from tests.bench.play.children import Missing, child
+from bench.play.children import Missing, child
 
 RATE_HZ = 48_000
 CHANNELS = 2
@@ -66,7 +66,7 @@ def sound_server(folder: Path) -> Iterator[SoundServer]:
         "XDG_CACHE_HOME": caches,
         "PULSE_RUNTIME_PATH": str(folder),
         "PULSE_SERVER": f"unix:{folder / SOCKET}",
-        "PYTHONPATH": str(Path(__file__).parents[3]),
+        "PYTHONPATH": str(Path(__file__).parents[2]),
     }
     socket, log_path = folder / SOCKET, folder / "pulse.log"
     protocol = f"module-native-protocol-unix socket={socket} auth-anonymous=1"

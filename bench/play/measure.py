@@ -15,12 +15,12 @@ import numpy as np
 
 from app.audio.choices import Buffer
 from app.patches.instrument import Instrument, SingleString
-from tests.bench.play import analysis, hands
-from tests.bench.play.calibration import Holding, transit
-from tests.bench.play.children import child
-from tests.bench.play.program import Program, program
-from tests.bench.play.sound_server import RATE_HZ
-from tests.bench.printing import target
+from bench.play import analysis, hands
+from bench.play.calibration import Holding, transit
+from bench.play.children import child
+from bench.play.program import Program, program
+from bench.play.sound_server import RATE_HZ
+from bench.printing import target
 from training.cli.console import ProgressReport
 
 SINGLES = 60

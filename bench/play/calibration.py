@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from tests.bench.play.analysis import FAINTEST_PLUCK
-from tests.bench.play.children import child
-from tests.bench.play.recording import Recording
-from tests.bench.play.sound_server import RATE_HZ, SoundServer
+from bench.play.analysis import FAINTEST_PLUCK
+from bench.play.children import child
+from bench.play.recording import Recording
+from bench.play.sound_server import RATE_HZ, SoundServer
 
 LATENCIES_S = (0.01, 0.02, 0.05, 0.1, 0.2)  # requested of the device
 CLICKS = 8
@@ -79,7 +79,7 @@ def click_through(server: SoundServer) -> list[Handed]:
     """
     found = []
     for latency_s in LATENCIES_S:
-        command = [sys.executable, "-m", "tests.bench.play.calibration", str(latency_s)]
+        command = [sys.executable, "-m", "bench.play.calibration", str(latency_s)]
         holding = Holding()
         with child(command, server.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             deadline_s = time.monotonic() + PATIENCE_S

@@ -22,10 +22,10 @@ from app.instrument.offline import OfflinePlayer
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Patch
+from bench.machine import RATE_HZ
 from engine.kernels import cache
 from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Instance, Library, note_on
-from tests.bench.machine import RATE_HZ
 from training.cli.console import ProgressReport
 
 INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")

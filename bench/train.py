@@ -12,11 +12,11 @@ from unittest.mock import patch
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
+from bench.machine import REPEATS, median_s
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
-from tests.bench.machine import REPEATS, median_s
 from training.cell import Cell, configuration_of
 from training.cli.console import ProgressReport
 from training.configuration import Recipe

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tests.bench.printing import target
+from bench.printing import target
 from training.cli.console import ProgressReport
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LOOK_MS = 5
 PATIENCE_S = 180.0
 # the command line is imported, as it is at a user's start
-COMMAND = "import sys; import app.commands.cli; from tests.bench.start import main; sys.exit(main())"
+COMMAND = "import sys; import app.commands.cli; from bench.start import main; sys.exit(main())"
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def _start() -> dict[str, Any]:
         environment = {**os.environ, "LEARNED_STRINGS_SETTINGS": str(Path(folder) / "settings.json")}
         environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as at a user's second start
         begun_s = time.time()  # the only clock that two processes share on every system
-        command, root = [sys.executable, "-c", COMMAND], Path(__file__).parents[2]
+        command, root = [sys.executable, "-c", COMMAND], Path(__file__).parents[1]
         done = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True, timeout=PATIENCE_S)
     if done.returncode != 0:
         raise RuntimeError(f"the app did not start: {done.stderr.strip().splitlines()[-1:]}")

@@ -20,8 +20,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.bench.play.children import child
-from tests.bench.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SINK, SoundServer
+from bench.play.children import child
+from bench.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SINK, SoundServer
 
 LATENCY_MS = 5  # of the recorder, and through it of the sink: how much the card takes at a time
 FRAME_BYTES = 4 * CHANNELS

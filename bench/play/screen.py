@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tests.bench.play.children import Missing, child
+from bench.play.children import Missing, child
 
 if TYPE_CHECKING:
     from Xlib.xobject.drawable import Window

@@ -20,13 +20,13 @@ from app.audio.choices import Buffer, SoundChoice
 from app.patches.instrument import Instrument, SingleString
 from app.session.choices import Choices
 from app.window.settings import Settings, save_settings
-from tests.bench.play import hands
-from tests.bench.play.calibration import Handed, click_through
-from tests.bench.play.children import child, need_programs
-from tests.bench.play.control import steady_tone
-from tests.bench.play.recording import Recording, recording
-from tests.bench.play.screen import Screen, private_screen
-from tests.bench.play.sound_server import RATE_HZ, SoundServer, sound_server
+from bench.play import hands
+from bench.play.calibration import Handed, click_through
+from bench.play.children import child, need_programs
+from bench.play.control import steady_tone
+from bench.play.recording import Recording, recording
+from bench.play.screen import Screen, private_screen
+from bench.play.sound_server import RATE_HZ, SoundServer, sound_server
 from training.cli.console import ProgressReport
 
 PROGRAMS = ("pulseaudio", "pacat", "parec", "pactl", "Xvfb")

@@ -16,11 +16,11 @@ from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
 from app.patches.patch import BodyChoice, Patch
+from bench.machine import RATE_HZ
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY
 from engine.kernels.loudness import k_weight
 from engine.presets import Preset
 from engine.values.effects import Room
-from tests.bench.machine import RATE_HZ
 from training.cli.console import ProgressReport
 
 QUIET_MM = 0.03  # amplitude at which the pitch is measured, above the level at which a voice ends

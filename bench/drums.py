@@ -16,12 +16,12 @@ from app.patches.drums import Drums
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Patch
+from bench.machine import RATE_HZ, Shares, shares, times_s
 from engine.presets import SHIPPED, load_preset
 from engine.resonators import surface
 from engine.values.drum import Mallet
 from engine.values.ear import Ear
 from engine.voices import Mixer
-from tests.bench.machine import RATE_HZ, Shares, shares, times_s
 from training.cli.console import ProgressReport
 
 VELOCITY = 110
@@ -35,7 +35,7 @@ MEASURED_HZ: dict[str, dict[tuple[int, int], float]] = {
     "tom_12": {mode: 142 * ratio for mode, ratio in zip(TOM_MODES, TOM_RATIOS, strict=True)},
     "timpani_head_26": {(0, 1): 82, (1, 1): 155, (2, 1): 229, (3, 1): 297, (4, 1): 366, (5, 1): 431},
 }
-DRUM_FILES, MODES_COMPARED = Path(__file__).parents[2] / "presets" / "drums", 40
+DRUM_FILES, MODES_COMPARED = Path(__file__).parents[1] / "presets" / "drums", 40
 # Drops of hard blows in percent. Toms: "almost 8 %" of one of 14 inches (Gärder, Chalmers thesis 2005:23, C.4.3), 160
 # cents of one of 32 cm (Bork, PTB 1983, by Fletcher and Rossing, 18.4), both as CWBudde/algo-drum quotes them
 # (docs/paper/references.bib). A kick drum: "around 10 percent" (Reid, Sound on Sound, January 2002).

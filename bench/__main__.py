@@ -1,0 +1,7 @@
+"""`python -m bench`: what `run.py bench` starts."""
+
+import sys
+
+from bench.cli import main
+
+sys.exit(main())
