@@ -18,7 +18,6 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
-from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
@@ -26,6 +25,7 @@ from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import Name
 from app.patches.library import SHIPPED, SUFFIX, PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import BodyChoice, Category, Fretted, Patch, Pickup, PluckChoices
+from engine.effects.responses import resampled
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
 from engine.presets import load_preset
@@ -128,8 +128,7 @@ def both_sounds(learned: Learned, rate_hz: int) -> dict[str, NDArray[np.float32]
 
     One gain for both: the recording peaks at -6 dBFS.
     """
-    shared = math.gcd(rate_hz, learned.note.rate_hz)
-    recording = resample_poly(learned.note.samples, rate_hz // shared, learned.note.rate_hz // shared)
+    recording = resampled(learned.note.samples[:, None], learned.note.rate_hz, rate_hz)[:, 0]
     note = recorded_note(learned.note, learned.fitted, learned.source).sound(rate_hz)
     frames = min(len(recording), len(note))
     gain = 0.5 / max(float(np.abs(recording).max()), 1e-9)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
+
+from engine.effects.responses import resampled
 
 Array = NDArray[np.float64]
 
@@ -76,8 +77,7 @@ def note_of(samples: Array, rate_hz: int) -> Note:
         raise RecordingError("it is silent; check the cable and the level, and record it again")
     if rate_hz > HIGHEST_RATE_HZ:
         target = HIGHEST_RATE_HZ if rate_hz % HIGHEST_RATE_HZ == 0 else 44_100
-        shared = math.gcd(target, rate_hz)
-        mono, rate_hz = signal.resample_poly(mono, target // shared, rate_hz // shared), target
+        mono, rate_hz = resampled(mono[:, None], rate_hz, target)[:, 0], target
     onset = onset_of(mono, rate_hz)
     return Note(mono, rate_hz, onset, _noise_power(mono, rate_hz, onset))
 

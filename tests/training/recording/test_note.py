@@ -35,3 +35,15 @@ def test_the_louder_of_two_unlike_channels_is_taken(synthetic: SyntheticNote) ->
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(synthetic.samples))
     note = note_of(np.stack([noise, synthetic.samples], 1), synthetic.rate_hz)
     assert np.allclose(note.samples, synthetic.samples - synthetic.samples.mean())
+
+
+@pytest.mark.parametrize("rate_hz", [88_200, 96_000, 64_000])
+def test_a_high_rate_has_the_tones_of_a_low_one_and_nothing_folded(rate_hz: int) -> None:
+    def recorded(hz: float, at_hz: int) -> np.ndarray:
+        time_s = np.arange(at_hz // 2) / at_hz
+        return np.sin(2 * np.pi * hz * time_s) * np.hanning(len(time_s) + 1)[:-1]
+
+    tone, above = 18_000.0, 29_000.0  # the second is above half the rate that is fitted
+    note = note_of(recorded(tone, rate_hz) + recorded(above, rate_hz), rate_hz)
+    expected = recorded(tone, note.rate_hz)[: len(note.samples)]
+    assert np.linalg.norm(note.samples[: len(expected)] - expected) < 1e-4 * np.linalg.norm(expected)
