@@ -251,7 +251,7 @@ def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, An
     lab.controller.play_or_stop()
     lab.performance.seek(0.2)
     lab.wait(lambda: shown["show_frame"] and set(shown["show_frame"].shapes) == {"preset:second", "difference"})
-    assert shown["show_frame"].envelopes
+    lab.wait(lambda: shown["show_frame"].envelopes)
     lab.press("Envelope")
     lab.wait(lambda: shown["show_frame"] and not shown["show_frame"].envelopes)
     lab.press("Motion")
