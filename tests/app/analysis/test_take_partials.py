@@ -17,6 +17,7 @@ from engine.resonators.sine_transform import project, to_grid, to_modes
 from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
+from engine.values.string import StringParameters
 from tests.app.takes import append_to
 
 
@@ -26,14 +27,13 @@ def info(small_preset: object) -> PresetInfo:
 
 
 def take_of(
-    info: PresetInfo, pluck: Pluck, gains: list[float], sharp_cents: float = 0.0, seconds: float = 0.5
+    info: PresetInfo, pluck: Pluck, gains: list[float], model: StringParameters | None = None, seconds: float = 0.5
 ) -> Take:
-    """A linear string, and beside it one with modes of other levels and, where asked, a higher tension."""
+    """A linear string, and beside it one with modes of other levels and, where asked, another string."""
     take = Take("take", info, pluck, seconds, Ear((0.5,)))
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
-    tighter = replace(info.string, tension_n=info.string.tension_n * 2 ** (2 * sharp_cents / 1200))
     motions = []
-    for string in (replace(info, string=tighter), info):
+    for string in (replace(info, string=model or info.string), info):
         source = TruthSource(string)
         frames, _ = source.advance(source.start(initial), take.frames - 1)
         motions.append(np.concatenate([initial, frames[0]]))
@@ -56,10 +56,19 @@ def test_levels_and_decay_times_mode_by_mode(info: PresetInfo, job: Job) -> None
     assert two.model_t60_s == pytest.approx(two.truth_t60_s, rel=1e-2)
 
 
-def test_a_tighter_string_is_sharp(info: PresetInfo, job: Job) -> None:
-    rows = take_partials(take_of(info, Pluck(0.37, 4.0), [1.0] * 10, sharp_cents=5), job)["all"]
-    assert rows[0].cents == pytest.approx(5, abs=0.1)
-    assert rows[0].model_hz == pytest.approx(rows[0].truth_hz * 2 ** (5 / 1200), rel=1e-4)  # type: ignore[operator]
+@pytest.mark.parametrize("decay", [0.6, 1.8])
+def test_a_tighter_string_is_sharp_and_one_of_another_loss_rings_as_long_as_it_does(
+    info: PresetInfo, job: Job, decay: float
+) -> None:
+    own = info.string
+    loss = {name: decay * getattr(own, name) for name in ("damping_d1_kg_m_s", "damping_d3_kg_m_s")}
+    other = replace(own, tension_n=own.tension_n * 2 ** (10 / 1200), **loss)
+    for row in take_partials(take_of(info, Pluck(0.37, 4.0), [1.0] * 10, other), job)["all"][1:4]:
+        assert row.cents == pytest.approx(5, abs=0.1)
+        assert row.model_hz == pytest.approx(other.undamped_frequency(row.mode) / (2 * math.pi), rel=1e-4)
+        t60_s = [math.log(1000) / string.decay_rate(row.mode) for string in (own, other)]
+        assert [row.truth_t60_s, row.model_t60_s] == pytest.approx(t60_s, rel=1e-2)
+        assert row.t60_error_percent == pytest.approx(100 / decay - 100, abs=1)
 
 
 def test_rows_without_figures_say_why(info: PresetInfo, job: Job) -> None:

@@ -169,9 +169,9 @@ def numbers_of(text: str) -> list[list[float]]:
 AGAIN = "on 45, .3 on 45, .5 off 45"
 PULLED_ON = "legato 127, on 45, .2 on 48 v90, .4 off 48, .6 off 45"
 ALIKE = f"""
-test: harmonics 127, on 45               | test technique.harmonic={USUAL_HARMONIC}: on 45  | 0.3 0
+test: harmonics 64, on 45                | test technique.harmonic={USUAL_HARMONIC}: on 45  | 0.3 0
 test mod_wheel=technique.harmonic: wheel 127, on 45 | test technique.harmonic={USUAL_HARMONIC}: on 45 | 0.3 0
-test: harmonics 127, harmonics 0, on 45  | test: on 45                                      | 0.3 0
+test: harmonics 64, harmonics 63, on 45  | test: on 45                                      | 0.3 0
 test: mute 127, on 45                    | test damping.mute=1: on 45                       | 0.3 0
 test mod_wheel=damping.mute: wheel 127, on 45 | test damping.mute=1: on 45                  | 0.3 0
 test mod_wheel=technique.vibrato_cents: wheel 127, on 45 | test technique.vibrato_cents=35: on 45 | 0.5 0
@@ -260,7 +260,7 @@ test mode=mpe: on 45 v8 @1, on 57 v8 @2, .02 bend {4 / 48} @2 | .1 1 45 .5; .1 1
 guitar mode=poly: {HAMMERED_ON} | .1 .27 45 6; .5 .67 48 6; .9 1.07 45 6
 guitar: {HAMMERED_ON}           | .1 .27 45 6; .5 .67 48 6; .9 1.07 45 6
 guitar mode=poly: legato 127, on 45 v40, .4 on 42 v40 | .5 .75 45 7; .5 .75 42 7
-guitar mode=poly: portamento 127, slide-time {HALF_S}, legato 127, on 45, .4 on 50 | .6 .7 47.65 115; 1.1 1.35 50 7
+guitar mode=poly: portamento 64, slide-time {HALF_S}, legato 64, on 45, .4 on 50 | .6 .7 47.65 115; 1.1 1.35 50 7
 """
 
 
@@ -315,6 +315,12 @@ def test_levels(read: Read, preset: Preset, played: str, heard: str, source: str
 
 
 SCORES = f"""
+test: a foot is on a pedal from 64 on
+pedal 64, on 57, off 57 => 0 kept
+pedal 63 => 0 damped
+legato 64, on 45, on 48 => rings 57 48
+legato 63, on 50 => rings 57 48 50
+
 test mod_wheel=knobs.decay: a reset leaves the next key and the ringing one in tune and lifts the pedal
 bend 1, pedal 127, wheel 127, on 57 => 0 bent 2, 0 held
 off 57 => 0 kept
@@ -487,11 +493,13 @@ test technique.strum_ms=5 technique.strokes=2: {TURNS}               | 48000 | 4
 test technique.strum_ms=20: 100 on 50, 300 on 59, 420 on 45, {100 + LATE} on 70 | 6000 | 50@100 45@1060 70@{100 + LATE} 59@2020
 test technique.strum_ms=40: {THREE.format(64)}, 640 mode123 0        | 9600 | 40@64
 test technique.strum_ms=40: {THREE.format(64)}, 640 sound-off 0      | 9600 | 40@64
-test: strum 127 @16, on 40 @16, on 45 @16                            | 4096 | 40@0 45@{SPREAD}
+test: strum 64 @16, on 40 @16, on 45 @16                             | 4096 | 40@0 45@{SPREAD}
+test: strum 64 @16, strum 63 @16, on 40 @16, on 45 @16               | 4096 | 40@0 45@0
 test: strum 127 @16, on 40 @3, on 45 @3                              | 4096 | 40@0 45@0
 test technique.tremolo_hz=12: 1000 on 45, 18000 off 45               | 48000 | 45@1000 45@5000 45@9000 45@13000 45@17000
 test technique.tremolo_hz=10: pedal 127, on 45, 640 off 45           | 48000 | 45@0
-test: tremolo 127, on 45, 24000 reset 0                              | 48000 | {TREMBLING}
+test: tremolo 64, tremolo 63, on 45                                  | 48000 | 45@0
+test: tremolo 64, on 45, 24000 reset 0                               | 48000 | {TREMBLING}
 """  # noqa: E501
 
 

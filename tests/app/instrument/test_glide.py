@@ -18,12 +18,19 @@ from tests.app.instrument.stage import cents, pitch_hz, play
 
 @pytest.mark.parametrize("source", ["model", "truth"])
 @pytest.mark.parametrize(
-    ("name", "key", "velocity"),
-    [("Slack bass", 44, 127), ("Slack bass", 50, 100), ("Electric bass", 45, 127), ("Harpsichord", 84, 127)],
+    ("name", "key", "velocity", "decay"),
+    [
+        ("Slack bass", 44, 127, 1.0),
+        ("Slack bass", 50, 127, 20.0),
+        ("Electric bass", 45, 127, 1.0),
+        ("Harpsichord", 84, 127, 1.0),
+    ],
 )
-def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, source: str, preset: Preset) -> None:
+def test_a_rendered_note_starts_as_sharp(
+    name: str, key: int, velocity: int, decay: float, source: str, preset: Preset
+) -> None:
     """Of the string alone. Keys high enough for many periods in START_S: partials of a lower one overlap."""
-    patch = find_patch(name).patch.with_values({"noise.onset_db": -60.0})
+    patch = find_patch(name).patch.with_values({"noise.onset_db": -60.0, "knobs.decay": decay})
     patch = patch.model_copy(update={"amp": Amp(), "body": BodyChoice(), "room": Room()})
     string = Strings(patch).of_key(key)
     assert string is not None

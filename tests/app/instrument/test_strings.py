@@ -58,6 +58,8 @@ def test_a_set_may_be_asked_for_a_string(guitar: Patch) -> None:
         assert in_tune(found, hz_of(key))
         return found.tension_n
 
+    by_key = {50: 60.0, 54: 60.0, 55: 70.0, 58: 70.0, 59: 80.0, 60: 80.0}  # open strings sound at their own keys
+    assert {key: tension_n(key, None) for key in by_key} == by_key
     assert [tension_n(64, string) for string in (None, 0, 1, 2, 3)] == [80.0, 80.0, 70.0, 60.0, 80.0]
     assert [tension_n(53, string) for string in (None, 0, 2)] == [60.0, 60.0, 60.0]  # 0 is too far above
     assert tension_n(57, 0) == pytest.approx(80 * 2 ** (-4 / 12), rel=0.01)  # it is slackened

@@ -65,6 +65,16 @@ def test_it_rings_out_within_its_tail() -> None:
     assert np.abs(found[tail + 100 :]).max() < 1e-12
 
 
+@pytest.mark.parametrize("room", [None, Room(0.4, 0.5)])
+def test_a_mono_body_is_one_whose_sides_are_the_same(room: Room | None) -> None:
+    """A room is as wide behind it."""
+    mono = np.random.default_rng(0).standard_normal((100, 1))
+    one, two = (Effects(Body(0.7, impulse=Impulse(each, RATE_HZ)), room) for each in (mono, mono.repeat(2, 1)))
+    found = one.impulse(RATE_HZ)
+    np.testing.assert_allclose(np.broadcast_to(found, (len(found), 2)), two.impulse(RATE_HZ), atol=1e-12)
+    assert found.shape[1] == (1 if room is None else 2)
+
+
 def test_a_body_of_a_single_frame_is_heard_in_a_room() -> None:
     """Its balance of left and right, and its sign."""
     sample, silence = np.array([[-1.0, 0.2]]), np.zeros((1, 2))

@@ -58,6 +58,15 @@ def test_two_octaves_away_the_smooth_decay_alone() -> None:
     assert np.allclose(resonator.sigma[first], 2 * law.sigma, rtol=1e-6)
 
 
+def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
+    lossy = replace(STRING, damping_d1_kg_m_s=0.03)
+    fast = replace(recorded(), ratio=(20.0, 2.0, 20.0), second_ratio=(0.5, 1.0, 4.0))
+    resonator, law = fast.resonator(lossy, 6), resonator_of(lossy, 3)
+    bounded = resonator.sigma / resonator.omega[[0, 0, 2, 3, 4, 5]]
+    assert bounded[[0, 1, 5]] == pytest.approx([0.5, 0.25, 0.5])
+    assert resonator.sigma[2:5] / law.sigma[[1, 1, 2]] == pytest.approx([4, 4, 40], rel=1e-6)
+
+
 def test_a_displacement_is_shared_by_both_polarisations() -> None:
     resonator = recorded().resonator(STRING, 6)
     shape = resonator.shapes[0]
@@ -77,6 +86,18 @@ def test_the_recorded_note_glides_to_its_pitch() -> None:
 
     assert hz(500, 3_000) > hz(30_000, 44_000) + 0.5
     assert hz(30_000, 44_000) == pytest.approx(246.9, abs=0.2)
+
+
+def test_at_another_rate_it_is_the_same_sound_without_what_lies_above_half_of_it() -> None:
+    hz, ones = (1_000.0, 5_000.0, 6_000.0, 10_000.0, 20_000.0), (1.0,) * 5
+
+    def note(count: int) -> RecordedNote:
+        parts = (each[:count] for each in (hz, (20.0,) * 5, ones, ones, (1, 2, 0, 3, 0)))
+        return RecordedNote(44_100, 22_048, 100, 452, (0.1,), (0.01,), *parts)  # type: ignore[arg-type]
+
+    low = note(2).sound()[::4]
+    np.testing.assert_allclose(note(5).sound(11_025), low, atol=1e-9)
+    assert np.abs(low).max() > 1 and np.abs(note(5).sound()[::4] - low).max() > 1
 
 
 def test_it_is_written_and_read_and_checked() -> None:

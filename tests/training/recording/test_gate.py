@@ -62,6 +62,8 @@ def with_mode(x: np.ndarray, decay: float) -> np.ndarray:
 
 CHANGED: dict[str, tuple[Change, set[str], set[str]]] = {  # what must be found, and what refused
     "many samples clipped": (lambda x: np.clip(4 * x, -0.5, 0.5), {"clipped"}, {"clipped"}),
+    "clipped above alone, as with an offset": (lambda x: np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
+    "clipped below alone": (lambda x: -np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
     "few samples clipped": (few_clipped, {"clipped"}, set()),
     "reversed": (lambda x: x[::-1].copy(), {"edited"}, {"edited"}),
     "so much of a room that the level rises for long": (reverberated, {"edited"}, {"chord"}),
