@@ -66,8 +66,8 @@ class Script:
         task = read(Task, plain, "task")
         self.tasks.append(task)
         self.started.append(task.runs[0].name)
+        self.most = max(self.most, 1 + sum(not future.done() for future in self.futures))
         self.futures.append(self._pool.submit(self._end, task, self.started.count(task.runs[0].name)))
-        self.most = max(self.most, sum(not future.done() for future in self.futures))
         return self.futures[-1]
 
     def _end(self, task: Task, tries: int) -> dict[str, Any]:
