@@ -29,7 +29,7 @@ from PySide6.QtWidgets import (
 
 from app.views.controls.browser_rows import STAR, TITLE, BrowserColumn, BrowserRow, RowList, listed_rows
 from app.views.controls.notice_bar import NoticeBar
-from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button
+from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button, words_label
 from app.views.controls.plain import Label
 
 KEYS = Qt.Key
@@ -122,7 +122,7 @@ class Browser(QFrame):
         self.card.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.card.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.card.setContentsMargins(14, 4, 10, 10)
-        self.state = faint()
+        self.state = words_label()  # the path of a folder may be longer than the window is wide
         self.play_button = _button(f"▶  {plays}", f"{plays} (Space)", self.play)
         self.star = _button("☆  Favourite", "Add to the favourites, or remove (Ctrl+D)", self.ask_favourite)
         tip = "Give your own another name"
@@ -204,7 +204,7 @@ class Browser(QFrame):
         self._filling = False
         matches, total = len(self.listed), self.total
         count = f"{matches} of {total} {self.what}" if matches < total else f"{total} {self.what}"
-        self.state.setText(f"{count}   ·   your own: {self._folder}")
+        self.state.say(f"{count}   ·   your own: {self._folder}", count)
         self.select(self.selected)
         self.listed_changed.emit()
 

@@ -94,6 +94,15 @@ class Window:
     def wait(self, condition: Callable[[], object]) -> None:
         self.qtbot.waitUntil(lambda: bool(condition()))
 
+    def wait_for(self, value: Callable[[], object], expected: object) -> None:
+        """Wait until a value is the expected one; the error of a value that stays another shows it."""
+
+        def check() -> None:
+            found = value()
+            assert found == expected, f"it is {found!r}"
+
+        self.qtbot.waitUntil(check)
+
     def wait_for_take(self) -> None:
         """Return when what is chosen is rendered; the words alone may be of the pluck before."""
         words = self.window.error_label

@@ -223,3 +223,15 @@ def test_a_notice_is_not_hidden_behind_it(browser: Browser) -> None:
     assert browser.y() > notices.geometry().bottom()
     notices.hide()
     assert browser.y() == alone == notices.y()
+
+
+@pytest.mark.parametrize("name", ["steel", "mine"])
+def test_it_fits_a_small_window_wherever_the_folder_lies(browser: Browser, guitar: Patch, name: str) -> None:
+    browser.parentWidget().resize(853, 480)  # 1280 × 720 at 150 %
+    entries = [entry(guitar, "steel"), entry(guitar, "mine", own=True)]
+    browser.show_rows([patch_row(each) for each in entries], {"steel"}, name, "/home/musician" + "/a long name" * 30)
+    browser.select(name)
+    browser.place()
+    assert browser.rename.isVisible() == (name == "mine")
+    assert browser.layout().minimumSize().width() <= browser.width()
+    assert browser.state.text().endswith("/a long name")
