@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from app.instrument import events
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import (
-    COARSE_TUNING,
-    FINE_TUNING,
     Bend,
     ControlChange,
     Event,
@@ -32,6 +30,7 @@ from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import constants as of
+from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
 from engine.presets import Preset
 from engine.values.ear import Ear
 from engine.voices import CompiledPlayer

@@ -8,42 +8,39 @@ from typing import Annotated
 
 from app.patches.fields import ranged
 from app.patches.patch import Patch
+from engine.kernels.midi import (
+    BEND_RANGE,
+    DECREMENT,
+    EXPRESSION,
+    FINE_OTHER,
+    FINE_REGISTERED,
+    FINE_VALUE,
+    HARMONICS,
+    INCREMENT,
+    LEGATO,
+    MOD_WHEEL,
+    NO_PARAMETER,
+    NOTES_OFF,
+    OTHER,
+    PEDAL_DOWN,
+    PORTAMENTO,
+    REGISTERED,
+    RESET,
+    SLIDE,
+    SLIDE_TIME,
+    SOFT,
+    SOUND_OFF,
+    STRUM,
+    SUSTAIN,
+    TREMOLO,
+    VALUE,
+    VOLUME,
+)
 from engine.pluck import Pluck
 
-# Numbers of MIDI controllers
-MOD_WHEEL = 1
-SLIDE_TIME = 5
-VOLUME = 7
-EXPRESSION = 11
-SUSTAIN = 64
-PORTAMENTO = 65
-SOFT = 67
-LEGATO = 68
-SLIDE = 74
-HARMONICS = 80  # this and the next two: MIDI's general-purpose buttons
-TREMOLO = 81
-STRUM = 82
-SOUND_OFF = 120
-RESET = 121
-NOTES_OFF = 123
 SWITCHES = (LEGATO, PORTAMENTO, SLIDE_TIME, HARMONICS, TREMOLO, STRUM)  # how keys are played
-# Controllers that choose a parameter, a registered one (RPN) or another, and set it
-FINE_OTHER = 98
-OTHER = 99
-FINE_REGISTERED = 100
-REGISTERED = 101
-VALUE = 6
-FINE_VALUE = 38
-INCREMENT = 96
-DECREMENT = 97
-# Registered parameters
-BEND_RANGE = 0
-FINE_TUNING = 1
-COARSE_TUNING = 2
-NO_PARAMETER = 127
 SETS_PARAMETER = (VALUE, FINE_VALUE, INCREMENT, DECREMENT)
 AT_REST = 127  # value of `RESET` with which nothing stays, of what MIDI's own, 0, leaves: ranges, tuning, volume
-PEDAL_DOWN = 64  # from this value on
 _PARAMETER = "chooses or sets a parameter, as the bend range"
 _FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
     SUSTAIN: "is the sustain pedal",

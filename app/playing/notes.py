@@ -60,7 +60,9 @@ MadeNote = TypeVar("MadeNote", PluckVoices, KeyNote, PluckVoices | KeyNote)
 
 
 class Notes:
-    """All public methods but `poll` and `close`, which are the window's, may be called from any thread.
+    """Notes that ring, and how they are heard.
+
+    All public methods but `poll` and `close`, which are the window's, may be called from any thread.
 
     Args:
         find: a preset by its name; None where there is none.

@@ -178,7 +178,7 @@ class BlowTake:
 
     @property
     def horizon_s(self) -> float:
-        """All of it: the model was trained on no drum."""
+        """The whole duration: the model was trained on no drum."""
         return self.seconds
 
     @property

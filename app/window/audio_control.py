@@ -34,7 +34,7 @@ LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
 
 
 class AudioControl(QObject):
-    """All of it runs in the window's thread. `device` and `sound`: what played last, to be saved."""
+    """The choice of an output, in the window's thread. `device` and `sound`: what played last, to be saved."""
 
     def __init__(self, window: MainWindow, output: Sound, device: DeviceChoice | None, sound: SoundChoice) -> None:
         super().__init__(window)

@@ -3,6 +3,7 @@
     memory     pointers, fences, and what is published to another thread
     strings, recorded, rotation, pulses, velocities
                laws of physics: plain functions, which Python calls as they are
+    midi       numbers of controllers
     records    what is played; voice_records, mixer_records: what sounds
     bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
     tension    a voice of latents that share one tension: the model of every string

@@ -109,7 +109,7 @@ class Voice:
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """Its rows, (rows, modes); `voice_records` has their numbers."""
+        """The rows of a voice, (rows, modes); `voice_records` has their numbers."""
         n = self.program.modes
         return self.memory[slots(VOICE) + WEIGHT_ROWS * n :].reshape(-1, n)
 

@@ -49,7 +49,7 @@ class Legend(QWidget):
 
     @property
     def text(self) -> str:
-        """All of it, uncut."""
+        """The whole text, uncut."""
         return "   ".join([*([self._part] if self._part else []), *map(_caption, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:

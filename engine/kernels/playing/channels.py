@@ -18,25 +18,13 @@ import math
 from numba import njit
 
 from engine.kernels import constants as of
+from engine.kernels import midi
 from engine.kernels.compiled import COMPILED
 from engine.kernels.records import Event, Player, Table
 
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 WIDEST_SEMITONES = 96.0  # that messages may ask for
 HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another key; of a slide, at times of 0 and 127
-# Controllers of MIDI
-DATA = 6
-FINE_DATA = 38
-INCREMENT = 96
-DECREMENT = 97
-FINE_OTHER = 98
-OTHER = 99
-FINE_REGISTERED = 100
-REGISTERED = 101
-NO_PARAMETER = 127
-BEND_RANGE = 0
-FINE_TUNING = 1
-COARSE_TUNING = 2  # registered parameters
 
 
 @njit(**COMPILED)
@@ -48,8 +36,8 @@ def rest(player: Player, number: int, pedal: int, plays: int) -> None:
     channel.pedal = pedal
     channel.slide = -1
     channel.plays = plays
-    channel.coarse = NO_PARAMETER
-    channel.fine = NO_PARAMETER
+    channel.coarse = midi.NO_PARAMETER
+    channel.fine = midi.NO_PARAMETER
     channel.coarse_tuning = 0
     channel.fine_tuning = 0
 
@@ -60,8 +48,8 @@ def reset(player: Player, number: int) -> None:
     channel = player.channels[number]
     channel.bend = channel.mute = 0.0
     channel.pedal = 0
-    channel.coarse = NO_PARAMETER
-    channel.fine = NO_PARAMETER
+    channel.coarse = midi.NO_PARAMETER
+    channel.fine = midi.NO_PARAMETER
     channel.expression = 127
     for switch in range(of.SWITCHES):
         channel.switches[switch] = 0
@@ -150,38 +138,38 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
     Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
     """
     state = player.channels[number]
-    if controller in (OTHER, FINE_OTHER):
-        state.coarse = NO_PARAMETER
-        state.fine = NO_PARAMETER
-    elif controller == REGISTERED:
+    if controller in (midi.OTHER, midi.FINE_OTHER):
+        state.coarse = midi.NO_PARAMETER
+        state.fine = midi.NO_PARAMETER
+    elif controller == midi.REGISTERED:
         state.coarse = value
-    elif controller == FINE_REGISTERED:
+    elif controller == midi.FINE_REGISTERED:
         state.fine = value
-    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or state.coarse != 0:
+    if controller not in (midi.VALUE, midi.FINE_VALUE, midi.INCREMENT, midi.DECREMENT) or state.coarse != 0:
         return False
-    chosen, step = state.fine, 1 if controller == INCREMENT else -1
-    if chosen == BEND_RANGE:
+    chosen, step = state.fine, 1 if controller == midi.INCREMENT else -1
+    if chosen == midi.BEND_RANGE:
         wide = _bend_range(player, mode, number)
-        if controller == DATA:
+        if controller == midi.VALUE:
             wide = float(value)
-        elif controller == FINE_DATA:
+        elif controller == midi.FINE_VALUE:
             wide = math.floor(wide) + value / 100
         else:
             wide += step / 100
         for member in range(of.CHANNELS):
             if member == number or (_is_member(mode, number) and _is_member(mode, member)):
                 player.channels[member].range_semitones = min(max(wide, 0.0), WIDEST_SEMITONES)
-    elif chosen == FINE_TUNING:
+    elif chosen == midi.FINE_TUNING:
         steps = state.fine_tuning + of.TUNING_STEPS
-        if controller == DATA:
+        if controller == midi.VALUE:
             steps = 128 * value
-        elif controller == FINE_DATA:
+        elif controller == midi.FINE_VALUE:
             steps = steps // 128 * 128 + value
         else:
             steps += step
         state.fine_tuning = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
-    elif chosen == COARSE_TUNING and controller != FINE_DATA:
-        semitone = value - 64 if controller == DATA else state.coarse_tuning + step
+    elif chosen == midi.COARSE_TUNING and controller != midi.FINE_VALUE:
+        semitone = value - 64 if controller == midi.VALUE else state.coarse_tuning + step
         state.coarse_tuning = min(max(semitone, -64), 63)
     else:
         return False

@@ -5,29 +5,12 @@ from __future__ import annotations
 from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import contact
+from engine.kernels import contact, midi
 from engine.kernels.compiled import COMPILED
 from engine.kernels.playing import changes, channels, chords, hands, slots, voices
 from engine.kernels.records import Player, Table
 
 KNOB_S = 0.04  # of the glide to other modes
-MOD_WHEEL = 1
-SLIDE_TIME = 5
-VOLUME = 7
-EXPRESSION = 11
-SUSTAIN = 64
-PORTAMENTO = 65
-SOFT = 67
-LEGATO = 68
-SLIDE = 74
-HARMONICS = 80
-TREMOLO = 81
-STRUM = 82
-SOUND_OFF = 120
-RESET = 121
-NOTES_OFF = 123
-PEDAL_DOWN = 64  # from this value on
-LAST_MODE = 127  # messages from NOTES_OFF on choose a mode, and release all keys as well
 
 
 @njit(**COMPILED)
@@ -60,38 +43,38 @@ def controller(
     state = player.channels[channel]
     wheel = table.wheel
     turns = 0 <= wheel < of.KNOBS or wheel == of.MUTE
-    if number == SUSTAIN:
-        state.pedal = value >= PEDAL_DOWN
+    if number == midi.SUSTAIN:
+        state.pedal = value >= midi.PEDAL_DOWN
         changes.damp_unkept(player, table, frame, now)
-    elif number == SLIDE:
+    elif number == midi.SLIDE:
         state.slide = max(value, 0)
-    elif number == SOFT:
+    elif number == midi.SOFT:
         state.mute = min(max(value, 0), 127) / 127
         changes.glide(player, table, channel, changes.DAMPER_S, frame, now)
-    elif number == LEGATO:
-        state.switches[of.LEGATO] = value >= PEDAL_DOWN
-    elif number == PORTAMENTO:
-        state.switches[of.SLIDES] = value >= PEDAL_DOWN
-    elif number == HARMONICS:
-        state.switches[of.HARMONICS] = value >= PEDAL_DOWN
-    elif number == TREMOLO:
-        state.switches[of.TREMOLO] = value >= PEDAL_DOWN
-    elif number == STRUM:
-        state.switches[of.STRUMS] = value >= PEDAL_DOWN
-    elif number == SLIDE_TIME:
+    elif number == midi.LEGATO:
+        state.switches[of.LEGATO] = value >= midi.PEDAL_DOWN
+    elif number == midi.PORTAMENTO:
+        state.switches[of.SLIDES] = value >= midi.PEDAL_DOWN
+    elif number == midi.HARMONICS:
+        state.switches[of.HARMONICS] = value >= midi.PEDAL_DOWN
+    elif number == midi.TREMOLO:
+        state.switches[of.TREMOLO] = value >= midi.PEDAL_DOWN
+    elif number == midi.STRUM:
+        state.switches[of.STRUMS] = value >= midi.PEDAL_DOWN
+    elif number == midi.SLIDE_TIME:
         state.slide_time = min(max(value, 0), 127)
-    elif number == MOD_WHEEL:
+    elif number == midi.MOD_WHEEL:
         player.wheel = min(max(value, 0), 127)
         player.wheel_by = channel
         if turns:
             changes.glide(player, table, -1, KNOB_S, frame, now)
-    elif number == VOLUME:
+    elif number == midi.VOLUME:
         state.volume = min(max(value, 0), 127)
-    elif number == EXPRESSION:
+    elif number == midi.EXPRESSION:
         state.expression = min(max(value, 0), 127)
-    elif number == SOUND_OFF:
+    elif number == midi.SOUND_OFF:
         stop(player, hands.STOP_S, frame)
-    elif NOTES_OFF <= number <= LAST_MODE:
+    elif midi.NOTES_OFF <= number <= midi.LAST_MODE:
         for other in range(of.CHANNELS):
             if channels.is_master(mode, channel, other):
                 channels.release_keys(player, other)
@@ -102,7 +85,7 @@ def controller(
                 note.held = 0
                 note.kept = 0
                 changes.damp(player, table, note, frame, now)
-    elif number == RESET:
+    elif number == midi.RESET:
         for other in range(of.CHANNELS):
             if channels.is_master(mode, channel, other) and value == 0:
                 channels.reset(player, other)

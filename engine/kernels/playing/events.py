@@ -10,7 +10,7 @@ from __future__ import annotations
 from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import drums
+from engine.kernels import drums, midi
 from engine.kernels.compiled import COMPILED
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
@@ -137,7 +137,7 @@ def _superseded(event: Event, following: Event) -> bool:
     same = kind == following.kind and key == following.key
     if not same or event.channel != following.channel:
         return False
-    return kind == of.BEND or (kind == of.CONTROLLER and key == controllers.MOD_WHEEL)
+    return kind == of.BEND or (kind == of.CONTROLLER and key == midi.MOD_WHEEL)
 
 
 @njit(**COMPILED)

@@ -14,12 +14,10 @@ import numpy as np
 import pytest
 
 from app.instrument.events import (
-    COARSE_TUNING,
     DECREMENT,
     EXPRESSION,
     FINE_OTHER,
     FINE_REGISTERED,
-    FINE_TUNING,
     FINE_VALUE,
     HARMONICS,
     INCREMENT,
@@ -50,6 +48,7 @@ from app.instrument.events import (
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Course, Patch
 from engine.kernels import constants as of
+from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
 from engine.kernels.playing.channels import SLIDE_S, WIDEST_SEMITONES
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ
