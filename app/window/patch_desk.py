@@ -544,6 +544,7 @@ class PatchDesk(QObject):
     def close(self) -> None:
         """End the playback and a recording, which is kept; may be called again."""
         self._note_timer.stop()
+        self.browser.dismiss()  # or it would play what is selected after a rest, without a device
         self.stop()
         self.recordings.close()
 

@@ -337,7 +337,6 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_
     assert guitar.choices.instrument == changed
     patches.audition("concert_harp")
     assert guitar.patch == HARP
-    guitar.wait(guitar.keys.sounding)
 
 
 def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
