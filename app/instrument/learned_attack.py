@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve, resample_poly
+from scipy.signal import fftconvolve
 
 from app.instrument.effects import effects_of
 from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.patch import Noise, Patch
 from app.shared.parameters import NOISE_DB
+from engine.effects.responses import resampled
 from engine.kernels.constants import CURVES_HZ as RESPONSE_HZ
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.kernels.loudness import k_weight
@@ -56,8 +56,7 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
     key = round(69 + 12 * math.log2(f0_hz / 440))
     tuning = patch.tuning.model_copy(update={"a4_hz": f0_hz * 2 ** ((69 - key) / 12)})  # as the note was
     tuned = patch.model_copy(update={"tuning": tuning})
-    shared = gcd(note.rate_hz, RESPONSE_HZ)
-    truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
+    truth = resampled(note.part(0, PART_S)[:, None], note.rate_hz, RESPONSE_HZ)[:, 0]
     events, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
     dry = np.concatenate(
         list(
@@ -66,8 +65,7 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
     )
     sound = fftconvolve(dry[:, 0].astype(np.float64), body)[: len(truth)]
     attack = recorded.attack
-    shared = gcd(attack.rate_hz, RESPONSE_HZ)
-    force = resample_poly(attack.samples, RESPONSE_HZ // shared, attack.rate_hz // shared)[: len(truth)]
+    force = resampled(attack.samples[:, None], attack.rate_hz, RESPONSE_HZ)[: len(truth), 0]
     loudness_db = 10 * math.log10(max(_mean_square(sound, RESPONSE_HZ), 1e-30))
     onset_db = level_db + loudness_db - WANTED_DB - patch.level_db  # keys are softer where their peaks are high
     onset_db = round(min(max(onset_db, NOISE_DB[0]), NOISE_DB[1]), 2)

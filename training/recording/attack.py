@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal
+from scipy import fft
 
+from engine.effects.responses import resampled
 from engine.resonators.recorded import RecordedNote
 from training.recording.note import Note
 
@@ -32,8 +33,7 @@ def attack_force(note: Note, learned: RecordedNote, impulse: Array, impulse_hz: 
     sound = learned.sound(rate)[: len(note.samples)]
     end = min(len(sound), note.onset + round(FADED_S * rate))
     attack = (note.samples[: len(sound)] - sound)[note.onset : end]
-    shared = math.gcd(rate, impulse_hz)
-    body = signal.resample_poly(impulse, rate // shared, impulse_hz // shared) * impulse_hz / rate
+    body = resampled(impulse[:, None], impulse_hz, rate)[:, 0] * impulse_hz / rate
     size = fft.next_fast_len(len(attack) + len(body), real=True)
     gain = fft.rfft(body, size)
     least = float(np.abs(gain).max()) ** 2 * 10 ** (LEAST_DB / 10)
