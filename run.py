@@ -6,6 +6,7 @@ python3 run.py FILE ...        open it with these: presets, patches, MIDI files,
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --quick    the tests nearest to changed files, in a minute and a half
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
+python3 run.py bundle          make dist/learned-strings, a folder that starts without Python, and a file of it
 python3 run.py docs            build the documents as a site in site/; warnings are errors
 python3 run.py bench NAME      measure speed, sound and memory on this machine (without NAME: which there are)
 python3 run.py setup           only prepare
@@ -26,6 +27,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import threading
 import time
 from pathlib import Path
@@ -44,6 +46,9 @@ SCRIPTS = VENV / ("Scripts" if WINDOWS else "bin")
 SUFFIX = ".exe" if WINDOWS else ""
 PYTHON = SCRIPTS / f"python{SUFFIX}"
 APP = SCRIPTS / f"learned-strings{SUFFIX}"
+DIST = ROOT / "dist"
+BUNDLE = DIST / ("learned-strings.app" if sys.platform == "darwin" else "learned-strings")
+BUNDLED = BUNDLE / ("Contents/MacOS" if sys.platform == "darwin" else "") / APP.name
 
 LINTS = {
     "ruff check": [PYTHON, "-m", "ruff", "check", "."],
@@ -110,6 +115,8 @@ def main(words: list[str]) -> int:
             return check(arguments)
         if action == "docs":
             return documents()
+        if action == "bundle":
+            return bundle()
         if action == "bench":
             return subprocess.call([PYTHON, "-m", "bench", *arguments], cwd=ROOT)
         return start(arguments) if action == "start" else 0
@@ -127,7 +134,7 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
         return "start", words[1:]
     if words[0] in ("test", "bench"):
         return words[0], words[1:]
-    if words in (["setup"], ["docs"]):
+    if words in (["setup"], ["docs"], ["bundle"]):
         return words[0], []
     usage = (__doc__ or "").strip()
     if words[0] in ("-h", "--help"):
@@ -186,6 +193,34 @@ def documents() -> int:
             pip("--no-build-isolation", "-e", ".[docs]")
     env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     return subprocess.call([PYTHON, "-m", "mkdocs", "build", "--strict"], cwd=ROOT, env=env)
+
+
+def bundle() -> int:
+    """Make a folder that starts without Python, with compiled kernels, and one compressed file of it."""
+    with locked():
+        if not (site_packages() / "PyInstaller").is_dir():
+            pip("--no-build-isolation", "-e", ".[bundle]")
+    trouble = "no bundle was made, for the reason above; remedy: put that right, free 3 GB of disk, then try again"
+    say("collecting the bundle: a few minutes")
+    places = ["--distpath", DIST, "--workpath", ROOT / "build"]
+    run_step([PYTHON, "-m", "PyInstaller", "--noconfirm", *places, "learned-strings.spec"], trouble)
+    say("compiling its sound engine: one to five minutes")
+    run_step([BUNDLED, "-P", "-m", "engine.warm"], trouble)
+    say("compressing it: a few minutes")
+    with ticking():
+        packed = compress()
+    say(f"ready: {packed}, {packed.stat().st_size / 1e6:.0f} MB; to start it: {BUNDLED}")
+    return 0
+
+
+def compress() -> Path:
+    """Write the bundle as one file: a zip for Windows, else a tar, which keeps links and permissions."""
+    if WINDOWS:
+        return Path(shutil.make_archive(str(BUNDLE), "zip", DIST, BUNDLE.name))
+    packed = DIST / "learned-strings.tar.xz"
+    with tarfile.open(packed, "w:xz", preset=1) as archive:
+        archive.add(BUNDLE, BUNDLE.name)
+    return packed
 
 
 def prepare(action: str, window: bool) -> None:

@@ -22,7 +22,7 @@ SYSTEMS = {  # uv's names, and those of docs/install.md
 MACOS = "14.0"
 # Nothing is built, and no other Python is fetched: this one stands in for it.
 COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build", "--no-python-downloads")
-EXTRAS = ("dev", "midi", "docs", "cluster")
+EXTRAS = ("dev", "midi", "docs", "cluster", "bundle")
 WHAT = ("pyproject.toml", "--constraints", "constraints.txt", *(word for e in EXTRAS for word in ("--extra", e)))
 CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
 AT_ONCE = 8

@@ -10,7 +10,7 @@ from numba import config, njit
 from numba.extending import register_jitable
 
 from engine.kernels import cache, pulses, recorded, rotation, strings, velocities
-from engine.kernels.numba_internals import compile_once_for_all_numbers, keep_bitcode_alone
+from engine.kernels.numba_internals import compile_once_for_all_numbers, keep_bitcode_alone, keep_cache_when_moved
 
 PLACE = cache.folder()
 config.CACHE_DIR = str(PLACE or "")
@@ -29,6 +29,7 @@ LAWS = pulses, recorded, rotation, strings, velocities  # modules of plain funct
 
 compile_once_for_all_numbers()
 keep_bitcode_alone()
+keep_cache_when_moved()
 for _laws in LAWS:
     for _law in vars(_laws).values():
         if isinstance(_law, FunctionType) and _law.__module__ == _laws.__name__:

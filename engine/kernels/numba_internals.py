@@ -64,3 +64,20 @@ def stop_before_machine_code() -> None:
     CPUCodeLibrary.finalize = finalize
     JITCodeLibrary.get_pointer_to_function = lambda library, name: NOWHERE
     JITCPUCodegen.set_env = lambda codegen, name, env: None
+
+
+def keep_cache_when_moved() -> None:
+    """Let compiled functions be found again where the whole program lies in another folder, also in a bundle."""
+    from hashlib import sha256
+    from pathlib import Path
+
+    from numba.core.caching import UserProvidedCacheLocator
+
+    def subpath(kind: Any, source: str) -> str:
+        return "_".join(Path(source).parts[-3:-1])
+
+    def stamp(locator: Any) -> bytes:
+        return sha256(Path(locator._py_file).read_bytes()).digest()
+
+    UserProvidedCacheLocator.get_suitable_cache_subpath = classmethod(subpath)
+    UserProvidedCacheLocator.get_source_stamp = stamp
