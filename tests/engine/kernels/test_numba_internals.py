@@ -87,6 +87,24 @@ def test_a_function_that_is_loaded_can_still_be_called_by_one_that_is_compiled(t
     assert again == ["1 True 7", "29"]
 
 
+def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its_source_changed(
+    tmp_path: Path,
+) -> None:
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from called import called\n"
+        "print(sum(called.stats.cache_hits.values()), called(2))\n"
+    )
+    places = [tmp_path / name / "engine" / "package" for name in ("first", "second")]
+    for place in places:
+        place.mkdir(parents=True)
+        (place / "called.py").write_text(CALLED)
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert [printed(code, str(place), **kept) for place in places] == [["0 7"], ["1 7"]]
+    (places[1] / "called.py").write_text(CALLED.replace("3 * x", "5 * x"))
+    assert printed(code, str(places[1]), **kept) == ["0 11"]
+
+
 def test_machine_code_is_not_made_where_text_alone_is_wanted() -> None:
     code = (
         "from engine.kernels.numba_internals import NOWHERE, stop_before_machine_code\n"
