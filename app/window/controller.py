@@ -22,10 +22,7 @@ from PySide6.QtGui import QGuiApplication
 from app.analysis.abx.record import material_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
-from app.instrument.events import Event, NoteOn, PluckAt
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
-from app.playing.note import PluckVoices
 from app.presets.library import Library, PresetEntry
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
@@ -141,9 +138,7 @@ class Controller(QObject):
             self.session,
             self.library,
             settings.midi,
-            self._handle,
-            self.performance.play_preset,
-            self.performance.notes.look,
+            self.performance,
         )
         self.performance.by_hand = self.instruments.by_hand
         self.instruments.played.connect(self.performance.follow)
@@ -313,12 +308,6 @@ class Controller(QObject):
         """Strike the drum at a place, in half-lengths from its centre."""
         self.instruments.strike(x, y, velocity)
 
-    def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
-        """Handle an event of the instrument; called in the thread of the event."""
-        if self._abx is not None and isinstance(event, NoteOn | PluckAt):
-            return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.notes.handle(event, due)
-
     def play_or_stop(self) -> None:
         if self._abx is None:
             was_playing = self.patches.playing
@@ -346,14 +335,14 @@ class Controller(QObject):
         self.performance.stop()
         note = note_of(choices, entry, struck)
         render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
-        self.performance.hear_dry(True)
+        self.performance.compare(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
-        self.performance.hear_dry(False)
+        self.performance.compare(False)
         self.sound.set_volume_db(self.session.choices.volume_db)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -32,6 +31,7 @@ from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
+from app.window.performance import Performance
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
 
@@ -42,11 +42,6 @@ LOOK_MS = 8  # until the player has reported the note of a key, between two look
 
 class Instruments(QObject):
     """The player of events, at once in the thread of each; session and window follow later.
-
-    Args:
-        handle: plays an event and returns the note that it began; called in the event's thread.
-        play_preset: lets events pluck the string of a preset, by its name; called in the event's thread.
-        look: follows what the player reports of notes of keys.
 
     Attributes:
         latest: the note that was begun last; None before the first.
@@ -66,16 +61,12 @@ class Instruments(QObject):
         session: Session,
         library: Library,
         midi: MidiChoices,
-        handle: Callable[[Event, Due | None], PluckVoices | KeyNote | None],
-        play_preset: Callable[[str], None],
-        look: Callable[[], None],
+        performance: Performance,
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
-        self._handle = handle
-        self._play_preset = play_preset
-        self._look = look
+        self._performance = performance
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
@@ -145,7 +136,7 @@ class Instruments(QObject):
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
-        note = self._handle(event, due)
+        note = self._performance.handle(event, due)
         if note is None:
             return
         self.latest = note
@@ -258,7 +249,7 @@ class Instruments(QObject):
         elif names := self._library.names:
             name = names[(event.key - LOWEST_PLACE) % len(names)]
             pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
-            self._play_preset(name)
+            self._performance.play_preset(name)
             with self._lock:
                 self._reported |= {"instrument": SingleString(preset=name)}
             self.play(PluckAt(pluck))
@@ -267,7 +258,7 @@ class Instruments(QObject):
 
     def _look_at_key(self) -> None:
         """Take the string and the pluck of a key from the player's report, within a quantum of the device."""
-        self._look()
+        self._performance.notes.look()
         note = self._unknown
         if note is not None and not note.known:
             return

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering import BlowTake, Take
 
-Shown = TypeVar("Shown", Take, BlowTake)
-
 
 @dataclass
-class Playhead(Generic[Shown]):
+class Playhead:
     """A motion and the note whose time it follows; without a note it stands at `parked_s`.
 
     Attributes:
         finished: whether the motion is known to be complete.
     """
 
-    take: Shown | None = None
+    take: Take | BlowTake | None = None
     note: PluckVoices | KeyNote | None = None
     parked_s: float = 0.0
     finished: bool = False

@@ -20,7 +20,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app.presets.library import Library
-from app.rendering import BlowTake, Sounding, Take
+from app.rendering import BlowTake, Take
 from app.session.choices import Choices, Session
 from app.shared.worker import Job, Work
 from app.views.background import Background
@@ -38,25 +38,28 @@ class Moment:
     """The moment that is to be shown now.
 
     Attributes:
-        take: the motion, or None before the first.
+        sounding: the pluck or the blow that is heard, or None before the first.
         position_s: the playhead, from the pluck on: the time that sounds now.
         playing: whether the playhead moves.
         elapsed_s: since the last call of `show_moment`, by the clock.
-        blow: the motion of a drum, while one is played; `take` is None then.
         audible: whether the note of the motion rings.
     """
 
-    take: Take | None
+    sounding: Take | BlowTake | None
     position_s: float
     playing: bool
     elapsed_s: float
-    blow: BlowTake | None = None
     audible: bool = False
 
     @property
-    def sounding(self) -> Sounding | None:
-        """The pluck or the blow that is heard."""
-        return self.take or self.blow
+    def take(self) -> Take | None:
+        """The motion of a string."""
+        return self.sounding if isinstance(self.sounding, Take) else None
+
+    @property
+    def blow(self) -> BlowTake | None:
+        """The motion of a drum."""
+        return self.sounding if isinstance(self.sounding, BlowTake) else None
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """The state that a picture of the take depends on.

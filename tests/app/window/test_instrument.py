@@ -418,8 +418,8 @@ def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_i
     dry: list[bool] = []
     monkeypatch.setattr(guitar.notes, "hear_dry", dry.append)
     guitar.change(a="model", b="difference", heard="b")
-    guitar.performance.hear_dry(True)
-    guitar.performance.hear_dry(False)  # a listening test has ended
+    guitar.performance.compare(True)
+    guitar.performance.compare(False)  # a listening test has ended
     guitar.change(heard="a")
     assert dry[-4:] == [True, True, True, False]
 
