@@ -16,7 +16,7 @@ from app.rendering.take import Listened
 from app.session.choices import Choices, Session, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
-from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
+from app.session.shown import LEGEND_FIELDS
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
@@ -36,6 +36,7 @@ WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.m
 
 
 class StringPanel(StagePanel):
+    view: StringView
     key = "string"
     title = "String"
     help = (
@@ -55,8 +56,6 @@ class StringPanel(StagePanel):
         self.view.shape_stepped.connect(self._step_shape)
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
         self._envelope: Envelope | None = None
-        self._standing: tuple[object, ...] = ()
-        self._shown: tuple[object, ...] = ()
         self._take: Take | None = None  # of this pluck, once it is complete
         self._judged: Listened | None = None  # the signals for which the warning was last set
 
@@ -67,54 +66,33 @@ class StringPanel(StagePanel):
         if names & WARNING_FIELDS:
             self._show_pluck()
         if names & {"face", *LEGEND_FIELDS}:
-            self.view.set_plain(self._plain)
-            self.view.set_sources(self._sources)
-            self._shown = self._standing = ()
+            self._show_sources()
         if "face" in names:
             self.view.set_warning(*self._pluck_warning())
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
 
-    @property
-    def _plain(self) -> bool:
-        return self.session.choices.face == "play"
-
-    @property
-    def _sources(self) -> tuple[ShownSource, ...]:
-        """The drawn sources: both slots, or in Play the audible one."""
-        sources = shown_sources(self.session.choices, self.library)
-        return tuple(source for source in sources if source.heard) if self._plain else sources
-
     def take_started(self, take: Take | BlowTake) -> None:
+        super().take_started(take)
         self._envelope = Envelope()
-        self._standing = ()
 
     def take_finished(self, take: Take) -> None:
         self._take = take
         self.view.set_warning(*self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
-        take = moment.take
-        position_s = moment.position_s
-        choices = self.session.choices
         self._judge()
-        standing = moment.standing(choices)
-        if not moment.playing and standing == self._standing:
-            return
-        self._standing = standing
-        if take is None or not moment.in_motion(choices):
+        super().show_moment(moment)
+
+    def _draw_motion(self, moment: Moment) -> None:
+        choices, take = self.session.choices, moment.take
+        if take is None:
             self.view.show_frame(None)
-            self._shown = ()
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
         rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
-        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
-        strobes = [motion.strobes(position_s) for motion in rendered]
-        drawn_state = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
-        if not moment.playing and drawn_state == self._shown:
-            return
-        self._shown = drawn_state
+        position_s = min([moment.position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
         envelope = self._envelope if choices.envelope else None
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
@@ -145,7 +123,7 @@ class StringPanel(StagePanel):
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
-        if silent or self._plain or entry is None:
+        if silent or choices.face == "play" or entry is None:
             return silent, True
         error = math.nan if self._take is None else self._take.error
         patch, string = choices.patch, choices.string
