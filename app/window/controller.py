@@ -36,10 +36,9 @@ from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import ABOUT, HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
-from app.views.dialogs.preset_card import preset_browser
-from app.views.drum.view import DrumView
-from app.views.instrument.patch_card import patch_browser
-from app.views.string.view import StringView
+from app.views.instrument.patch_bar import PatchBar
+from app.views.instrument.string_knobs import StringKnobs
+from app.views.stage import StageView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
@@ -116,9 +115,7 @@ class Controller(QObject):
         self._learning: LearnDialog | None = None
         self.library = Library([])
         problems = self.library.refresh()
-        self.presets = PresetDesk(
-            self.session, self.library, window.presets, preset_browser(window), settings.favourites
-        )
+        self.presets = PresetDesk(window, self.session, self.library, settings.favourites)
         self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
         window.show_stage(self.string, self.drum)
         self.string.view.setFocus()
@@ -143,40 +140,23 @@ class Controller(QObject):
         self.performance.by_hand = self.instruments.by_hand
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
-        self.instruments.reported.connect(window.notices.report)
-        self.instruments.informed.connect(window.notices.inform)
         self.instruments.start()
         self.patches = PatchDesk(
-            self.session,
-            self.library,
-            self.performance,
-            self.instruments,
-            window.instrument,
-            window.song,
-            patch_browser(window),
-            settings.patch_favourites,
+            window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
-        self.patches.reported.connect(window.notices.report)
-        self.patches.informed.connect(window.notices.inform)
         self.instruments.played.connect(self.patches.show_played)
         window.show_keys(settings.instrument.shown)
-        self.patches.outside_changed.connect(window.show_outside)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
-        for dragged in (window.instrument.bar, window.instrument.knobs):
-            dragged.drag_started.connect(self.history.hold)
-            dragged.drag_ended.connect(self.history.release)
         self.exports = Exports(
+            window,
             self.session,
             self.library,
             self.patches.recordings,
-            lambda: self.instruments.struck,
+            self.instruments,
             (settings.export, settings.sampled),
-            window,
         )
-        self.exports.reported.connect(window.notices.report)
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
-        self.instruments.played.connect(self.exports.refresh)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect_actions()
         self.keeper = SettingsSaver(settings_path, settings, self.settings, self)
@@ -199,7 +179,6 @@ class Controller(QObject):
         for panel in self.panels:
             self._connect_panel(panel)
         self.presets.browser.played.connect(lambda name: self.pluck())
-        self.presets.reported.connect(window.notices.report)
         window.file_dropped.connect(self.take_file)
         window.transport.slots.set_entries(self.library.entries)
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
@@ -249,7 +228,7 @@ class Controller(QObject):
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
             "loop": lambda: session.update(loop=not session.choices.loop),
-            "instruments": self.patches.desk.toggle,
+            "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
             "next": lambda: self.presets.step(1),
@@ -269,8 +248,15 @@ class Controller(QObject):
     def _connect_history(self) -> None:
         window, history = self.window, self.history
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
-        views = self.string.view, self.drum.view
-        draggable: list[StringView | DrumView | Knob] = [*views, *window.transport.knobs.values()]
+        strip = window.instrument
+        knobs = window.transport.knobs.values()
+        draggable: tuple[StageView | PatchBar | StringKnobs | Knob, ...] = (
+            self.string.view,
+            self.drum.view,
+            strip.bar,
+            strip.knobs,
+            *knobs,
+        )
         for dragged in draggable:
             dragged.drag_started.connect(history.hold)
             dragged.drag_ended.connect(history.release)
@@ -442,7 +428,7 @@ class Controller(QObject):
                 "look": self.appearance.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
-                "patch_favourites": tuple(sorted(self.patches.desk.favourites)),
+                "patch_favourites": tuple(sorted(self.patches.favourites)),
                 "instrument": InstrumentChoice(
                     shown=self.window.shows_keys,
                     surface=self.window.instrument.surface,

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
 from app.export.note import ExportedPluck, HeardNote, musical_name, struck_name
@@ -24,6 +22,8 @@ from app.session.slots import other_preset
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
+from app.window.instruments import Instruments
+from app.window.main_window import MainWindow
 from app.window.recordings import Recordings
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
@@ -32,33 +32,29 @@ HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", 
 
 
 class Exports(QObject):
-    """The exports, which live as long as the window; `reported` has notices for the user.
+    """The exports, which live as long as the window."""
 
-    Args:
-        struck: the key of the instrument that an export plays; None: a string is plucked by itself.
-    """
-
-    reported = Signal(str)
     ended = Signal(bool)  # an export, well or not; or its dialog was closed
 
     def __init__(
         self,
+        window: MainWindow,
         session: Session,
         library: Library,
         recordings: Recordings,
-        struck: Callable[[], Struck | None],
+        instruments: Instruments,
         choices: tuple[ExportChoices, SampledChoices],
-        window: QWidget,
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
         self._window = window
-        self._recordings, self._struck = recordings, struck
+        self._recordings, self._instruments = recordings, instruments
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
+        instruments.played.connect(self.refresh)
         window.installEventFilter(self)
 
     @property
@@ -70,7 +66,7 @@ class Exports(QObject):
         """Open the dialog at a page, or bring it to the front."""
         subjects = self._subjects()
         if subjects[kind] is None:
-            self.reported.emit(PAGES[kind].missing)
+            self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
@@ -120,7 +116,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._struck()),
+            "note": heard_note(choices, self._library, self._instruments.struck),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,

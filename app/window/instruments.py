@@ -50,9 +50,6 @@ class Instruments(QObject):
     """
 
     played = Signal()  # a note has begun, and the session has its values
-    reported = Signal(str)  # an error, for the user
-    informed = Signal(str)  # what went well
-
     _begun = Signal()  # emitted in any thread
 
     def __init__(
@@ -86,8 +83,8 @@ class Instruments(QObject):
         self._keys.released.connect(self._release)
         self.midi = MidiControl(midi, self.play, self._play_note, self)
         self.midi.performed.connect(lambda changes: session.update(**changes))
-        self.midi.reported.connect(self.reported)
-        self.midi.informed.connect(self.informed)
+        self.midi.reported.connect(window.notices.report)
+        self.midi.informed.connect(window.notices.inform)
 
     def start(self) -> None:
         """Open the remembered MIDI input, if any."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from app.presets.library import Library
 from app.session.choices import Session
-from app.views.controls.browser import Browser
-from app.views.controls.preset_bar import PresetBar
-from app.views.dialogs.preset_card import preset_row
+from app.views.controls.browser_rows import BrowserRow
+from app.views.dialogs.preset_card import preset_browser, preset_row
 from app.window.browsing import BrowserDesk
+from app.window.main_window import MainWindow
 from engine.folders import user_folder
 
 
@@ -17,49 +18,44 @@ class PresetDesk(BrowserDesk):
     """A desk of presets; see `BrowserDesk`."""
 
     def __init__(
-        self,
-        session: Session,
-        library: Library,
-        bar: PresetBar,
-        browser: Browser,
-        favourites: Iterable[str] = (),
+        self, window: MainWindow, session: Session, library: Library, favourites: Iterable[str] = ()
     ) -> None:
-        super().__init__(
-            browser,
-            lambda: [preset_row(entry) for entry in library.entries],
-            lambda: session.choices.preset,
-            lambda name: session.update(preset=name),
-            user_folder,
-            favourites,
-        )
-        self._library, self._bar = library, bar
+        super().__init__(window, window.presets, preset_browser(window), favourites)
+        self._session, self._library, self._bar = session, library, window.presets
         self._known = set(library.names)
-        bar.step_asked.connect(self.step)
-        bar.browse_asked.connect(self.toggle)
-        bar.all_asked.connect(browser.clear_filter)
-        browser.opened.connect(self._reload)
-        browser.listed_changed.connect(self._show_bar)
+        self._bar.step_asked.connect(self.step)
         library.changed.connect(self._library_changed)
-        self.show()
+        self.show_rows()
+
+    @property
+    def chosen(self) -> str:
+        return self._session.choices.preset
+
+    def choose(self, name: str) -> None:
+        self._session.update(preset=name)
+
+    def reload(self) -> None:
+        for problem in self._library.refresh():
+            self._notices.report(problem)
+
+    def _rows(self) -> Sequence[BrowserRow]:
+        return [preset_row(entry) for entry in self._library.entries]
+
+    def _folder(self) -> Path:
+        return user_folder()
 
     def choice_changed(self) -> None:
         """Show the chosen preset; to be called when another one is chosen."""
-        self._show_bar()
-        self.show_chosen()
+        self._show_listed()
+        self.browser.set_chosen(self.chosen)
 
-    def _show_bar(self) -> None:
-        name, browser = self._chosen(), self.browser
-        self._bar.set_chosen(self._library.find(name), name in self.favourites)
-        self._bar.filtered.show_listed(len(browser.listed), browser.total)
+    def _show_listed(self) -> None:
+        super()._show_listed()
+        self._bar.set_chosen(self._library.find(self.chosen), self.chosen in self.favourites)
 
     def _library_changed(self) -> None:
         """Show what there is now; a filter that hides an added preset is cleared."""
         added, self._known = set(self._library.names) - self._known, set(self._library.names)
-        self.show()
+        self.show_rows()
         for name in added:
             self.browser.reveal(name)
-
-    def _reload(self) -> None:
-        """Read the folders again: the user may have added files."""
-        for problem in self._library.refresh():
-            self.reported.emit(problem)

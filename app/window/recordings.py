@@ -16,8 +16,8 @@ from app.session.choices import Choices, Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.background import Background
 from app.views.dialogs.question import ask
-from app.views.instrument.patch_bar import PatchBar
 from app.window.journaling import Journaling
+from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
 
 LONGEST_NAME = 60  # characters of an instrument
@@ -29,29 +29,28 @@ DISCARD = "Discard"
 class Recordings(QObject):
     """Recordings, which live in the window's thread, as long as the window.
 
-    The button of `bar` records, ends, saves and discards.
+    The button of the instrument's bar records, ends, saves and discards.
 
     A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
     as long, also past the end of the process, and `offer_left` finds it.
     """
 
-    reported = Signal(str)  # an error, for the user
-    informed = Signal(str)  # what went well
     save_asked = Signal()  # of the latest one
     unsaved_changed = Signal()
 
-    def __init__(self, session: Session, keys: Keys, bar: PatchBar, parent: QObject) -> None:
-        super().__init__(parent)
+    def __init__(self, window: MainWindow, session: Session, keys: Keys) -> None:
+        super().__init__(window)
         self._session = session
         self._keys = keys
-        self._bar = bar
+        self._notices = window.notices
+        self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: dict[Played, Journal | None] = {}  # in their order
         self._journaling = Journaling(keys.recorder, self)
-        self._journaling.failed.connect(self.reported)
+        self._journaling.failed.connect(self._notices.report)
         self._reading = Background("journals", self)
         self._reading.finished.connect(lambda read: self._ask_about(*read))
-        self._reading.failed.connect(self.reported)
+        self._reading.failed.connect(self._notices.report)
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save_asked)
@@ -78,7 +77,7 @@ class Recordings(QObject):
         else:
             self._keys.begin_recording()
             if not self._session.choices.plays_patch:
-                self.informed.emit("Keys of an instrument are recorded; plucks of a single string are not.")
+                self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
             self._journaling.begin(self._began)
             self._choices_changed(frozenset())
@@ -117,11 +116,11 @@ class Recordings(QObject):
     def _ask_about(self, journals: dict[Played, Journal], problems: list[str]) -> None:
         """Ask about journals that were left; `problems`: why others cannot be read."""
         for problem in problems:
-            self.reported.emit(problem)
+            self._notices.report(problem)
         if not journals:
             return
         if self._keys.recorder.recording:  # no question comes between a musician and the keys
-            self.informed.emit("An earlier recording is not saved yet; the next start offers it.")
+            self._notices.inform("An earlier recording is not saved yet; the next start offers it.")
             answer = LATER
         else:
             lines = "\n".join(_words(played) for played in journals)
@@ -156,13 +155,13 @@ class Recordings(QObject):
         if not events or patch is None:
             if journal is not None:
                 journal.delete()
-            self.informed.emit("Nothing was played, so nothing was recorded.")
+            self._notices.inform("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
         self._unsaved[Played(patch, tuple(events), *_heard(choices), self._began)] = journal
         self._show_unsaved()
         if choices.solo:
-            self.informed.emit(f"The recording has all modes, although mode {choices.solo} is soloed.")
+            self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
 
     def _choices_changed(self, _: frozenset[str]) -> None:
         self._journaling.hear(*_heard(self._session.choices))

@@ -420,7 +420,7 @@ def test_a_notice_is_read_whole_over_the_window_moves_nothing_and_is_dismissed_b
         assert settled() == bare and fits(window)
         for part in parts[:3]:
             assert not part.isVisible() or part.height() >= part.minimumSizeHint().height()
-        for desk in (lab.controller.presets, lab.controller.patches.desk):
+        for desk in (lab.controller.presets, lab.controller.patches):
             desk.toggle()
             browser = desk.browser
             lab.wait(lambda: browser.y() > notices.geometry().bottom())  # noqa: B023
