@@ -40,14 +40,13 @@ from app.views.instrument.patch_bar import PatchBar
 from app.views.instrument.string_knobs import StringKnobs
 from app.views.stage import StageView
 from app.window.about import about_text
-from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports, all_modes_words, note_of, note_words
 from app.window.instruments import Instruments
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
-from app.window.panels import Panel, StringPanel
+from app.window.panels import Location, Panel, StringPanel
 from app.window.panels.drum import DrumPanel
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
@@ -59,8 +58,9 @@ from engine.presets import SHIPPED, PresetError
 if TYPE_CHECKING:
     from app.instrument.learned import Kept
 
-FRAME_MS = 16
-IDLE_MS = 100  # between two looks while nothing moves
+LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
+IDLE_LOOK_MS = 50  # while nothing moves
+TURNS: tuple[Location, ...] = ("stage", "left", "stage", "right")
 FACTS_S = 0.1  # between two updates of gains and of the audio state
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
@@ -98,16 +98,13 @@ class Controller(QObject):
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
         self._audio_mail.reported.connect(self.audio.report)
         self.audio.open()  # it is opened while all else is made
-        self.appearance = Appearance(window, settings.look)
-        self._last_tick_s = time.monotonic()
-        self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
+        window.show_look(settings.look)
+        self._timer = QTimer(self, interval=LOOK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
-        self._deck_timer = QTimer(self, interval=FRAME_MS // 2, singleShot=True, timerType=Qt.TimerType.PreciseTimer)
-        self._deck_timer.timeout.connect(self._show_deck)
         self._lively_until_s = 0.0
         self._ticks = 0
         self._facts_due_s = 0.0
-        self._decks_shown_s = dict.fromkeys((True, False), self._last_tick_s)  # True: of the left one
+        self._shown_s = dict.fromkeys(TURNS, time.monotonic())
         self._peak_db = METER_FLOOR_DB
         self._struck: KeyNote | None = None  # the blow whose drum was shown last
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
@@ -195,7 +192,7 @@ class Controller(QObject):
 
     def _fill_decks(self) -> None:
         """Make the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
-        if any(not panel.on_stage for panel in self.panels):
+        if any(panel.location != "stage" for panel in self.panels):
             return
         from app.window.panels.rack import decks
 
@@ -406,7 +403,6 @@ class Controller(QObject):
         if self._learning is not None:
             self._learning.done(0)
         self._timer.stop()
-        self._deck_timer.stop()
         self.keeper.close()
         self.exports.close()
         self.patches.close()
@@ -425,7 +421,7 @@ class Controller(QObject):
                 "sampled": self.exports.choices[1],
                 "device": self.audio.device,
                 "sound": self.audio.sound,
-                "look": self.appearance.look,
+                "look": self.window.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
                 "patch_favourites": tuple(sorted(self.patches.favourites)),
@@ -466,7 +462,7 @@ class Controller(QObject):
         self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
-        self._wake()
+        self._wake(time.monotonic())
 
     def _show_kind(self) -> None:
         """Show the string or the drum; views of a string say that they do not show drums."""
@@ -488,55 +484,46 @@ class Controller(QObject):
         if (drum := drums.of_key(latest.event.key)) is not None:
             self.drum.show_key(latest.event.key, latest.event.place or drum.place)
 
-    def _wake(self) -> None:
+    def _wake(self, now_s: float) -> None:
         """Run the timer at its full rate for LIVELY_S, as something may move."""
-        self._lively_until_s = time.monotonic() + LIVELY_S
-        if self._timer.interval() != FRAME_MS:
-            self._timer.setInterval(FRAME_MS)
+        self._lively_until_s = now_s + LIVELY_S
+        self._set_pace(LOOK_MS)
 
-    # Sixty times a second
+    def _set_pace(self, interval_ms: int) -> None:
+        if self._timer.interval() != interval_ms:
+            self._timer.setInterval(interval_ms)
+
+    # A hundred and twenty times a second
 
     def _tick(self) -> None:
+        """Show the string and, between two of its frames, the left or the right deck."""
         now_s = time.monotonic()
-        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        window = self.window
-        performance = self.performance
-        status = self.sound.status()
-        performance.tick()
-        playing, take = performance.playing, performance.take
-        window.transport.show_playing(playing)
-        self._show_level(elapsed_s)
+        location = TURNS[self._ticks % len(TURNS)]
         self._ticks += 1
+        elapsed_s, self._shown_s[location] = now_s - self._shown_s[location], now_s
+        if location == "stage":
+            self._follow_sound(now_s, elapsed_s)
+        moment = self.performance.moment(elapsed_s)
+        for panel in self.panels:
+            if panel.location == location and panel.isVisible():
+                panel.show_moment(moment)
+
+    def _follow_sound(self, now_s: float, elapsed_s: float) -> None:
+        """Show what sounds, sixty times a second, and ten times as long as nothing moves."""
+        performance, transport = self.performance, self.window.transport
+        performance.tick()
+        transport.show_playing(performance.playing)
+        self._show_level(elapsed_s)
         if now_s >= self._facts_due_s:
             self._facts_due_s = now_s + FACTS_S
             choices = self.session.choices
-            window.transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
-            self.audio.show(status, performance.notes, take)
-        moment = performance.moment(elapsed_s)
-        for panel in self.panels:
-            if panel.on_stage and panel.isVisible():
-                panel.show_moment(moment)
-        self._deck_timer.start()
+            transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
+            self.audio.show(self.sound.status(), performance.notes, performance.take)
         self.patches.tick()
-        if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
+        is_still = performance.settled and not (performance.playing or performance.moving)
+        if not is_still or self._peak_db > METER_FLOOR_DB:
             self._lively_until_s = now_s + LIVELY_S
-        wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS
-        if self._timer.interval() != wanted_ms:
-            self._timer.setInterval(wanted_ms)
-
-    def _show_deck(self) -> None:
-        """Show the left and the right deck by turns, between two frames of the string.
-
-        So each painting is short: a key that is played waits for it.
-        """
-        on_the_left = bool(self._ticks % 2)
-        now_s = time.monotonic()
-        performance = self.performance
-        elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
-        moment = performance.moment(elapsed_s)
-        for panel in self.panels:
-            if not panel.on_stage and panel.on_the_left == on_the_left and panel.isVisible():
-                panel.show_moment(moment)
+        self._set_pace(LOOK_MS if now_s < self._lively_until_s else IDLE_LOOK_MS)
 
     def _show_level(self, elapsed_s: float) -> None:
         mixer = self.sound.mixer

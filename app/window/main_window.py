@@ -24,6 +24,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QApplication,
     QComboBox,
     QFileDialog,
     QGraphicsView,
@@ -55,6 +56,7 @@ from app.views.controls.song_strip import SongStrip
 from app.views.controls.transport_bar import TransportBar
 from app.views.faces import FACES, TITLES, Area
 from app.views.instrument.panel import InstrumentPanel
+from app.views.look import Look
 from engine.kernels import cache  # and not the compiler
 from engine.plain_text import one_line
 
@@ -111,6 +113,7 @@ class MainWindow(QMainWindow):
         self._painted = False
         self._folder = ""  # of the file that was opened last
         self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
+        self.look = Look()
         self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
         self.menu = AppMenu(self)
         self.action = self.menu.action
@@ -151,6 +154,8 @@ class MainWindow(QMainWindow):
         self._error = math.nan
         self._lay_out()
         self.setAcceptDrops(True)
+        self.menu.look_asked.connect(self._change_look)
+        QApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         enter = QShortcut(QKeySequence("Return"), self)
         enter.setAutoRepeat(False)
         enter.activated.connect(self._press_or_pluck)
@@ -295,6 +300,26 @@ class MainWindow(QMainWindow):
         self._share_height()
         self.faces.setEnabled(alive)
         self._show_rate_label()
+
+    # The look
+
+    def show_look(self, look: Look) -> None:
+        """Show the look that the application has in the menu."""
+        self.look = look
+        self.menu.show_look(look)
+
+    def _change_look(self, field: str, value: object) -> None:
+        self.show_look(Look.model_validate({**self.look.model_dump(), field: value}))
+        self._apply_look()
+
+    def _follow_desktop(self) -> None:
+        if self.look.theme == "system":
+            self._apply_look()
+
+    def _apply_look(self) -> None:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        theme.apply_theme(application, self.look.theme, self.look.size_percent)
 
     # Faces
 

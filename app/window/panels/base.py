@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
@@ -32,6 +32,7 @@ from app.views.drum.view import DrumView
 from app.views.stage import StageView
 from app.views.string.view import StringView
 
+Location = Literal["stage", "left", "right"]
 LEAST_HEIGHT = 84  # pixels
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
 UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
@@ -91,8 +92,7 @@ class Panel(QWidget):
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
-    on_the_left = False  # in which deck
-    on_stage: ClassVar[bool] = False  # the picture of the string or the drum, above the decks
+    location: Location = "stage"  # above the decks, or in one
     every: ClassVar[int] = 1  # of so many moments one is drawn
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
@@ -261,7 +261,6 @@ class ComputedPanel(Panel):
 class StagePanel(Panel):
     """The picture of the string or the drum, above the decks; in Play of the audible source alone."""
 
-    on_stage = True
     view: StringView | DrumView
 
     @property

@@ -65,7 +65,7 @@ def test_the_window_shows_without_the_engine_and_waits_for_its_parts(
     qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code = (
-        "import sys, app.window.main, app.window.main_window, app.window.appearance\n"
+        "import sys, app.window.main, app.window.main_window\n"
         "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
     )
     if sys.platform != "win32":  # there torch must come before Qt
