@@ -41,6 +41,7 @@ from app.views.instrument.string_knobs import StringKnobs
 from app.views.stage import StageView
 from app.window.about import about_text
 from app.window.audio_control import AudioControl
+from app.window.browsing import PresetDesk
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports, all_modes_words, note_of, note_words
 from app.window.instruments import Instruments
@@ -50,7 +51,6 @@ from app.window.panels import Location, Panel, StringPanel
 from app.window.panels.drum import DrumPanel
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
-from app.window.preset_desk import PresetDesk
 from app.window.remembering import SettingsSaver
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError

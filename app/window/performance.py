@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QObject, Signal
 
@@ -35,12 +35,49 @@ from app.session.slots import request_of
 from app.shared.vocabulary import DIFFERENCE
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
-from app.window.playhead import Playhead
 from engine.plain_text import name_text
 from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
 PLACED = {"instrument", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
+
+
+@dataclass
+class Playhead:
+    """A motion and the note whose time it follows; without a note it stands at `parked_s`.
+
+    Attributes:
+        finished: whether the motion is known to be complete.
+    """
+
+    take: Take | BlowTake | None = None
+    note: PluckVoices | KeyNote | None = None
+    parked_s: float = 0.0
+    finished: bool = False
+
+    def position_s(self, latency_s: float) -> float:
+        """The time in the motion that is heard now, or where it stands; `latency_s`: of the output."""
+        if self.take is None:
+            return 0.0
+        heard_s = self.parked_s
+        if self.note is not None:
+            heard_s = max(self.note.seconds - latency_s, self.note.from_s)
+        return min(max(heard_s, 0.0), self.take.seconds)
+
+    def park(self, position_s: float) -> None:
+        """Park the playhead: it stands at a time of the motion from now on."""
+        self.note, self.parked_s = None, position_s
+
+    @property
+    def moving(self) -> bool:
+        """Return True if it moves."""
+        note, take = self.note, self.take
+        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+
+    @property
+    def audible(self) -> bool:
+        """Return True if the note of the motion rings, which may be longer than the motion."""
+        return self.note is not None and self.take is not None and not self.note.over
 
 
 class RenderSignals(QObject):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from datetime import datetime
@@ -12,18 +13,102 @@ from app.export.journal import Journal, left_journals, recordings_folder
 from app.export.played import Played
 from app.instrument.events import NoteOn, PatchTurned
 from app.playing.keys import Keys
+from app.playing.recorder import EventRecorder
 from app.session.choices import Choices, Session
+from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.background import Background
 from app.views.dialogs.question import ask
-from app.window.journaling import Journaling
 from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
 
+WRITE_EVERY_S = 0.25  # to disk
 LONGEST_NAME = 60  # characters of an instrument
 RECOVER = "Recover"
 LATER = "Later"
 DISCARD = "Discard"
+
+
+class Journaling(QObject):
+    """The writing of a recording to disk while it is made, in a thread: a crash loses a fraction of a second.
+
+    Methods belong to the window's thread. Where the disk fails, the recording continues in memory alone.
+
+    Args:
+        recorder: whose events are written.
+    """
+
+    failed = Signal(str)  # why the recording is in memory alone from now on
+
+    def __init__(self, recorder: EventRecorder, parent: QObject) -> None:
+        super().__init__(parent)
+        self._recorder = recorder
+        self._journal: Journal | None = None
+        self._heard: tuple[PlayedSource, float] = ("model", 0.0)
+        self._written: tuple[PlayedSource, float] = self._heard
+        self._broken = False
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def begin(self, recorded: datetime) -> None:
+        """A recording has begun."""
+        self._journal, self._broken = None, False
+        self._written = ("model", 0.0)
+        self._stop.clear()
+        try:
+            self._journal = Journal.begun(recordings_folder(), recorded)
+        except OSError as error:
+            self._fail(error)
+            return
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+
+    def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
+        """The source that is heard from now on."""
+        self._heard = source, difference_gain_db
+
+    def end(self) -> Journal | None:
+        """End the journal, with all of the recording, and return it; None: it could not be begun."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        journal = self._journal
+        self._journal = None
+        self._thread = None
+        if journal is not None and not self._broken:
+            try:
+                journal.end(self._recorder.ended_s)
+            except OSError as error:
+                self._fail(error)
+        return journal
+
+    def _run(self) -> None:
+        lower_priority(Rank.BACKGROUND)
+        while not self._broken:
+            stopped = self._stop.wait(WRITE_EVERY_S)
+            self._write()
+            if stopped:
+                return
+
+    def _write(self) -> None:
+        """Append what is new. After a fault nothing more: what follows would stand behind a torn line."""
+        journal, source_and_gain = self._journal, self._heard
+        assert journal is not None
+        try:
+            journal.write(self._recorder.fetch())
+            if source_and_gain != self._written:
+                journal.hear(*source_and_gain)
+                self._written = source_and_gain
+        except OSError as error:
+            self._broken = True
+            self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        place = error.filename or recordings_folder()
+        self.failed.emit(
+            f"The recording cannot be written to disk while you play ({place}: {error.strerror or error}); "
+            "a crash would lose it. Save it soon."
+        )
 
 
 class Recordings(QObject):

@@ -8,16 +8,14 @@ core at a low priority. They rest while a pluck is rendered and while the panel 
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
+from threadpoolctl import threadpool_limits
 
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
@@ -168,7 +166,9 @@ class Panel(QWidget):
         """Start a long job in place of the one under way; `background` has its signals."""
 
         def on_one_core(job: Job) -> object:
-            with _one_core():
+            import torch  # noqa: F401 - whose OpenMP counts threads for each thread that computes
+
+            with threadpool_limits(limits=1, user_api="openmp"):
                 return work(job)
 
         self.look()
@@ -301,31 +301,3 @@ class StagePanel(Panel):
 
     def _reset_listening_point(self, side: str) -> None:
         self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
-
-
-_lock = threading.Lock()
-_holders: list[None] = []
-_usual = [1]
-
-
-@contextmanager
-def _one_core() -> Iterator[None]:
-    """Limit torch to one core while any job is under way; then restore the usual number.
-
-    PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
-    restores it.
-    """
-    import torch
-
-    with _lock:
-        if not _holders:
-            _usual[0] = torch.get_num_threads()
-        _holders.append(None)
-        torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        with _lock:
-            _holders.pop()
-            if not _holders:
-                torch.set_num_threads(_usual[0])
