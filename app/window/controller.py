@@ -16,14 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
-from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.playing.key_note import KeyNote
-from app.presets.library import Library, PresetEntry
+from app.presets.library import Library
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
@@ -40,7 +39,7 @@ from app.views.instrument.patch_bar import PatchBar
 from app.views.instrument.string_knobs import StringKnobs
 from app.views.stage import StageView
 from app.window.about import about_text
-from app.window.audio_control import AudioControl
+from app.window.audio_control import AudioControl, MakeSound
 from app.window.browsing import PresetDesk
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports, all_modes_words, note_of, note_words
@@ -68,13 +67,6 @@ METER_FLOOR_DB = -120.0
 DRUMS_PLAYED = (
     "This view shows a string, and drums are played.\nWaveform, spectrum, spectrogram and error over time show them."
 )
-ProblemListener = Callable[[AudioProblem], None]
-
-
-class _AudioMail(QObject):
-    """A signal that carries a fault of the sound device from its caretaker's thread into the window's."""
-
-    reported = Signal(object)
 
 
 class Controller(QObject):
@@ -85,18 +77,16 @@ class Controller(QObject):
         window: MainWindow,
         settings: Settings,
         settings_path: Path,
-        make_sound: Callable[[ProblemListener], Sound] = Sound,
+        make_sound: MakeSound = Sound,
     ) -> None:
         super().__init__(window)
         self.window = window
         self.session = Session(settings.choices)
         self._settings = settings
         self._settings_path = settings_path
-        self._audio_mail = _AudioMail()
-        self.sound = make_sound(self._audio_mail.reported.emit)
+        self.audio = AudioControl(window, make_sound, settings.device, settings.sound)
+        self.sound = self.audio.output
         window.closing.connect(self.sound.close)  # in case the rest of this fails
-        self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
-        self._audio_mail.reported.connect(self.audio.report)
         self.audio.open()  # it is opened while all else is made
         window.show_look(settings.look)
         self._timer = QTimer(self, interval=LOOK_MS, timerType=Qt.TimerType.PreciseTimer)
@@ -106,7 +96,6 @@ class Controller(QObject):
         self._facts_due_s = 0.0
         self._shown_s = dict.fromkeys(TURNS, time.monotonic())
         self._peak_db = METER_FLOOR_DB
-        self._struck: KeyNote | None = None  # the blow whose drum was shown last
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
@@ -119,8 +108,7 @@ class Controller(QObject):
         self.panels: list[Panel] = [self.string, self.drum]  # and those of the decks from the Lab on
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
-        self._connect()
-        if self.entry is None and (first := self.library.first()):
+        if self.performance.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
         for slot, name in missing_presets(self.session.choices, self.library).items():
             self.session.update(**{slot: "model" if slot == "a" else "truth"})
@@ -135,6 +123,7 @@ class Controller(QObject):
             self.performance,
         )
         self.performance.by_hand = self.instruments.by_hand
+        self.instruments.begun.connect(self._wake)
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
         self.instruments.start()
@@ -155,6 +144,7 @@ class Controller(QObject):
         )
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
         window.transport.export_asked.connect(window.action["export"].trigger)
+        self._connect()
         self._connect_actions()
         self.keeper = SettingsSaver(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.report)
@@ -162,9 +152,7 @@ class Controller(QObject):
             self.window.notices.report(problem)
         everything = frozenset(OBSERVED)
         self.session.changed.connect(self._choices_changed)
-        self.performance.choices_changed(everything)
-        self.instruments.choices_changed(everything)
-        self._choices_shown(everything)
+        self._choices_changed(everything)
         self._timer.start()
         window.closing.disconnect(self.sound.close)
         window.closing.connect(self.close)
@@ -172,7 +160,7 @@ class Controller(QObject):
     # Connections
 
     def _connect(self) -> None:
-        window, _session = self.window, self.session
+        window = self.window
         for panel in self.panels:
             self._connect_panel(panel)
         self.presets.browser.played.connect(lambda name: self.pluck())
@@ -187,7 +175,7 @@ class Controller(QObject):
     def _connect_panel(self, panel: Panel) -> None:
         panel.seek_asked.connect(self.performance.seek)
         panel.pluck_asked.connect(self.pluck)
-        panel.strike_asked.connect(self.strike)
+        panel.strike_asked.connect(self.instruments.strike)
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
@@ -287,10 +275,6 @@ class Controller(QObject):
         else:
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
 
-    def strike(self, x: float, y: float, velocity: float) -> None:
-        """Strike the drum at a place, in half-lengths from its centre."""
-        self.instruments.strike(x, y, velocity)
-
     def play_or_stop(self) -> None:
         if self._abx is None:
             was_playing = self.patches.playing
@@ -303,7 +287,7 @@ class Controller(QObject):
 
     def listening_test(self) -> None:
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
-        entry = self.entry
+        entry = self.performance.entry
         choices = self.session.choices
         struck = self.instruments.struck
         if entry is None:
@@ -391,11 +375,6 @@ class Controller(QObject):
         self.patches.take_file(kept.patch)
         self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}")
 
-    @property
-    def entry(self) -> PresetEntry | None:
-        """The chosen preset."""
-        return self.performance.entry
-
     def close(self) -> None:
         """Save the settings and end every thread."""
         if self._abx is not None:
@@ -462,7 +441,7 @@ class Controller(QObject):
         self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
-        self._wake(time.monotonic())
+        self._wake()
 
     def _show_kind(self) -> None:
         """Show the string or the drum; views of a string say that they do not show drums."""
@@ -478,15 +457,14 @@ class Controller(QObject):
     def _show_struck(self) -> None:
         """Show the drum that was struck last, and where."""
         latest, drums = self.instruments.latest, self.session.choices.drums
-        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
+        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum:
             return
-        self._struck = latest
         if (drum := drums.of_key(latest.event.key)) is not None:
             self.drum.show_key(latest.event.key, latest.event.place or drum.place)
 
-    def _wake(self, now_s: float) -> None:
+    def _wake(self) -> None:
         """Run the timer at its full rate for LIVELY_S, as something may move."""
-        self._lively_until_s = now_s + LIVELY_S
+        self._lively_until_s = time.monotonic() + LIVELY_S
         self._set_pace(LOOK_MS)
 
     def _set_pace(self, interval_ms: int) -> None:
@@ -501,6 +479,7 @@ class Controller(QObject):
         location = TURNS[self._ticks % len(TURNS)]
         self._ticks += 1
         elapsed_s, self._shown_s[location] = now_s - self._shown_s[location], now_s
+        self.instruments.look()
         if location == "stage":
             self._follow_sound(now_s, elapsed_s)
         moment = self.performance.moment(elapsed_s)

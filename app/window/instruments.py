@@ -37,7 +37,6 @@ from engine.values.string import StringParameters
 
 HIGHEST_KEY = 127
 OWN_MS = 60  # after another instrument, or the last turn of a knob, until its own pluck is shown
-LOOK_MS = 8  # until the player has reported the note of a key, between two looks
 
 
 class Instruments(QObject):
@@ -50,7 +49,7 @@ class Instruments(QObject):
     """
 
     played = Signal()  # a note has begun, and the session has its values
-    _begun = Signal()  # emitted in any thread
+    begun = Signal()  # a note; emitted in any thread
 
     def __init__(
         self,
@@ -74,10 +73,8 @@ class Instruments(QObject):
         self._own_timer.timeout.connect(self._show_own_string)
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
         self._drawn = False  # whether its pluck is the session's
-        self._look_timer = QTimer(self, interval=LOOK_MS)
-        self._look_timer.timeout.connect(self._look_at_key)
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
-        self._begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
+        self.begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
         self._keys.pressed.connect(self._press)
         self._keys.released.connect(self._release)
@@ -91,7 +88,6 @@ class Instruments(QObject):
         self.midi.start()
 
     def close(self) -> None:
-        self._look_timer.stop()
         self._own_timer.stop()
         self.midi.close()
 
@@ -144,7 +140,7 @@ class Instruments(QObject):
         else:
             self._unknown = None
             self._show_in_session(note.request, drawn)
-        self._begun.emit()
+        self.begun.emit()
 
     def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
         """Show this string and its pluck in the session; the string alone where it has drawn the pluck itself."""
@@ -222,20 +218,10 @@ class Instruments(QObject):
             event = self.by_hand()
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
-    def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
-        """Strike the drum that is shown.
-
-        Args:
-            x, y: where, from its centre in half-lengths; None: at its own place.
-            velocity: 1 … 127; None: that of the computer's keys.
-        """
-        key = self.drum_key
-        if key is not None:
-            place = None if x is None or y is None else (x, y)
-            strike_velocity = (
-                self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
-            )
-            self.play(NoteOn(key, strike_velocity, KEYS, place))
+    def strike(self, x: float, y: float, velocity: float) -> None:
+        """Strike the drum that is shown at a place, from its centre in half-lengths; velocity: 1 … 127."""
+        if (key := self.drum_key) is not None:
+            self.play(NoteOn(key, round(min(max(velocity, 1.0), 127.0)), KEYS, (x, y)))
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
@@ -253,18 +239,19 @@ class Instruments(QObject):
             return
         self.play(self._by_hand(pluck))
 
-    def _look_at_key(self) -> None:
+    def look(self) -> None:
         """Take the string and the pluck of a key from the player's report, within a quantum of the device."""
-        self._performance.notes.look()
         note = self._unknown
-        if note is not None and not note.known:
+        if note is None:
+            return
+        self._performance.notes.look()
+        if not note.known:
             return
         with self._lock:
             if self._unknown is not note:  # another was begun just now
                 return
             self._unknown = None
-        self._look_timer.stop()
-        if note is None or note is not self.latest or not self._session.choices.plays_patch:
+        if note is not self.latest or not self._session.choices.plays_patch:
             return  # another pluck was begun, or a single string chosen, meanwhile
         self.latest_key = note.event.key, note.string
         if note.request is not None:
@@ -275,9 +262,7 @@ class Instruments(QObject):
 
     def _tell_session(self) -> None:
         """Update the session, once for all notes that have begun meanwhile."""
-        if self._unknown is not None and not self._look_timer.isActive():
-            self._look_timer.start()
-            self._look_at_key()
+        self.look()
         with self._lock:
             changes = self._reported
             self._reported = {}

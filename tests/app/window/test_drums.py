@@ -97,7 +97,7 @@ def test_pads_keys_and_channel_ten_strike_drums_that_ring_light_and_stop(
         kit.key(KEY.Key_Space)  # strikes the drum that was struck last
         kit.wait(lambda sounding=sounding: bool(kit.keys.sounding()) == sounding)
     assert kit.struck[-1].event.key == 45
-    kit.controller.strike(0.1, -0.2, 100.0)
+    kit.controller.instruments.strike(0.1, -0.2, 100.0)
     event = kit.struck[-1].event
     assert (event.key, event.velocity, event.place) == (45, 100, (0.1, -0.2))
     count = len(kit.struck)
