@@ -126,7 +126,7 @@ class Controller(QObject):
         self.instruments.begun.connect(self._wake)
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
-        self.instruments.start()
+        self.instruments.midi.start()
         self.patches = PatchDesk(
             window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )

@@ -83,10 +83,6 @@ class Instruments(QObject):
         self.midi.reported.connect(window.notices.report)
         self.midi.informed.connect(window.notices.inform)
 
-    def start(self) -> None:
-        """Open the remembered MIDI input, if any."""
-        self.midi.start()
-
     def close(self) -> None:
         self._own_timer.stop()
         self.midi.close()
@@ -166,12 +162,13 @@ class Instruments(QObject):
         (low, high), latest = patch.range, self.latest_key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
-    def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
-        """A pluck as a note of the key whose string is shown. It is of the string alone where keys do not play it so.
+    def by_hand(self, pluck: Pluck | None = None) -> NoteOn | PluckAt:
+        """A pluck, by default the chosen one, as a note of the key whose string is shown.
 
-        These are a single string, and one beside another preset.
+        It is of the string alone where keys do not play it so: of a single string, and beside another preset.
         """
         choices = self._session.choices
+        pluck = pluck or choices.pluck
         patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
             return alone
@@ -186,10 +183,6 @@ class Instruments(QObject):
             return alone
         velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
         return NoteOn(key, velocity, KEYS, string=number, pluck=pluck)
-
-    def by_hand(self) -> NoteOn | PluckAt:
-        """The chosen pluck of the string that is shown, where it can be with all of its instrument."""
-        return self._by_hand(self._session.choices.pluck)
 
     def pluck(self) -> None:
         """Pluck the string that is shown as it is chosen."""
@@ -237,7 +230,7 @@ class Instruments(QObject):
                 self._reported |= {"instrument": SingleString(preset=name)}
             self.play(PluckAt(pluck))
             return
-        self.play(self._by_hand(pluck))
+        self.play(self.by_hand(pluck))
 
     def look(self) -> None:
         """Take the string and the pluck of a key from the player's report, within a quantum of the device."""

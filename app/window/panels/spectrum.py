@@ -13,6 +13,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, Qt
 from PySide6.QtGui import QResizeEvent
 
 from app.analysis.heard import HeardSignal
+from app.analysis.spectrogram import FrequencyRows
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.choices import Session
@@ -45,8 +46,9 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """The frequencies (COLUMNS,), from LOWEST_HZ to half the rate."""
-        return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
+        """The middles (COLUMNS,) of the columns between LOWEST_HZ and half the rate."""
+        edges = np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS + 1)
+        return np.sqrt(edges[1:] * edges[:-1])
 
     @cached_property
     def _window(self) -> NDArray[np.float32]:
@@ -54,31 +56,18 @@ class Analyser:
         return (window * 2 / window.sum()).astype(np.float32)
 
     @cached_property
-    def _bins(self) -> NDArray[np.float64]:
-        """The columns' places in the padded spectrum, in bins."""
-        return self.column_hz * PADDING * self.window_frames / self.rate_hz
+    def _rows(self) -> FrequencyRows:
+        frames = PADDING * self.window_frames
+        return FrequencyRows(frames // 2 + 1, self.rate_hz / frames, COLUMNS, LOWEST_HZ, logarithmic=True)
 
-    @cached_property
-    def _first_bins(self) -> NDArray[np.intp]:
-        """The first bin of each column, where columns are wider than bins."""
-        return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
-
-    @cached_property
-    def _wide_columns(self) -> NDArray[np.bool_]:
-        last = PADDING * self.window_frames // 2 + 1
-        return np.diff(self._first_bins, append=last) > 1
-
-    def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float64]:
+    def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
         """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
         frames = self.window_frames
         block = np.zeros(frames, np.float32)
         block[: min(frames, len(signal))] = signal[:frames]
         magnitude = np.abs(np.fft.rfft((block - block.mean()) * self._window, PADDING * frames))
-        columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
-        # the loudest bin of a wide column, so that no partial falls between two
-        loudest = np.maximum.reduceat(magnitude, self._first_bins)
-        columns = np.maximum(columns, np.where(self._wide_columns, loudest, 0))
-        return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
+        levels_db = 20 * np.log10(magnitude + 1e-12).astype(np.float32)
+        return np.maximum(self._rows.of(levels_db[np.newaxis])[0], np.float32(FLOOR_DB))
 
 
 @lru_cache(maxsize=4)
@@ -103,7 +92,7 @@ class SpectrumPanel(CurvesPanel):
         # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
         self._area_of: str | None = None
-        self._levels_db: dict[str, NDArray[np.float64]] = {}
+        self._levels_db: dict[str, NDArray[np.float32]] = {}
         self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
         super().__init__(session, library, pg.PlotWidget(enableMenu=False))
         self.setMinimumHeight(LEAST_HEIGHT)
