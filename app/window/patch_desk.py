@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QInputDialog
 
-from app.instrument.beyond_training import outside_of_key, outside_of_string
+from app.instrument.beyond_training import outside_of_key
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
 from app.instrument.events import (
@@ -25,7 +26,7 @@ from app.instrument.events import (
     NoteOn,
     TimedEvent,
 )
-from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figures_of, knob_for
+from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
@@ -56,6 +57,7 @@ from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
 from app.window.main_window import MainWindow
+from app.window.panels.string import outside_of_shown
 from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import SongPlayer
@@ -223,38 +225,37 @@ class PatchDesk(BrowserDesk):
         if patch is None:
             return
         if entry is not None and entry.own:
-            self._save(patch, entry.path)
+            self._write(lambda: self._save(patch, entry.path))
         else:
             self._ask(
                 "Save instrument",
                 "Name of the instrument:",
                 f"{patch.name} 2",
-                lambda name: self._save_as(patch, name),
+                lambda name: self._save(Patch.model_validate({**dict(patch), "name": name})),
             )
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
-        """Ask for a name and do what it is for; again, with the reason, where the name is impossible."""
+        """Ask for a name and do what it is for; again, with the reason, where the name is impossible or taken."""
         reason = ""
         while True:
             name, typed_name = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
             if not typed_name:
                 return
             try:
-                do(name)
+                self._write(partial(do, name))
                 return
             except ValueError as error:
                 reason = f"{one_line(explained(error))}.\n\n"
 
-    def _save_as(self, patch: Patch, name: str) -> None:
-        """Raise ValueError: the name is impossible or taken."""
-        self._save(Patch.model_validate({**dict(patch), "name": name}))
-
-    def _save(self, patch: Patch, replace: Path | None = None) -> None:
+    def _write(self, do: Callable[[], None]) -> None:
+        """Do what writes a file; report that it cannot be written."""
         try:
-            saved = save_patch(patch, replace)
+            do()
         except WriteError as error:
             self._notices.report(one_line(str(error)))
-            return
+
+    def _save(self, patch: Patch, replace: Path | None = None) -> None:
+        saved = save_patch(patch, replace)
         self.reload()
         self._session.update(patch=patch)
         self._show_patch()
@@ -269,12 +270,7 @@ class PatchDesk(BrowserDesk):
         self._ask("Rename instrument", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
 
     def _rename(self, entry: PatchEntry, name: str) -> None:
-        """Raise ValueError: the name is impossible or taken."""
-        try:
-            renamed = rename_patch(entry, name)
-        except WriteError as error:
-            self._notices.report(one_line(str(error)))
-            return
+        renamed = rename_patch(entry, name)
         if entry.name in self.favourites:
             self.favourites ^= {entry.name, renamed.name}
         if self.patch is not None and self.patch.name == entry.patch.name:
@@ -471,27 +467,22 @@ class PatchDesk(BrowserDesk):
             self._show_string(self.patch)
         latest = self._latest
         is_outdated = isinstance(latest, KeyNote) and latest.patch != self.patch
-        self._say("; ".join(self._outside(latest)), of_shown=not is_outdated)
+        self._say(self._outside(latest), of_shown=not is_outdated)
 
     def _say(self, outside: str, of_shown: bool = True) -> None:
         """Report what is outside the training; in the bar, how pitches are had where there is no patch."""
         self._window.show_outside(outside, of_shown)
         self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
-    def _outside(self, latest: PluckVoices | KeyNote | None) -> list[str]:
+    def _outside(self, latest: PluckVoices | KeyNote | None) -> str:
         """The parts of the latest note, with the present knobs, that lie outside the training of its model."""
         choices, patch = self._session.choices, self.patch
         entry = self._library.find(choices.preset)
         if entry is None:
-            return []
+            return ""
         if isinstance(latest, KeyNote) and patch is not None and latest.patch != patch:
-            return outside_of_key(entry.info, patch, latest.event, latest.string)
-        if choices.string is None:
-            return []
-        string = choices.string
-        if patch is not None and choices.plays_patch:
-            string = by_two_numbers(patch, string)
-        return outside_of_string(entry.info, string, choices.pluck)
+            return "; ".join(outside_of_key(entry.info, patch, latest.event, latest.string))
+        return "" if choices.string is None else outside_of_shown(choices, entry)
 
     def _show_string(self, patch: Patch) -> None:
         """Show the string or the drum in figures, or why there is none."""

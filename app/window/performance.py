@@ -306,7 +306,6 @@ class Performance(QObject):
         else:
             self._forget_turn()
             self._show_error("")
-            self._window.show_growth("")
 
     def play_preset(self, name: str) -> None:
         """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
@@ -409,8 +408,6 @@ class Performance(QObject):
                 panel.take_started(take)
         self.follow()
         self._show_error("Rendering …")
-        self._window.show_error(math.nan)
-        self._window.show_growth("")
 
     def _take_finished(self, take: Take | BlowTake) -> None:
         if take is not self._shown.take or self._shown.finished:
@@ -425,9 +422,8 @@ class Performance(QObject):
             self._window.notices.report(reason)
         errors, places = take.errors_by_training, ("in the training range", "beyond")
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
-        self._show_error("Error of this pluck: " + ", ".join(parts))
-        self._window.show_error(take.error)
-        self._window.show_growth(growth_words(errors, take.info.rel_mae))
+        growth = growth_words(errors, take.info.rel_mae)
+        self._show_error("Error of this pluck: " + ", ".join(parts), take.error, growth)
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
@@ -438,9 +434,12 @@ class Performance(QObject):
 
     # Helpers
 
-    def _show_error(self, words: str) -> None:
+    def _show_error(self, words: str, error: float = math.nan, growth: str = "") -> None:
+        """Show the error of the shown motion in the header, and that it grew, as far as they are known."""
         self._error_words = words
         self._show_words()
+        self._window.show_error(error)
+        self._window.show_growth(growth)
 
     def _show_words(self) -> None:
         """Show in the header how long a model is still waited for, or the error."""

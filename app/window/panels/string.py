@@ -9,7 +9,7 @@ from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
 from app.instrument.beyond_training import outside_of_string
 from app.instrument.facts import by_two_numbers
-from app.presets.library import Library
+from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
@@ -126,11 +126,7 @@ class StringPanel(StagePanel):
         if silent or choices.face == "play" or entry is None:
             return silent, True
         error = math.nan if self._take is None else self._take.error
-        patch, string = choices.patch, choices.string
-        if patch is None or string is None or not choices.plays_patch:
-            return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
-        drawn_string = by_two_numbers(patch, string)  # as the head of the Lab reports it
-        return judged("; ".join(outside_of_string(entry.info, drawn_string, choices.pluck)), error)
+        return judged(outside_of_shown(choices, entry), error)  # as the head of the Lab reports it
 
     # Gestures
 
@@ -148,6 +144,16 @@ class StringPanel(StagePanel):
     def _step_shape(self, steps: int) -> None:
         index = SHAPES.index(self.session.choices.shape)
         self.session.update(shape=SHAPES[(index + steps) % len(SHAPES)])
+
+
+def outside_of_shown(choices: Choices, entry: PresetEntry) -> str:
+    """The differences of the shown string and its pluck from the training of its preset, in words; "": none."""
+    string, patch = choices.string, choices.patch
+    if string is None:
+        return "; ".join(outside_training(entry.info, choices.pluck))
+    if patch is not None and choices.plays_patch:
+        string = by_two_numbers(patch, string)
+    return "; ".join(outside_of_string(entry.info, string, choices.pluck))
 
 
 def _label(choices: Choices) -> str:
