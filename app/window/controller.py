@@ -73,11 +73,7 @@ class Controller(QObject):
     """A controller that lives as long as the window."""
 
     def __init__(
-        self,
-        window: MainWindow,
-        settings: Settings,
-        settings_path: Path,
-        make_sound: MakeSound = Sound,
+        self, window: MainWindow, settings: Settings, settings_path: Path, make_sound: MakeSound = Sound
     ) -> None:
         super().__init__(window)
         self.window = window
@@ -115,13 +111,7 @@ class Controller(QObject):
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
-        self.instruments = Instruments(
-            window,
-            self.session,
-            self.library,
-            settings.midi,
-            self.performance,
-        )
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance)
         self.performance.by_hand = self.instruments.by_hand
         self.instruments.begun.connect(self._wake)
         self.instruments.played.connect(self.performance.follow)
@@ -200,19 +190,19 @@ class Controller(QObject):
 
     def _connect_actions(self) -> None:
         """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
-        window, session = self.window, self.session
+        window, session, history = self.window, self.session, self.history
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
-            "undo": self._undo,
-            "redo": self._redo,
+            "undo": lambda: self._step(history.undo, history.undo_words, "Undone", "Nothing to undo"),
+            "redo": lambda: self._step(history.redo, history.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
-            "loop": lambda: session.update(loop=not session.choices.loop),
+            **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
             "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
@@ -220,8 +210,6 @@ class Controller(QObject):
             "switch": session.switch_source,
             "all_modes": lambda: session.update(solo=0),
             "abx": self.listening_test,
-            "motion": lambda: session.update(motion=not session.choices.motion),
-            "envelope": lambda: session.update(envelope=not session.choices.envelope),
             "audio": self.audio.show_dialog,
             "midi": lambda: self.instruments.midi.show_dialog(window),
             "help": self.show_help,
@@ -256,15 +244,13 @@ class Controller(QObject):
 
     # Intents
 
-    def _undo(self) -> None:
-        words = self.history.undo_words
-        self.history.undo()
-        self.window.say_briefly(f"Undone: {words}" if words else "Nothing to undo")
+    def _toggle(self, field: str) -> None:
+        self.session.update(**{field: not getattr(self.session.choices, field)})
 
-    def _redo(self) -> None:
-        words = self.history.redo_words
-        self.history.redo()
-        self.window.say_briefly(f"Redone: {words}" if words else "Nothing to redo")
+    def _step(self, take: Callable[[], None], words: str, done: str, nothing: str) -> None:
+        """Take a step of undo or redo, and say which; `words`: those of the step."""
+        take()
+        self.window.say_briefly(f"{done}: {words}" if words else nothing)
 
     def pluck(self) -> None:
         """Pluck the string as chosen, or strike the drum that is shown."""

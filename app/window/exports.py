@@ -19,12 +19,11 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices, Session
 from app.session.slots import other_preset
-from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
 from app.window.instruments import Instruments
 from app.window.main_window import MainWindow
-from app.window.recordings import Recordings
+from app.window.recordings import Recordings, played_source
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
 ESCAPE = Qt.Key.Key_Escape
@@ -146,8 +145,8 @@ def heard_note(choices: Choices, library: Library, struck: Struck | None = None)
     if entry is None:
         return None
     note = note_of(choices, entry, struck)
-    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
-    return HeardNote(note, saved, another is not None, choices.difference_gain_db, note_words(entry.title, choices))
+    saved, words = played_source(choices), note_words(entry.title, choices)
+    return HeardNote(note, saved, another is not None, choices.difference_gain_db, words)
 
 
 def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> ExportedPluck:

@@ -274,11 +274,15 @@ def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[s
     return journals, problems
 
 
+def played_source(choices: Choices) -> PlayedSource:
+    """The source that is heard, as files name it; of another preset the model plays keys."""
+    source = choices.source_heard
+    return "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
+
+
 def _heard(choices: Choices) -> tuple[PlayedSource, float]:
     """The source that is heard, and the gain of the difference."""
-    name = choices.source_heard
-    source: PlayedSource = "truth" if name == "truth" else "difference" if name == DIFFERENCE else "model"
-    return source, choices.difference_gain_db
+    return played_source(choices), choices.difference_gain_db
 
 
 def _words(played: Played) -> str:
