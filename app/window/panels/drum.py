@@ -63,7 +63,7 @@ class DrumPanel(StagePanel):
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:
-        """Those of the slots; of another preset the model plays drums."""
+        """The sources of the slots; of another preset the model plays drums."""
         return tuple(source for source in super()._sources if source.source in DRAWN)
 
     @property
