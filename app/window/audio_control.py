@@ -6,9 +6,10 @@ A choice is saved once the device plays with it: one that was refused must not l
 from __future__ import annotations
 
 import statistics
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice, output_devices
@@ -33,14 +34,23 @@ FREQUENT_GAPS = (
 LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
 
 
+MakeSound = Callable[[Callable[[AudioProblem], None]], Sound]
+
+
 class AudioControl(QObject):
     """The choice of an output, in the window's thread. `device` and `sound`: what played last, to be saved."""
 
-    def __init__(self, window: MainWindow, output: Sound, device: DeviceChoice | None, sound: SoundChoice) -> None:
+    _reported = Signal(object)  # a fault, from the output's caretaker thread
+
+    def __init__(
+        self, window: MainWindow, make_output: MakeSound, device: DeviceChoice | None, sound: SoundChoice
+    ) -> None:
         super().__init__(window)
         self.device, self.sound = device, sound
         self._wish = (device, sound)
-        self._window, self._output = window, output
+        self._window = window
+        self.output = make_output(self._reported.emit)
+        self._reported.connect(self.report)
         self._changes = 0
         self._notice = ""
         self._latencies_s: tuple[float, ...] = ()
@@ -55,7 +65,7 @@ class AudioControl(QObject):
         """Open the output as chosen. Return at once; `show` sees what became of it."""
         device, sound = self._wish
         self._changes += 1
-        self._output.open(
+        self.output.open(
             AudioDevice(device.name, device.host_api) if device else None,
             LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
             sound.rate_hz,
@@ -72,7 +82,7 @@ class AudioControl(QObject):
             self._window.notices.withdraw(self._notice)  # one notice about the sound at a time
         self._notice = str(problem)
         if problem.kind is not ProblemKind.STALLED:
-            device = self._output.status().device
+            device = self.output.status().device
             self._notice += (
                 f" Playback continues on “{device.name}”." if device else " The app continues without sound."
             )
@@ -112,12 +122,12 @@ class AudioControl(QObject):
             self._dialog = dialog = AudioDialog(self._window)
             dialog.choice_made.connect(self._choose)
             dialog.rescan_asked.connect(lambda: self.open(rescan=True))
-            dialog.tone_asked.connect(self._output.sound_tone)
+            dialog.tone_asked.connect(self.output.sound_tone)
             dialog.gaps_reset.connect(self._reset_gaps)
         self._listed = None
         self._list_devices()
         self._dialog.show_sound(self._wish[1])
-        self._dialog.show_state(self._state(self._output.status()))
+        self._dialog.show_state(self._state(self.output.status()))
         self._dialog.show()
         self._dialog.raise_()
 
@@ -127,14 +137,14 @@ class AudioControl(QObject):
         self.open()
 
     def _reset_gaps(self) -> None:
-        gaps = self._output.status().gaps
+        gaps = self.output.status().gaps
         self._last_known = gaps[-1] if gaps else None
 
     def _list_devices(self) -> None:
         """List the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
         first = self._listed is None
         try:
-            devices = output_devices(rescan=first and self._output.status().device is None)
+            devices = output_devices(rescan=first and self.output.status().device is None)
         except AudioUnavailable:
             devices, choices = [], None
         else:

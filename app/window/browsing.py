@@ -1,58 +1,73 @@
-"""The parts that both browsers share in the window: rows, favourites, previous and next, the user's folder."""
+"""The choice among rows by a bar and a browser: favourites, previous and next, the user's folder; of presets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QUrl, Signal
+from PySide6.QtCore import QObject, QUrl
 from PySide6.QtGui import QDesktopServices
 
+from app.presets.library import Library
+from app.session.choices import Session
 from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import BrowserRow
+from app.views.controls.preset_bar import PresetBar
+from app.views.dialogs.preset_card import preset_browser, preset_row
+from app.views.instrument.patch_bar import PatchBar
+from app.window.main_window import MainWindow
+from engine.folders import user_folder
 
 
 class BrowserDesk(QObject):
     """A desk that lives in the window's thread, as long as the window.
 
-    Args:
-        rows: what there is now.
-        chosen: the name of the row that is loaded; "": none.
-        choose: loads one.
-        folder: of the user's own files.
-
     Attributes:
         favourites: names of rows, also of those whose files are missing at present.
     """
 
-    reported = Signal(str)  # a notice for the user
-
     def __init__(
-        self,
-        browser: Browser,
-        rows: Callable[[], Sequence[BrowserRow]],
-        chosen: Callable[[], str],
-        choose: Callable[[str], None],
-        folder: Callable[[], Path],
-        favourites: Iterable[str],
+        self, window: MainWindow, bar: PresetBar | PatchBar, browser: Browser, favourites: Iterable[str]
     ) -> None:
-        super().__init__(browser)
+        super().__init__(window)
+        self._notices = window.notices
+        self._bar_filter = bar.filtered
         self.browser, self.favourites = browser, set(favourites)
-        self._rows = rows
-        self._chosen = chosen
-        self._choose = choose
-        self._folder = folder
-        browser.chosen.connect(choose)
+        bar.browse_asked.connect(self.toggle)
+        bar.all_asked.connect(browser.clear_filter)
+        browser.opened.connect(self.reload)
+        browser.listed_changed.connect(self._show_listed)
+        browser.chosen.connect(self.choose)
         browser.favourite_asked.connect(self.toggle_favourite)
         browser.folder_asked.connect(self._open_folder)
 
-    def show(self) -> None:
-        """List what there is now."""
-        self.browser.show_rows(self._rows(), self.favourites, self._chosen(), str(self._folder()))
+    @property
+    def chosen(self) -> str:
+        """The name of the row that is loaded; "": none."""
+        raise NotImplementedError
 
-    def show_chosen(self) -> None:
-        """Show the chosen one; to be called when another one is loaded."""
-        self.browser.set_chosen(self._chosen())
+    def choose(self, name: str) -> None:
+        """Load a row."""
+        raise NotImplementedError
+
+    def reload(self) -> None:
+        """Read the folders again: the user may have added files."""
+        raise NotImplementedError
+
+    def _rows(self) -> Sequence[BrowserRow]:
+        """The rows that there are now."""
+        raise NotImplementedError
+
+    def _folder(self) -> Path:
+        """The folder of the user's own files."""
+        raise NotImplementedError
+
+    def show_rows(self) -> None:
+        """List what there is now."""
+        self.browser.show_rows(self._rows(), self.favourites, self.chosen, str(self._folder()))
+
+    def _show_listed(self) -> None:
+        self._bar_filter.show_listed(len(self.browser.listed), self.browser.total)
 
     def toggle(self) -> None:
         """Open the browser, or close it."""
@@ -66,14 +81,14 @@ class BrowserDesk(QObject):
 
         A step from outside leads to its first or last.
         """
-        names, name = self.browser.listed, self._chosen()
+        names, name = self.browser.listed, self.chosen
         if names:
             index = names.index(name) if name in names else -1
-            self._choose(names[(index + step) % len(names) if index >= 0 else (0 if step > 0 else -1)])
+            self.choose(names[(index + step) % len(names) if index >= 0 else (0 if step > 0 else -1)])
 
     def toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}
-        self.show()
+        self.show_rows()
 
     def _open_folder(self) -> None:
         folder = self._folder()
@@ -81,7 +96,54 @@ class BrowserDesk(QObject):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             remedy = "choose another with LEARNED_STRINGS_PRESETS"
-            self.reported.emit(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
+            self._notices.report(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.reported.emit(f"No file manager was found here; your own {self.browser.what} are in {folder}.")
+            self._notices.report(f"No file manager was found here; your own {self.browser.what} are in {folder}.")
+
+
+class PresetDesk(BrowserDesk):
+    """A desk of presets; see `BrowserDesk`."""
+
+    def __init__(
+        self, window: MainWindow, session: Session, library: Library, favourites: Iterable[str] = ()
+    ) -> None:
+        super().__init__(window, window.presets, preset_browser(window), favourites)
+        self._session, self._library, self._bar = session, library, window.presets
+        self._known = set(library.names)
+        self._bar.step_asked.connect(self.step)
+        library.changed.connect(self._library_changed)
+        self.show_rows()
+
+    @property
+    def chosen(self) -> str:
+        return self._session.choices.preset
+
+    def choose(self, name: str) -> None:
+        self._session.update(preset=name)
+
+    def reload(self) -> None:
+        for problem in self._library.refresh():
+            self._notices.report(problem)
+
+    def _rows(self) -> Sequence[BrowserRow]:
+        return [preset_row(entry) for entry in self._library.entries]
+
+    def _folder(self) -> Path:
+        return user_folder()
+
+    def choice_changed(self) -> None:
+        """Show the chosen preset; to be called when another one is chosen."""
+        self._show_listed()
+        self.browser.set_chosen(self.chosen)
+
+    def _show_listed(self) -> None:
+        super()._show_listed()
+        self._bar.set_chosen(self._library.find(self.chosen), self.chosen in self.favourites)
+
+    def _library_changed(self) -> None:
+        """Show what there is now; a filter that hides an added preset is cleared."""
+        added, self._known = set(self._library.names) - self._known, set(self._library.names)
+        self.show_rows()
+        for name in added:
+            self.browser.reveal(name)

@@ -16,17 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
-from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
-from app.instrument.events import Event, NoteOn, PluckAt
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
-from app.playing.note import PluckVoices
-from app.presets.library import Library, PresetEntry
+from app.presets.library import Library
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
@@ -39,23 +35,21 @@ from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import ABOUT, HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
-from app.views.dialogs.preset_card import preset_browser
-from app.views.drum.view import DrumView
-from app.views.instrument.patch_card import patch_browser
-from app.views.string.view import StringView
+from app.views.instrument.patch_bar import PatchBar
+from app.views.instrument.string_knobs import StringKnobs
+from app.views.stage import StageView
 from app.window.about import about_text
-from app.window.appearance import Appearance
-from app.window.audio_control import AudioControl
+from app.window.audio_control import AudioControl, MakeSound
+from app.window.browsing import PresetDesk
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports, all_modes_words, note_of, note_words
 from app.window.instruments import Instruments
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
-from app.window.panels import Panel, StringPanel
+from app.window.panels import Location, Panel, StringPanel
 from app.window.panels.drum import DrumPanel
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
-from app.window.preset_desk import PresetDesk
 from app.window.remembering import SettingsSaver
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
@@ -63,8 +57,9 @@ from engine.presets import SHIPPED, PresetError
 if TYPE_CHECKING:
     from app.instrument.learned import Kept
 
-FRAME_MS = 16
-IDLE_MS = 100  # between two looks while nothing moves
+LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
+IDLE_LOOK_MS = 50  # while nothing moves
+TURNS: tuple[Location, ...] = ("stage", "left", "stage", "right")
 FACTS_S = 0.1  # between two updates of gains and of the audio state
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
@@ -72,117 +67,74 @@ METER_FLOOR_DB = -120.0
 DRUMS_PLAYED = (
     "This view shows a string, and drums are played.\nWaveform, spectrum, spectrogram and error over time show them."
 )
-ProblemListener = Callable[[AudioProblem], None]
-
-
-class _AudioMail(QObject):
-    """A signal that carries a fault of the sound device from its caretaker's thread into the window's."""
-
-    reported = Signal(object)
 
 
 class Controller(QObject):
     """A controller that lives as long as the window."""
 
     def __init__(
-        self,
-        window: MainWindow,
-        settings: Settings,
-        settings_path: Path,
-        make_sound: Callable[[ProblemListener], Sound] = Sound,
+        self, window: MainWindow, settings: Settings, settings_path: Path, make_sound: MakeSound = Sound
     ) -> None:
         super().__init__(window)
         self.window = window
         self.session = Session(settings.choices)
         self._settings = settings
         self._settings_path = settings_path
-        self._audio_mail = _AudioMail()
-        self.sound = make_sound(self._audio_mail.reported.emit)
+        self.audio = AudioControl(window, make_sound, settings.device, settings.sound)
+        self.sound = self.audio.output
         window.closing.connect(self.sound.close)  # in case the rest of this fails
-        self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
-        self._audio_mail.reported.connect(self.audio.report)
         self.audio.open()  # it is opened while all else is made
-        self.appearance = Appearance(window, settings.look)
-        self._last_tick_s = time.monotonic()
-        self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
+        window.show_look(settings.look)
+        self._timer = QTimer(self, interval=LOOK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
-        self._deck_timer = QTimer(self, interval=FRAME_MS // 2, singleShot=True, timerType=Qt.TimerType.PreciseTimer)
-        self._deck_timer.timeout.connect(self._show_deck)
         self._lively_until_s = 0.0
         self._ticks = 0
         self._facts_due_s = 0.0
-        self._decks_shown_s = dict.fromkeys((True, False), self._last_tick_s)  # True: of the left one
+        self._shown_s = dict.fromkeys(TURNS, time.monotonic())
         self._peak_db = METER_FLOOR_DB
-        self._struck: KeyNote | None = None  # the blow whose drum was shown last
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
         self.library = Library([])
         problems = self.library.refresh()
-        self.presets = PresetDesk(
-            self.session, self.library, window.presets, preset_browser(window), settings.favourites
-        )
+        self.presets = PresetDesk(window, self.session, self.library, settings.favourites)
         self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
         window.show_stage(self.string, self.drum)
         self.string.view.setFocus()
         self.panels: list[Panel] = [self.string, self.drum]  # and those of the decks from the Lab on
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
-        self._connect()
-        if self.entry is None and (first := self.library.first()):
+        if self.performance.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
         for slot, name in missing_presets(self.session.choices, self.library).items():
             self.session.update(**{slot: "model" if slot == "a" else "truth"})
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
-        self.instruments = Instruments(
-            window,
-            self.session,
-            self.library,
-            settings.midi,
-            self._handle,
-            self.performance.play_preset,
-            self.performance.notes.look,
-        )
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance)
         self.performance.by_hand = self.instruments.by_hand
+        self.instruments.begun.connect(self._wake)
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
-        self.instruments.reported.connect(window.notices.report)
-        self.instruments.informed.connect(window.notices.inform)
-        self.instruments.start()
+        self.instruments.midi.start()
         self.patches = PatchDesk(
-            self.session,
-            self.library,
-            self.performance,
-            self.instruments,
-            window.instrument,
-            window.song,
-            patch_browser(window),
-            settings.patch_favourites,
+            window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
-        self.patches.reported.connect(window.notices.report)
-        self.patches.informed.connect(window.notices.inform)
         self.instruments.played.connect(self.patches.show_played)
         window.show_keys(settings.instrument.shown)
-        self.patches.outside_changed.connect(window.show_outside)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
-        for dragged in (window.instrument.bar, window.instrument.knobs):
-            dragged.drag_started.connect(self.history.hold)
-            dragged.drag_ended.connect(self.history.release)
         self.exports = Exports(
+            window,
             self.session,
             self.library,
             self.patches.recordings,
-            lambda: self.instruments.struck,
+            self.instruments,
             (settings.export, settings.sampled),
-            window,
         )
-        self.exports.reported.connect(window.notices.report)
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
-        self.instruments.played.connect(self.exports.refresh)
         window.transport.export_asked.connect(window.action["export"].trigger)
+        self._connect()
         self._connect_actions()
         self.keeper = SettingsSaver(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.report)
@@ -190,9 +142,7 @@ class Controller(QObject):
             self.window.notices.report(problem)
         everything = frozenset(OBSERVED)
         self.session.changed.connect(self._choices_changed)
-        self.performance.choices_changed(everything)
-        self.instruments.choices_changed(everything)
-        self._choices_shown(everything)
+        self._choices_changed(everything)
         self._timer.start()
         window.closing.disconnect(self.sound.close)
         window.closing.connect(self.close)
@@ -200,11 +150,10 @@ class Controller(QObject):
     # Connections
 
     def _connect(self) -> None:
-        window, _session = self.window, self.session
+        window = self.window
         for panel in self.panels:
             self._connect_panel(panel)
         self.presets.browser.played.connect(lambda name: self.pluck())
-        self.presets.reported.connect(window.notices.report)
         window.file_dropped.connect(self.take_file)
         window.transport.slots.set_entries(self.library.entries)
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
@@ -216,12 +165,12 @@ class Controller(QObject):
     def _connect_panel(self, panel: Panel) -> None:
         panel.seek_asked.connect(self.performance.seek)
         panel.pluck_asked.connect(self.pluck)
-        panel.strike_asked.connect(self.strike)
+        panel.strike_asked.connect(self.instruments.strike)
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
         """Make the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
-        if any(not panel.on_stage for panel in self.panels):
+        if any(panel.location != "stage" for panel in self.panels):
             return
         from app.window.panels.rack import decks
 
@@ -241,28 +190,26 @@ class Controller(QObject):
 
     def _connect_actions(self) -> None:
         """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
-        window, session = self.window, self.session
+        window, session, history = self.window, self.session, self.history
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
-            "undo": self._undo,
-            "redo": self._redo,
+            "undo": lambda: self._step(history.undo, history.undo_words, "Undone", "Nothing to undo"),
+            "redo": lambda: self._step(history.redo, history.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
-            "loop": lambda: session.update(loop=not session.choices.loop),
-            "instruments": self.patches.desk.toggle,
+            **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
+            "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
             "next": lambda: self.presets.step(1),
             "switch": session.switch_source,
             "all_modes": lambda: session.update(solo=0),
             "abx": self.listening_test,
-            "motion": lambda: session.update(motion=not session.choices.motion),
-            "envelope": lambda: session.update(envelope=not session.choices.envelope),
             "audio": self.audio.show_dialog,
             "midi": lambda: self.instruments.midi.show_dialog(window),
             "help": self.show_help,
@@ -274,8 +221,15 @@ class Controller(QObject):
     def _connect_history(self) -> None:
         window, history = self.window, self.history
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
-        views = self.string.view, self.drum.view
-        draggable: list[StringView | DrumView | Knob] = [*views, *window.transport.knobs.values()]
+        strip = window.instrument
+        knobs = window.transport.knobs.values()
+        draggable: tuple[StageView | PatchBar | StringKnobs | Knob, ...] = (
+            self.string.view,
+            self.drum.view,
+            strip.bar,
+            strip.knobs,
+            *knobs,
+        )
         for dragged in draggable:
             dragged.drag_started.connect(history.hold)
             dragged.drag_ended.connect(history.release)
@@ -290,15 +244,13 @@ class Controller(QObject):
 
     # Intents
 
-    def _undo(self) -> None:
-        words = self.history.undo_words
-        self.history.undo()
-        self.window.say_briefly(f"Undone: {words}" if words else "Nothing to undo")
+    def _toggle(self, field: str) -> None:
+        self.session.update(**{field: not getattr(self.session.choices, field)})
 
-    def _redo(self) -> None:
-        words = self.history.redo_words
-        self.history.redo()
-        self.window.say_briefly(f"Redone: {words}" if words else "Nothing to redo")
+    def _step(self, take: Callable[[], None], words: str, done: str, nothing: str) -> None:
+        """Take a step of undo or redo, and say which; `words`: those of the step."""
+        take()
+        self.window.say_briefly(f"{done}: {words}" if words else nothing)
 
     def pluck(self) -> None:
         """Pluck the string as chosen, or strike the drum that is shown."""
@@ -308,16 +260,6 @@ class Controller(QObject):
             self.instruments.pluck()
         else:
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
-
-    def strike(self, x: float, y: float, velocity: float) -> None:
-        """Strike the drum at a place, in half-lengths from its centre."""
-        self.instruments.strike(x, y, velocity)
-
-    def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
-        """Handle an event of the instrument; called in the thread of the event."""
-        if self._abx is not None and isinstance(event, NoteOn | PluckAt):
-            return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.notes.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -331,7 +273,7 @@ class Controller(QObject):
 
     def listening_test(self) -> None:
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
-        entry = self.entry
+        entry = self.performance.entry
         choices = self.session.choices
         struck = self.instruments.struck
         if entry is None:
@@ -346,14 +288,14 @@ class Controller(QObject):
         self.performance.stop()
         note = note_of(choices, entry, struck)
         render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
-        self.performance.hear_dry(True)
+        self.performance.compare(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
-        self.performance.hear_dry(False)
+        self.performance.compare(False)
         self.sound.set_volume_db(self.session.choices.volume_db)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
@@ -419,11 +361,6 @@ class Controller(QObject):
         self.patches.take_file(kept.patch)
         self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}")
 
-    @property
-    def entry(self) -> PresetEntry | None:
-        """The chosen preset."""
-        return self.performance.entry
-
     def close(self) -> None:
         """Save the settings and end every thread."""
         if self._abx is not None:
@@ -431,7 +368,6 @@ class Controller(QObject):
         if self._learning is not None:
             self._learning.done(0)
         self._timer.stop()
-        self._deck_timer.stop()
         self.keeper.close()
         self.exports.close()
         self.patches.close()
@@ -450,10 +386,10 @@ class Controller(QObject):
                 "sampled": self.exports.choices[1],
                 "device": self.audio.device,
                 "sound": self.audio.sound,
-                "look": self.appearance.look,
+                "look": self.window.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
-                "patch_favourites": tuple(sorted(self.patches.desk.favourites)),
+                "patch_favourites": tuple(sorted(self.patches.favourites)),
                 "instrument": InstrumentChoice(
                     shown=self.window.shows_keys,
                     surface=self.window.instrument.surface,
@@ -507,61 +443,52 @@ class Controller(QObject):
     def _show_struck(self) -> None:
         """Show the drum that was struck last, and where."""
         latest, drums = self.instruments.latest, self.session.choices.drums
-        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
+        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum:
             return
-        self._struck = latest
         if (drum := drums.of_key(latest.event.key)) is not None:
             self.drum.show_key(latest.event.key, latest.event.place or drum.place)
 
     def _wake(self) -> None:
         """Run the timer at its full rate for LIVELY_S, as something may move."""
         self._lively_until_s = time.monotonic() + LIVELY_S
-        if self._timer.interval() != FRAME_MS:
-            self._timer.setInterval(FRAME_MS)
+        self._set_pace(LOOK_MS)
 
-    # Sixty times a second
+    def _set_pace(self, interval_ms: int) -> None:
+        if self._timer.interval() != interval_ms:
+            self._timer.setInterval(interval_ms)
+
+    # A hundred and twenty times a second
 
     def _tick(self) -> None:
+        """Show the string and, between two of its frames, the left or the right deck."""
         now_s = time.monotonic()
-        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        window = self.window
-        performance = self.performance
-        status = self.sound.status()
-        performance.tick()
-        playing, take = performance.playing, performance.take
-        window.transport.show_playing(playing)
-        self._show_level(elapsed_s)
+        location = TURNS[self._ticks % len(TURNS)]
         self._ticks += 1
+        elapsed_s, self._shown_s[location] = now_s - self._shown_s[location], now_s
+        self.instruments.look()
+        if location == "stage":
+            self._follow_sound(now_s, elapsed_s)
+        moment = self.performance.moment(elapsed_s)
+        for panel in self.panels:
+            if panel.location == location and panel.isVisible():
+                panel.show_moment(moment)
+
+    def _follow_sound(self, now_s: float, elapsed_s: float) -> None:
+        """Show what sounds, sixty times a second, and ten times as long as nothing moves."""
+        performance, transport = self.performance, self.window.transport
+        performance.tick()
+        transport.show_playing(performance.playing)
+        self._show_level(elapsed_s)
         if now_s >= self._facts_due_s:
             self._facts_due_s = now_s + FACTS_S
             choices = self.session.choices
-            window.transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
-            self.audio.show(status, performance.notes, take)
-        moment = performance.moment(elapsed_s)
-        for panel in self.panels:
-            if panel.on_stage and panel.isVisible():
-                panel.show_moment(moment)
-        self._deck_timer.start()
+            transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
+            self.audio.show(self.sound.status(), performance.notes, performance.take)
         self.patches.tick()
-        if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
+        is_still = performance.settled and not (performance.playing or performance.moving)
+        if not is_still or self._peak_db > METER_FLOOR_DB:
             self._lively_until_s = now_s + LIVELY_S
-        wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS
-        if self._timer.interval() != wanted_ms:
-            self._timer.setInterval(wanted_ms)
-
-    def _show_deck(self) -> None:
-        """Show the left and the right deck by turns, between two frames of the string.
-
-        So each painting is short: a key that is played waits for it.
-        """
-        on_the_left = bool(self._ticks % 2)
-        now_s = time.monotonic()
-        performance = self.performance
-        elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
-        moment = performance.moment(elapsed_s)
-        for panel in self.panels:
-            if not panel.on_stage and panel.on_the_left == on_the_left and panel.isVisible():
-                panel.show_moment(moment)
+        self._set_pace(LOOK_MS if now_s < self._lively_until_s else IDLE_LOOK_MS)
 
     def _show_level(self, elapsed_s: float) -> None:
         mixer = self.sound.mixer

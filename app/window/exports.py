@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
 from app.export.note import ExportedPluck, HeardNote, musical_name, struck_name
@@ -21,10 +19,11 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices, Session
 from app.session.slots import other_preset
-from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
-from app.window.recordings import Recordings
+from app.window.instruments import Instruments
+from app.window.main_window import MainWindow
+from app.window.recordings import Recordings, played_source
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
 ESCAPE = Qt.Key.Key_Escape
@@ -32,33 +31,29 @@ HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", 
 
 
 class Exports(QObject):
-    """The exports, which live as long as the window; `reported` has notices for the user.
+    """The exports, which live as long as the window."""
 
-    Args:
-        struck: the key of the instrument that an export plays; None: a string is plucked by itself.
-    """
-
-    reported = Signal(str)
     ended = Signal(bool)  # an export, well or not; or its dialog was closed
 
     def __init__(
         self,
+        window: MainWindow,
         session: Session,
         library: Library,
         recordings: Recordings,
-        struck: Callable[[], Struck | None],
+        instruments: Instruments,
         choices: tuple[ExportChoices, SampledChoices],
-        window: QWidget,
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
         self._window = window
-        self._recordings, self._struck = recordings, struck
+        self._recordings, self._instruments = recordings, instruments
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
+        instruments.played.connect(self.refresh)
         window.installEventFilter(self)
 
     @property
@@ -70,7 +65,7 @@ class Exports(QObject):
         """Open the dialog at a page, or bring it to the front."""
         subjects = self._subjects()
         if subjects[kind] is None:
-            self.reported.emit(PAGES[kind].missing)
+            self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
@@ -120,7 +115,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._struck()),
+            "note": heard_note(choices, self._library, self._instruments.struck),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,
@@ -150,8 +145,8 @@ def heard_note(choices: Choices, library: Library, struck: Struck | None = None)
     if entry is None:
         return None
     note = note_of(choices, entry, struck)
-    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
-    return HeardNote(note, saved, another is not None, choices.difference_gain_db, note_words(entry.title, choices))
+    saved, words = played_source(choices), note_words(entry.title, choices)
+    return HeardNote(note, saved, another is not None, choices.difference_gain_db, words)
 
 
 def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> ExportedPluck:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -32,21 +31,16 @@ from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
+from app.window.performance import Performance
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
 
 HIGHEST_KEY = 127
 OWN_MS = 60  # after another instrument, or the last turn of a knob, until its own pluck is shown
-LOOK_MS = 8  # until the player has reported the note of a key, between two looks
 
 
 class Instruments(QObject):
     """The player of events, at once in the thread of each; session and window follow later.
-
-    Args:
-        handle: plays an event and returns the note that it began; called in the event's thread.
-        play_preset: lets events pluck the string of a preset, by its name; called in the event's thread.
-        look: follows what the player reports of notes of keys.
 
     Attributes:
         latest: the note that was begun last; None before the first.
@@ -55,10 +49,7 @@ class Instruments(QObject):
     """
 
     played = Signal()  # a note has begun, and the session has its values
-    reported = Signal(str)  # an error, for the user
-    informed = Signal(str)  # what went well
-
-    _begun = Signal()  # emitted in any thread
+    begun = Signal()  # a note; emitted in any thread
 
     def __init__(
         self,
@@ -66,16 +57,12 @@ class Instruments(QObject):
         session: Session,
         library: Library,
         midi: MidiChoices,
-        handle: Callable[[Event, Due | None], PluckVoices | KeyNote | None],
-        play_preset: Callable[[str], None],
-        look: Callable[[], None],
+        performance: Performance,
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
-        self._handle = handle
-        self._play_preset = play_preset
-        self._look = look
+        self._performance = performance
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
@@ -86,24 +73,17 @@ class Instruments(QObject):
         self._own_timer.timeout.connect(self._show_own_string)
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
         self._drawn = False  # whether its pluck is the session's
-        self._look_timer = QTimer(self, interval=LOOK_MS)
-        self._look_timer.timeout.connect(self._look_at_key)
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
-        self._begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
+        self.begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
         self._keys.pressed.connect(self._press)
         self._keys.released.connect(self._release)
         self.midi = MidiControl(midi, self.play, self._play_note, self)
         self.midi.performed.connect(lambda changes: session.update(**changes))
-        self.midi.reported.connect(self.reported)
-        self.midi.informed.connect(self.informed)
-
-    def start(self) -> None:
-        """Open the remembered MIDI input, if any."""
-        self.midi.start()
+        self.midi.reported.connect(window.notices.report)
+        self.midi.informed.connect(window.notices.inform)
 
     def close(self) -> None:
-        self._look_timer.stop()
         self._own_timer.stop()
         self.midi.close()
 
@@ -145,7 +125,7 @@ class Instruments(QObject):
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
-        note = self._handle(event, due)
+        note = self._performance.handle(event, due)
         if note is None:
             return
         self.latest = note
@@ -156,7 +136,7 @@ class Instruments(QObject):
         else:
             self._unknown = None
             self._show_in_session(note.request, drawn)
-        self._begun.emit()
+        self.begun.emit()
 
     def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
         """Show this string and its pluck in the session; the string alone where it has drawn the pluck itself."""
@@ -182,12 +162,13 @@ class Instruments(QObject):
         (low, high), latest = patch.range, self.latest_key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
-    def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
-        """A pluck as a note of the key whose string is shown. It is of the string alone where keys do not play it so.
+    def by_hand(self, pluck: Pluck | None = None) -> NoteOn | PluckAt:
+        """A pluck, by default the chosen one, as a note of the key whose string is shown.
 
-        These are a single string, and one beside another preset.
+        It is of the string alone where keys do not play it so: of a single string, and beside another preset.
         """
         choices = self._session.choices
+        pluck = pluck or choices.pluck
         patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
             return alone
@@ -202,10 +183,6 @@ class Instruments(QObject):
             return alone
         velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
         return NoteOn(key, velocity, KEYS, string=number, pluck=pluck)
-
-    def by_hand(self) -> NoteOn | PluckAt:
-        """The chosen pluck of the string that is shown, where it can be with all of its instrument."""
-        return self._by_hand(self._session.choices.pluck)
 
     def pluck(self) -> None:
         """Pluck the string that is shown as it is chosen."""
@@ -234,20 +211,10 @@ class Instruments(QObject):
             event = self.by_hand()
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
-    def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
-        """Strike the drum that is shown.
-
-        Args:
-            x, y: where, from its centre in half-lengths; None: at its own place.
-            velocity: 1 … 127; None: that of the computer's keys.
-        """
-        key = self.drum_key
-        if key is not None:
-            place = None if x is None or y is None else (x, y)
-            strike_velocity = (
-                self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
-            )
-            self.play(NoteOn(key, strike_velocity, KEYS, place))
+    def strike(self, x: float, y: float, velocity: float) -> None:
+        """Strike the drum that is shown at a place, from its centre in half-lengths; velocity: 1 … 127."""
+        if (key := self.drum_key) is not None:
+            self.play(NoteOn(key, round(min(max(velocity, 1.0), 127.0)), KEYS, (x, y)))
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
@@ -258,25 +225,26 @@ class Instruments(QObject):
         elif names := self._library.names:
             name = names[(event.key - LOWEST_PLACE) % len(names)]
             pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
-            self._play_preset(name)
+            self._performance.play_preset(name)
             with self._lock:
                 self._reported |= {"instrument": SingleString(preset=name)}
             self.play(PluckAt(pluck))
             return
-        self.play(self._by_hand(pluck))
+        self.play(self.by_hand(pluck))
 
-    def _look_at_key(self) -> None:
+    def look(self) -> None:
         """Take the string and the pluck of a key from the player's report, within a quantum of the device."""
-        self._look()
         note = self._unknown
-        if note is not None and not note.known:
+        if note is None:
+            return
+        self._performance.notes.look()
+        if not note.known:
             return
         with self._lock:
             if self._unknown is not note:  # another was begun just now
                 return
             self._unknown = None
-        self._look_timer.stop()
-        if note is None or note is not self.latest or not self._session.choices.plays_patch:
+        if note is not self.latest or not self._session.choices.plays_patch:
             return  # another pluck was begun, or a single string chosen, meanwhile
         self.latest_key = note.event.key, note.string
         if note.request is not None:
@@ -287,9 +255,7 @@ class Instruments(QObject):
 
     def _tell_session(self) -> None:
         """Update the session, once for all notes that have begun meanwhile."""
-        if self._unknown is not None and not self._look_timer.isActive():
-            self._look_timer.start()
-            self._look_at_key()
+        self.look()
         with self._lock:
             changes = self._reported
             self._reported = {}

@@ -24,6 +24,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QApplication,
     QComboBox,
     QFileDialog,
     QGraphicsView,
@@ -46,7 +47,7 @@ from app.views.controls.drop_sign import DropSign
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.overflow import Overflow
-from app.views.controls.parts import tool_button, words_label
+from app.views.controls.parts import faint, filled, tool_button, words_label
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
 from app.views.controls.segments import Segments
@@ -55,6 +56,7 @@ from app.views.controls.song_strip import SongStrip
 from app.views.controls.transport_bar import TransportBar
 from app.views.faces import FACES, TITLES, Area
 from app.views.instrument.panel import InstrumentPanel
+from app.views.look import Look
 from engine.kernels import cache  # and not the compiler
 from engine.plain_text import one_line
 
@@ -65,10 +67,7 @@ HIGH = 560  # pixels: in a lower one, so are the preset's facts
 WIDE_LAB = 1500  # pixels: in Lab a narrower one leaves the brand's room to the preset's name
 COMPACT_BELOW_PX, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
-KNOBS_HIGH, AIRY = (
-    610,
-    780,
-)  # pixels: a lower one shows knobs in place of keys; parts stand closer
+KNOBS_HIGH, AIRY = 610, 780  # pixels: a lower one shows knobs in place of keys; parts stand closer
 FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
 LONGEST_NAME = 60  # characters of a file
@@ -111,6 +110,7 @@ class MainWindow(QMainWindow):
         self._painted = False
         self._folder = ""  # of the file that was opened last
         self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
+        self.look = Look()
         self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
         self.menu = AppMenu(self)
         self.action = self.menu.action
@@ -145,12 +145,13 @@ class MainWindow(QMainWindow):
         self.growth_sign.setObjectName("badge")
         self.growth_sign.setAccessibleName("Error of the model")
         self.through_label = words_label()
-        self.through_label.setObjectName("faint")
         self.outside_label = words_label()
         self._outside, self._of_shown = "", True
         self._error = math.nan
         self._lay_out()
         self.setAcceptDrops(True)
+        self.menu.look_asked.connect(self._change_look)
+        QApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         enter = QShortcut(QKeySequence("Return"), self)
         enter.setAutoRepeat(False)
         enter.activated.connect(self._press_or_pluck)
@@ -168,19 +169,15 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self._brand = Label("LEARNED STRINGS")
         self._brand.setObjectName("brand")
-        self._head = head = QHBoxLayout()
-        head.addWidget(self._menu_button)
-        head.addWidget(self.faces)
-        head.addWidget(self._brand)
-        head.addWidget(self.presets, 1)
-        head.addStretch(0)
         tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
         self._test_button = test = tool_button("ABX …", "Listening test", tip)
         test.clicked.connect(self.action["abx"].trigger)
         self._more = Overflow("the Lab")
-        for widget in (self._keys_button, test, self._more, self.growth_sign, self.rate_label, self.notices.bell):
-            head.addWidget(widget)
-        head.addWidget(self._audio_button)
+        self._head = head = filled(QHBoxLayout(), self._menu_button, self.faces, self._brand)
+        head.addWidget(self.presets, 1)
+        head.addStretch(0)
+        badges = (self.growth_sign, self.rate_label, self.notices.bell)
+        filled(head, self._keys_button, test, self._more, *badges, self._audio_button)
         self._facts = QWidget()
         self._facts_row = facts = QHBoxLayout(self._facts)
         facts.setContentsMargins(0, 0, 0, 0)
@@ -190,15 +187,13 @@ class MainWindow(QMainWindow):
         facts.addWidget(self.presets.card, 3)
         facts.addWidget(self.through_label, 2)
         facts.addWidget(self.outside_label, 2)
-        facts.addWidget(self._solo)
-        facts.addWidget(self.error_label)
+        filled(facts, self._solo, self.error_label)
         self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
         decks.addWidget(self.right)
         decks.setSizes([620, 660])
         self._stage = QSplitter(Qt.Orientation.Vertical)
-        self._loading = Label(LOADING if cache.is_whole() else COMPILING)
-        self._loading.setObjectName("faint")
+        self._loading = faint(LOADING if cache.is_whole() else COMPILING)
         self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stage.addWidget(self._loading)
         self._shown = QStackedWidget()  # the string or the drum
@@ -213,13 +208,9 @@ class MainWindow(QMainWindow):
             "patch": (self.instrument.knobs.technique,),
             **self.transport.areas,
         }
-        self._column = column = QVBoxLayout()
-        column.addLayout(head)
-        column.addWidget(self._facts)
+        self._column = column = filled(QVBoxLayout(), head, self._facts)
         column.addWidget(self._stage, 1)
-        column.addWidget(self.song)
-        column.addWidget(Sideways(self.transport))
-        column.addWidget(self.instrument)
+        filled(column, self.song, Sideways(self.transport), self.instrument)
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
@@ -292,9 +283,29 @@ class MainWindow(QMainWindow):
             part.setEnabled(alive)
         self._alive = alive
         self.instrument.setEnabled(alive)
-        self._share_height()
         self.faces.setEnabled(alive)
+        self._share_room()
         self._show_rate_label()
+
+    # The look
+
+    def show_look(self, look: Look) -> None:
+        """Show the look that the application has in the menu."""
+        self.look = look
+        self.menu.show_look(look)
+
+    def _change_look(self, field: str, value: object) -> None:
+        self.show_look(Look.model_validate({**self.look.model_dump(), field: value}))
+        self._apply_look()
+
+    def _follow_desktop(self) -> None:
+        if self.look.theme == "system":
+            self._apply_look()
+
+    def _apply_look(self) -> None:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        theme.apply_theme(application, self.look.theme, self.look.size_percent)
 
     # Faces
 
@@ -325,38 +336,32 @@ class MainWindow(QMainWindow):
         """Show the keys in the Lab, or hide them."""
         self._keys_button.setChecked(shown)
         self.instrument.setVisible(shown or self.face == "play")
-        self._share_height()
+        self._share_room()
 
     @property
-    def _width_px(self) -> float:
-        """The window's width, in pixels at which text has its usual size."""
-        return self.width() / theme.present.scale
+    def _size_px(self) -> tuple[float, float]:
+        """The window's width and height, in pixels at which text has its usual size."""
+        return self.width() / theme.present.scale, self.height() / theme.present.scale
 
-    @property
-    def _height_px(self) -> float:
-        return self.height() / theme.present.scale
+    def _share_room(self) -> None:
+        """Hide what has no room: in a low window the plots while the keys are shown, in a lower one the facts.
 
-    def _share_width(self) -> None:
-        self._brand.setVisible(self._width_px >= (WIDE if self.face == "play" else WIDE_LAB))
-        for button in (self._keys_button, self._test_button):
-            button.setVisible(self._width_px >= WIDE and self._shows("test"))
-
-    def _hold_rest(self) -> None:
-        """Move the header's controls and the preset's facts that have no room to the overflow menu."""
-        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._width_px < WIDE else ()
-        hides_facts = self._shows("facts") and self._height_px < HIGH
-        facts = (self.presets.card, self.through_label, self.outside_label, self.error_label) if hides_facts else ()
-        self._more.hold(*buttons, *facts)
-
-    def _share_height(self) -> None:
-        """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
-        height = self._height_px
+        The header's controls and the preset's facts go to the overflow menu.
+        """
+        width, height = self._size_px
+        is_high, tests = height >= HIGH, self._shows("test")
+        self._brand.setVisible(width >= (WIDE if self.face == "play" else WIDE_LAB))
+        buttons = (self._keys_button, self._test_button)
+        for button in buttons:
+            button.setVisible(width >= WIDE and tests)
+        facts = (self.presets.card, self.through_label, self.outside_label, self.error_label)
+        hides_facts = self._shows("facts") and not is_high
+        self._more.hold(*(buttons if tests and width < WIDE else ()), *(facts if hides_facts else ()))
+        self._facts.setVisible(is_high and self._shows("facts"))
         self.instrument.set_low(height < KNOBS_HIGH)
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
         self._decks.setVisible(views)
-        self._facts.setVisible(height >= HIGH and self._shows("facts"))
-        self._hold_rest()
-        home, place = (self._facts_row, 2) if height >= HIGH else (self._head, 4)
+        home, place = (self._facts_row, 2) if is_high else (self._head, 4)
         if home.indexOf(self._solo) < 0:
             solo_visible = not self._solo.isHidden()
             home.insertWidget(place, self._solo)
@@ -364,13 +369,13 @@ class MainWindow(QMainWindow):
 
     def show_rate(self, text: str, tip: str, fault: bool) -> None:
         """Show the sample rate, in the Lab; a fault of the sound output, in both faces."""
-        label = self.rate_label
-        if label.text() == text:
+        badge = self.rate_label
+        if badge.text() == text:
             return
-        label.setText(text)
-        label.setToolTip(tip)
-        label.setProperty("fault", fault)
-        label.style().polish(label)
+        badge.setText(text)
+        badge.setToolTip(tip)
+        badge.setProperty("fault", fault)
+        badge.style().polish(badge)
         self._show_rate_label()
 
     def _show_rate_label(self) -> None:
@@ -400,11 +405,11 @@ class MainWindow(QMainWindow):
 
     def _show_outside(self) -> None:
         text, grave = judged(self._outside, self._error if self._of_shown else math.nan)
-        label = self.outside_label
-        label.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
-        label.setToolTip(plain_tip(text))
-        label.setObjectName("warning" if grave else "faint")
-        label.style().polish(label)
+        words = self.outside_label
+        words.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
+        words.setToolTip(plain_tip(text))
+        words.setObjectName("warning" if grave else "faint")
+        words.style().polish(words)
 
     def show_growth(self, text: str) -> None:
         """Show that the error of the latest pluck grew; "" where it did not."""
@@ -443,10 +448,10 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def _fit(self) -> None:
-        self._share_width()
-        self._share_height()
-        narrow, low = self._width_px < COMPACT_BELOW_PX, self._height_px < AIRY
-        self.transport.set_compact(narrow, self._width_px < TIGHT and self.face == "lab")
+        self._share_room()
+        width, height = self._size_px
+        narrow, low = width < COMPACT_BELOW_PX, height < AIRY
+        self.transport.set_compact(narrow, width < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QInputDialog
 
-from app.instrument.beyond_training import outside_of_key, outside_of_string
+from app.instrument.beyond_training import outside_of_key
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
 from app.instrument.events import (
@@ -25,9 +26,9 @@ from app.instrument.events import (
     NoteOn,
     TimedEvent,
 )
-from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figures_of, knob_for
+from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
-from app.instrument.strings import KeyString, Strings
+from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.library import (
     SUFFIX,
@@ -44,18 +45,19 @@ from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
+from app.playing.note import PluckVoices
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
 from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
-from app.views.controls.browser import Browser
-from app.views.controls.song_strip import SongStrip
-from app.views.instrument.panel import InstrumentPanel
-from app.views.instrument.patch_card import patch_row
+from app.views.controls.browser_rows import BrowserRow
+from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
+from app.window.main_window import MainWindow
+from app.window.panels.string import outside_of_shown
 from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import SongPlayer
@@ -73,89 +75,64 @@ MIDI_FILES = (".mid", ".midi", ".kar", ".rmi", ".smf")
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 
-class PatchDesk(QObject):
-    """A desk that lives in the window's thread, as long as the window.
+class PatchDesk(BrowserDesk):
+    """A desk of instruments, with the strip that plays them.
 
     Attributes:
-        desk: the browser's.
         recordings: of what is played.
     """
 
-    reported = Signal(str)  # an error, for the user
-    informed = Signal(str)  # what went well
-    outside_changed = Signal(str, bool)  # what of the latest note lies outside the training; whether it is shown
-
     def __init__(
         self,
+        window: MainWindow,
         session: Session,
         library: Library,
         performance: Performance,
         instruments: Instruments,
-        panel: InstrumentPanel,
-        strip: SongStrip,
-        browser: Browser,
         favourites: Iterable[str] = (),
     ) -> None:
-        super().__init__(panel)
+        super().__init__(window, window.instrument.bar, patch_browser(window), favourites)
+        self._window = window
         self._session = session
         self._library = library
         self._performance = performance
         self._instruments = instruments
-        self._panel = panel
-        self.browser = browser
+        self._panel = window.instrument
         self._entries: list[PatchEntry] = []
-        self.desk = BrowserDesk(
-            browser,
-            lambda: [patch_row(entry) for entry in self._entries],
-            lambda: self.entry.name if self.entry is not None else "",
-            self.choose,
-            own_patches,
-            favourites,
-        )
-        self.desk.reported.connect(self.reported)
         self._shown_s = 0.0
         self._sounding: frozenset[int] = frozenset()  # MIDI keys of the patch for which the octave was judged last
-        self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
-        self._song = SongPlayer(self._playback, strip)
+        self._song = SongPlayer(self._playback, window.song)
         self._note_timer = QTimer(self, interval=NOTE_REPORTED_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
-        self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
-        self.recordings.reported.connect(self.reported)
-        self.recordings.informed.connect(self.informed)
+        self.recordings = Recordings(window, session, performance.notes.keys)
         self.reload()
         self._connect()
 
     def _connect(self) -> None:
         session = self._session
-        panel = self._panel
-        bar = self._panel.bar
-        browser = self.browser
+        panel, bar, browser = self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
         panel.released.connect(lambda key, string: self._instruments.play(NoteOff(key, KEYS, string)))
-        bar.previous_asked.connect(lambda: self.desk.step(-1))
-        bar.next_asked.connect(lambda: self.desk.step(1))
-        bar.browse_asked.connect(self.desk.toggle)
-        bar.all_asked.connect(browser.clear_filter)
-        bar.save_asked.connect(self.save)
-        bar.rename_asked.connect(self.rename)
-        bar.revert_asked.connect(self.revert)
-        bar.compare_asked.connect(self.compare)
-        bar.scala_remove_asked.connect(self.remove_scala)
         panel.touch_chosen.connect(self._choose_touch)
         panel.technique_switched.connect(self._switch_technique)
         panel.keys_play_asked.connect(
             lambda plays: session.play_patch() if plays == "pitch" else session.play_string()
         )
+        panel.knobs.changed.connect(self.change)
+        panel.knobs.figure_asked.connect(self.turn_to)
+        bar.previous_asked.connect(lambda: self.step(-1))
+        bar.next_asked.connect(lambda: self.step(1))
+        bar.save_asked.connect(self.save)
+        bar.rename_asked.connect(self.rename)
+        bar.revert_asked.connect(self.revert)
+        bar.compare_asked.connect(self.compare)
+        bar.scala_remove_asked.connect(self.remove_scala)
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
         bar.body_chosen.connect(self._choose_body)
-        panel.knobs.changed.connect(self.change)
-        panel.knobs.figure_asked.connect(self.turn_to)
-        browser.opened.connect(self.reload)
-        browser.listed_changed.connect(lambda: bar.filtered.show_listed(len(browser.listed), browser.total))
         browser.played.connect(self.audition)
         browser.delete_asked.connect(self.delete)
         browser.rename_asked.connect(self.rename)
@@ -173,28 +150,40 @@ class PatchDesk(QObject):
         patch = self.patch
         return next((entry for entry in self._entries if patch is not None and entry.patch.name == patch.name), None)
 
+    @property
+    def chosen(self) -> str:
+        return "" if self.entry is None else self.entry.name
+
+    def _find(self, name: str) -> PatchEntry | None:
+        return next((entry for entry in self._entries if entry.name == name), None)
+
+    def _rows(self) -> Sequence[BrowserRow]:
+        return [patch_row(entry) for entry in self._entries]
+
+    def _folder(self) -> Path:
+        return own_patches()
+
     def reload(self) -> None:
         """Read patches and bodies again: the user may have added files."""
         if self._panel.bar.compare.isChecked():  # the saved patch may have changed
             self.compare(False)
         self._entries, problems = list_patches()
         for problem in problems:
-            self.reported.emit(problem)
+            self._notices.report(problem)
         self._panel.bar.set_bodies(body_titles())
-        self.desk.show()
+        self.show_rows()
         self._show_patch()
 
     # Intents
 
     def choose(self, name: str) -> None:
         """Make a patch, by the name of its entry, the one that keys play."""
-        for entry in self._entries:
-            if entry.name == name:
-                self._session.update(instrument=entry.patch)
+        if (entry := self._find(name)) is not None:
+            self._session.update(instrument=entry.patch)
 
     def audition(self, name: str) -> None:
         """Choose a patch, unless it is there already, maybe changed, and play a note in the middle of its range."""
-        if self.entry is None or self.entry.name != name:
+        if self.chosen != name:
             self.choose(name)
         self._session.play_patch()
         if self.patch is not None:
@@ -228,7 +217,7 @@ class PatchDesk(QObject):
         try:
             self.change(field, knob_for(patch, self._instruments.shown_key(patch), field, figure))
         except ValueError as error:
-            self.reported.emit(one_line(str(error)))
+            self._notices.report(one_line(str(error)))
 
     def save(self) -> None:
         """Save the patch: under its name where it is the user's own, else asks for one."""
@@ -236,38 +225,37 @@ class PatchDesk(QObject):
         if patch is None:
             return
         if entry is not None and entry.own:
-            self._save(patch, entry.path)
+            self._write(lambda: self._save(patch, entry.path))
         else:
             self._ask(
                 "Save instrument",
                 "Name of the instrument:",
                 f"{patch.name} 2",
-                lambda name: self._save_as(patch, name),
+                lambda name: self._save(Patch.model_validate({**dict(patch), "name": name})),
             )
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
-        """Ask for a name and do what it is for; again, with the reason, where the name is impossible."""
+        """Ask for a name and do what it is for; again, with the reason, where the name is impossible or taken."""
         reason = ""
         while True:
             name, typed_name = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
             if not typed_name:
                 return
             try:
-                do(name)
+                self._write(partial(do, name))
                 return
             except ValueError as error:
                 reason = f"{one_line(explained(error))}.\n\n"
 
-    def _save_as(self, patch: Patch, name: str) -> None:
-        """Raise ValueError: the name is impossible or taken."""
-        self._save(Patch.model_validate({**dict(patch), "name": name}))
+    def _write(self, do: Callable[[], None]) -> None:
+        """Do what writes a file; report that it cannot be written."""
+        try:
+            do()
+        except WriteError as error:
+            self._notices.report(one_line(str(error)))
 
     def _save(self, patch: Patch, replace: Path | None = None) -> None:
-        try:
-            saved = save_patch(patch, replace)
-        except WriteError as error:
-            self.reported.emit(one_line(str(error)))
-            return
+        saved = save_patch(patch, replace)
         self.reload()
         self._session.update(patch=patch)
         self._show_patch()
@@ -275,21 +263,16 @@ class PatchDesk(QObject):
 
     def rename(self, name: str = "") -> None:
         """Ask for a new name of one of the user's own patches, by default the present one."""
-        entry = next((entry for entry in self._entries if entry.name == name), self.entry)
+        entry = self._find(name) or self.entry
         if entry is None or not entry.own:
-            self.reported.emit("Only instruments of your own can be renamed: save this one first.")
+            self._notices.report("Only instruments of your own can be renamed: save this one first.")
             return
         self._ask("Rename instrument", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
 
     def _rename(self, entry: PatchEntry, name: str) -> None:
-        """Raise ValueError: the name is impossible or taken."""
-        try:
-            renamed = rename_patch(entry, name)
-        except WriteError as error:
-            self.reported.emit(one_line(str(error)))
-            return
-        if entry.name in self.desk.favourites:
-            self.desk.favourites ^= {entry.name, renamed.name}
+        renamed = rename_patch(entry, name)
+        if entry.name in self.favourites:
+            self.favourites ^= {entry.name, renamed.name}
         if self.patch is not None and self.patch.name == entry.patch.name:
             self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
         self.reload()
@@ -297,15 +280,15 @@ class PatchDesk(QObject):
 
     def delete(self, name: str) -> None:
         """Delete one of the user's own patches."""
-        entry = next((entry for entry in self._entries if entry.name == name and entry.own), None)
-        if entry is None:
+        entry = self._find(name)
+        if entry is None or not entry.own:
             return
         try:
             entry.path.unlink()
         except OSError as error:
-            self.reported.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
+            self._notices.report(f"{entry.path}: cannot be deleted ({error.strerror}).")
         else:
-            self.desk.favourites.discard(entry.name)
+            self.favourites.discard(entry.name)
         self.reload()
 
     def revert(self) -> None:
@@ -329,7 +312,7 @@ class PatchDesk(QObject):
             else:
                 self._add(file)
         except (MidiFileError, PatchError, OSError, ValueError) as error:
-            self.reported.emit(one_line(str(error)))
+            self._notices.report(one_line(str(error)))
 
     def _add(self, file: Path) -> None:
         """Add a patch's file to the library, and choose it; where it cannot be added, it is only chosen."""
@@ -337,18 +320,18 @@ class PatchDesk(QObject):
             entry, added = add_patch(file)
         except WriteError as error:
             self._session.update(instrument=read_patch(file))
-            self.reported.emit(f"{file.name} can be played, but not added to your library: {one_line(str(error))}")
+            self._notices.report(f"{file.name} can be played, but not added to your library: {one_line(str(error))}")
             return
         self.reload()
         self._session.update(instrument=entry.patch)
         self.browser.reveal(entry.name)
         if added:
-            self.informed.emit(f"{file.name} was added to your library as {entry.patch.name}.")
+            self._notices.inform(f"{file.name} was added to your library as {entry.patch.name}.")
 
     def _play_file(self, file: Path) -> None:
         song = read_song(file, self.patch)
         if song.left_out:
-            self.informed.emit(f"{song.left_out}.")
+            self._notices.inform(f"{song.left_out}.")
         self._session.play_patch()
         self._song.load(file.name, song.events)
 
@@ -356,7 +339,7 @@ class PatchDesk(QObject):
         """Tune the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
-            self.reported.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
+            self._notices.report(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
             return
         field = "scale"
         other = patch.tuning.keymap
@@ -368,7 +351,7 @@ class PatchDesk(QObject):
         tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
         joined = f", with the {kind} that it had" if other else ""
-        self.informed.emit(f"{file.name} tunes {patch.name}{joined}.")
+        self._notices.inform(f"{file.name} tunes {patch.name}{joined}.")
 
     def remove_scala(self) -> None:
         """Tune the patch in twelve equal steps again."""
@@ -380,12 +363,12 @@ class PatchDesk(QObject):
         """Give the patch one of the user's own bodies, which was just installed."""
         self._panel.bar.set_bodies(body_titles())
         if self.patch is None:
-            self.informed.emit(f"The body {name} was added; choose an instrument, then this body in its bar.")
+            self._notices.inform(f"The body {name} was added; choose an instrument, then this body in its bar.")
             return
         if self.patch.body.name == name:  # its file was missing
             self._performance.choices_changed(frozenset({"patch"}))
         self._choose_body(name)
-        self.informed.emit(f"{self.patch.name} now has the body {name}.")
+        self._notices.inform(f"{self.patch.name} now has the body {name}.")
 
     def stop(self) -> None:
         """Stop the MIDI file that is played, or the note of an audition."""
@@ -452,7 +435,7 @@ class PatchDesk(QObject):
             self._reported_other = ""
         self._panel.show_source("model" if other else heard_source)
         if other and other != self._reported_other:
-            self.informed.emit(
+            self._notices.inform(
                 f"Keys sound with the model of their instrument, not with {source_title(other, self._library)}: that "
                 "preset is heard when you pluck the string by hand, or where keys choose the place."
             )
@@ -463,17 +446,17 @@ class PatchDesk(QObject):
         if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
-    def _judge_again(self) -> None:
-        """Say soon what of the latest note lies outside the training with the knobs as they are now.
+    @property
+    def _latest(self) -> PluckVoices | KeyNote | None:
+        """The latest note, where it is of the instrument that is played."""
+        latest, instrument = self._instruments.latest, self._session.choices.instrument
+        if not isinstance(latest, KeyNote):
+            return latest
+        return latest if isinstance(instrument, Patch) and not is_another(instrument, latest.patch) else None
 
-        Another patch, or keys that choose places, leave nothing to say.
-        """
-        patch = self.patch
-        before = self._noted
-        self._noted = patch
-        if patch is None or not self._session.choices.plays_patch or before is None or is_another(patch, before):
-            self._instruments.latest = None
-        if self._instruments.latest is not None:
+    def _judge_again(self) -> None:
+        """Say soon what of the latest note lies outside the training with the knobs as they are now."""
+        if self._latest is not None:
             self.show_played()
             return
         self._note_timer.stop()
@@ -482,50 +465,43 @@ class PatchDesk(QObject):
     def _show_latest_note(self) -> None:
         if self.patch is not None:
             self._show_string(self.patch)
-        latest, patch = self._instruments.latest, self.patch
-        is_outdated = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
-        self._say("; ".join(self._outside()), of_shown=not is_outdated)
+        latest = self._latest
+        is_outdated = isinstance(latest, KeyNote) and latest.patch != self.patch
+        self._say(self._outside(latest), of_shown=not is_outdated)
 
     def _say(self, outside: str, of_shown: bool = True) -> None:
         """Report what is outside the training; in the bar, how pitches are had where there is no patch."""
-        self.outside_changed.emit(outside, of_shown)
+        self._window.show_outside(outside, of_shown)
         self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
-    def _outside(self) -> list[str]:
+    def _outside(self, latest: PluckVoices | KeyNote | None) -> str:
         """The parts of the latest note, with the present knobs, that lie outside the training of its model."""
-        choices = self._session.choices
-        latest = self._instruments.latest
-        patch = self.patch
+        choices, patch = self._session.choices, self.patch
         entry = self._library.find(choices.preset)
         if entry is None:
-            return []
+            return ""
         if isinstance(latest, KeyNote) and patch is not None and latest.patch != patch:
-            return outside_of_key(entry.info, patch, latest.event, latest.string)
-        if choices.string is None:
-            return []
-        string = choices.string
-        if patch is not None and choices.plays_patch:
-            string = by_two_numbers(patch, string)
-        return outside_of_string(entry.info, string, choices.pluck)
+            return "; ".join(outside_of_key(entry.info, patch, latest.event, latest.string))
+        return "" if choices.string is None else outside_of_shown(choices, entry)
 
-    def _show_string(self, patch: Patch) -> KeyString | None:
-        """Show that string in figures, or why there is none; None where it is silent or impossible."""
-        key_string: KeyString | None = None
+    def _show_string(self, patch: Patch) -> None:
+        """Show the string or the drum in figures, or why there is none."""
         facts: dict[str, str] = {}
-        knobs = self._panel.knobs
+        figures: dict[str, str] = {}
         if isinstance(patch.strings, Drums):
             key = self._instruments.drum_key
             drum = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
-            knobs.show_facts(facts_of_drum(drum))
-            knobs.show_figures({})
-            return None
-        try:
-            key_string = Strings(patch).of_key(*self._instruments.shown_key(patch))
-        except ValueError as error:
-            facts = {"string": str(error)}
-        knobs.show_facts(facts if key_string is None else facts_of(key_string))
-        knobs.show_figures({} if key_string is None else figures_of(key_string.parameters, patch))
-        return key_string
+            facts = facts_of_drum(drum)
+        else:
+            try:
+                key_string = Strings(patch).of_key(*self._instruments.shown_key(patch))
+            except ValueError as error:
+                facts = {"string": str(error)}
+            else:
+                if key_string is not None:
+                    facts, figures = facts_of(key_string), figures_of(key_string.parameters, patch)
+        self._panel.knobs.show_facts(facts)
+        self._panel.knobs.show_figures(figures)
 
     def tick(self) -> None:
         """Show the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
@@ -564,7 +540,7 @@ class PatchDesk(QObject):
             panel.neck.set_strings([(note_name(string.note), string.note) for string in strings.strings])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
-        self.desk.show_chosen()
+        self.browser.set_chosen(self.chosen)
 
     def _press(self, key: int, velocity: int, string: int | None) -> None:
         """Play a key on the screen, which is one of the patch, where there is one."""
@@ -592,12 +568,8 @@ class PatchDesk(QObject):
 
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
-            body_fields = {**dict(self.patch.body), "name": name}
-            body = (
-                BodyChoice(**body_fields)
-                if body_fields["mix"] > 0
-                else BodyChoice(name=name, size=body_fields["size"])
-            )
+            kept = dict(self.patch.body) if self.patch.body.mix > 0 else {"size": self.patch.body.size}
+            body = BodyChoice.model_validate({**kept, "name": name})
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
 
 

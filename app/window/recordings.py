@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from datetime import datetime
@@ -12,46 +13,129 @@ from app.export.journal import Journal, left_journals, recordings_folder
 from app.export.played import Played
 from app.instrument.events import NoteOn, PatchTurned
 from app.playing.keys import Keys
+from app.playing.recorder import EventRecorder
 from app.session.choices import Choices, Session
+from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.background import Background
 from app.views.dialogs.question import ask
-from app.views.instrument.patch_bar import PatchBar
-from app.window.journaling import Journaling
+from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
 
+WRITE_EVERY_S = 0.25  # to disk
 LONGEST_NAME = 60  # characters of an instrument
 RECOVER = "Recover"
 LATER = "Later"
 DISCARD = "Discard"
 
 
+class Journaling(QObject):
+    """The writing of a recording to disk while it is made, in a thread: a crash loses a fraction of a second.
+
+    Methods belong to the window's thread. Where the disk fails, the recording continues in memory alone.
+
+    Args:
+        recorder: whose events are written.
+    """
+
+    failed = Signal(str)  # why the recording is in memory alone from now on
+
+    def __init__(self, recorder: EventRecorder, parent: QObject) -> None:
+        super().__init__(parent)
+        self._recorder = recorder
+        self._journal: Journal | None = None
+        self._heard: tuple[PlayedSource, float] = ("model", 0.0)
+        self._written: tuple[PlayedSource, float] = self._heard
+        self._broken = False
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def begin(self, recorded: datetime) -> None:
+        """A recording has begun."""
+        self._journal, self._broken = None, False
+        self._written = ("model", 0.0)
+        self._stop.clear()
+        try:
+            self._journal = Journal.begun(recordings_folder(), recorded)
+        except OSError as error:
+            self._fail(error)
+            return
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+
+    def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
+        """The source that is heard from now on."""
+        self._heard = source, difference_gain_db
+
+    def end(self) -> Journal | None:
+        """End the journal, with all of the recording, and return it; None: it could not be begun."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        journal = self._journal
+        self._journal = None
+        self._thread = None
+        if journal is not None and not self._broken:
+            try:
+                journal.end(self._recorder.ended_s)
+            except OSError as error:
+                self._fail(error)
+        return journal
+
+    def _run(self) -> None:
+        lower_priority(Rank.BACKGROUND)
+        while not self._broken:
+            stopped = self._stop.wait(WRITE_EVERY_S)
+            self._write()
+            if stopped:
+                return
+
+    def _write(self) -> None:
+        """Append what is new. After a fault nothing more: what follows would stand behind a torn line."""
+        journal, source_and_gain = self._journal, self._heard
+        assert journal is not None
+        try:
+            journal.write(self._recorder.fetch())
+            if source_and_gain != self._written:
+                journal.hear(*source_and_gain)
+                self._written = source_and_gain
+        except OSError as error:
+            self._broken = True
+            self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        place = error.filename or recordings_folder()
+        self.failed.emit(
+            f"The recording cannot be written to disk while you play ({place}: {error.strerror or error}); "
+            "a crash would lose it. Save it soon."
+        )
+
+
 class Recordings(QObject):
     """Recordings, which live in the window's thread, as long as the window.
 
-    The button of `bar` records, ends, saves and discards.
+    The button of the instrument's bar records, ends, saves and discards.
 
     A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
     as long, also past the end of the process, and `offer_left` finds it.
     """
 
-    reported = Signal(str)  # an error, for the user
-    informed = Signal(str)  # what went well
     save_asked = Signal()  # of the latest one
     unsaved_changed = Signal()
 
-    def __init__(self, session: Session, keys: Keys, bar: PatchBar, parent: QObject) -> None:
-        super().__init__(parent)
+    def __init__(self, window: MainWindow, session: Session, keys: Keys) -> None:
+        super().__init__(window)
         self._session = session
         self._keys = keys
-        self._bar = bar
+        self._notices = window.notices
+        self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: dict[Played, Journal | None] = {}  # in their order
         self._journaling = Journaling(keys.recorder, self)
-        self._journaling.failed.connect(self.reported)
+        self._journaling.failed.connect(self._notices.report)
         self._reading = Background("journals", self)
         self._reading.finished.connect(lambda read: self._ask_about(*read))
-        self._reading.failed.connect(self.reported)
+        self._reading.failed.connect(self._notices.report)
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save_asked)
@@ -78,7 +162,7 @@ class Recordings(QObject):
         else:
             self._keys.begin_recording()
             if not self._session.choices.plays_patch:
-                self.informed.emit("Keys of an instrument are recorded; plucks of a single string are not.")
+                self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
             self._journaling.begin(self._began)
             self._choices_changed(frozenset())
@@ -117,11 +201,11 @@ class Recordings(QObject):
     def _ask_about(self, journals: dict[Played, Journal], problems: list[str]) -> None:
         """Ask about journals that were left; `problems`: why others cannot be read."""
         for problem in problems:
-            self.reported.emit(problem)
+            self._notices.report(problem)
         if not journals:
             return
         if self._keys.recorder.recording:  # no question comes between a musician and the keys
-            self.informed.emit("An earlier recording is not saved yet; the next start offers it.")
+            self._notices.inform("An earlier recording is not saved yet; the next start offers it.")
             answer = LATER
         else:
             lines = "\n".join(_words(played) for played in journals)
@@ -156,13 +240,13 @@ class Recordings(QObject):
         if not events or patch is None:
             if journal is not None:
                 journal.delete()
-            self.informed.emit("Nothing was played, so nothing was recorded.")
+            self._notices.inform("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
         self._unsaved[Played(patch, tuple(events), *_heard(choices), self._began)] = journal
         self._show_unsaved()
         if choices.solo:
-            self.informed.emit(f"The recording has all modes, although mode {choices.solo} is soloed.")
+            self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
 
     def _choices_changed(self, _: frozenset[str]) -> None:
         self._journaling.hear(*_heard(self._session.choices))
@@ -190,11 +274,15 @@ def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[s
     return journals, problems
 
 
+def played_source(choices: Choices) -> PlayedSource:
+    """The source that is heard, as files name it; of another preset the model plays keys."""
+    source = choices.source_heard
+    return "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
+
+
 def _heard(choices: Choices) -> tuple[PlayedSource, float]:
     """The source that is heard, and the gain of the difference."""
-    name = choices.source_heard
-    source: PlayedSource = "truth" if name == "truth" else "difference" if name == DIFFERENCE else "model"
-    return source, choices.difference_gain_db
+    return played_source(choices), choices.difference_gain_db
 
 
 def _words(played: Played) -> str:

@@ -67,14 +67,14 @@ def settings_file() -> Path:
 def load_settings(path: Path) -> tuple[Settings, str]:
     """The settings and a notice: empty, or what was not usable and where the broken file went."""
     try:
-        text = _read_bytes(path)
+        text = read_bounded(path, bounds.LARGEST_TEXT_BYTES)
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
         reason = error.strerror or error
         return Settings(), one_line(f"The settings {path} cannot be read ({reason}); starting with defaults.")
     try:
-        return _parse(text), ""
+        return Settings.model_validate(parse_json(text, "the file")), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
@@ -88,14 +88,6 @@ def load_settings(path: Path) -> tuple[Settings, str]:
             f"again; the file was set aside as {aside}."
         )
         return usable or Settings(), one_line(reason)
-
-
-def _read_bytes(path: Path) -> bytes:
-    return read_bounded(path, bounds.LARGEST_TEXT_BYTES)
-
-
-def _parse(text: bytes) -> Settings:
-    return Settings.model_validate(parse_json(text, "the file"))
 
 
 def _usable_settings(text: bytes) -> Settings | None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import signal
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
-from PySide6.QtCore import QSocketNotifier
+from PySide6.QtCore import QTimer
 
+LOOK_MS = 100
 SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGINT", "SIGBREAK") if hasattr(signal, name)]
 
 
@@ -17,33 +18,27 @@ SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGINT", "SI
 def asked_to_end(end: Callable[[], None]) -> Iterator[None]:
     """Let the first of SIGNALS call `end` in Qt's event loop; a second one has its usual effect.
 
-    Python alone would not notice it before the next line of Python is run.
+    A timer runs Python now and then: Qt alone would not notice a signal before the next event.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    woken, waker = socket.socketpair()
-    for end_socket in (woken, waker):
-        end_socket.setblocking(False)
-    before = {number: signal.signal(number, lambda *_: None) for number in SIGNALS}
-    waker_before = signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
+    before: dict[int, Any] = {}
 
     def restore() -> None:
-        signal.set_wakeup_fd(waker_before)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        while before:
+            signal.signal(*before.popitem())
 
-    def take() -> None:
-        notifier.setEnabled(False)
+    def take(*_: object) -> None:
         restore()
-        end()
+        QTimer.singleShot(0, end)
 
-    notifier = QSocketNotifier(woken.fileno(), QSocketNotifier.Type.Read)
-    notifier.activated.connect(take)
+    before |= {number: signal.signal(number, take) for number in SIGNALS}
+    pulse = QTimer(interval=LOOK_MS)
+    pulse.timeout.connect(lambda: None)
+    pulse.start()
     try:
         yield
     finally:
-        notifier.setEnabled(False)
+        pulse.stop()
         restore()
-        woken.close()
-        waker.close()

@@ -8,26 +8,29 @@ core at a low priority. They rest while a pluck is rendered and while the panel 
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
+from threadpoolctl import threadpool_limits
 
 from app.presets.library import Library
-from app.rendering import BlowTake, Sounding, Take
+from app.rendering import BlowTake, Take
 from app.session.choices import Choices, Session
+from app.session.shown import ShownSource, full_scale_words, shown_sources
 from app.shared.worker import Job, Work
 from app.views.background import Background
-from app.views.controls.parts import lay_out_alone
+from app.views.controls.parts import lay_out_alone, words_label
 from app.views.controls.plain import Label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.drum.view import DrumView
 from app.views.stage import StageView
+from app.views.string.view import StringView
 
+Location = Literal["stage", "left", "right"]
 LEAST_HEIGHT = 84  # pixels
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
 UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
@@ -38,25 +41,28 @@ class Moment:
     """The moment that is to be shown now.
 
     Attributes:
-        take: the motion, or None before the first.
+        sounding: the pluck or the blow that is heard, or None before the first.
         position_s: the playhead, from the pluck on: the time that sounds now.
         playing: whether the playhead moves.
         elapsed_s: since the last call of `show_moment`, by the clock.
-        blow: the motion of a drum, while one is played; `take` is None then.
         audible: whether the note of the motion rings.
     """
 
-    take: Take | None
+    sounding: Take | BlowTake | None
     position_s: float
     playing: bool
     elapsed_s: float
-    blow: BlowTake | None = None
     audible: bool = False
 
     @property
-    def sounding(self) -> Sounding | None:
-        """The pluck or the blow that is heard."""
-        return self.take or self.blow
+    def take(self) -> Take | None:
+        """The motion of a string."""
+        return self.sounding if isinstance(self.sounding, Take) else None
+
+    @property
+    def blow(self) -> BlowTake | None:
+        """The motion of a drum."""
+        return self.sounding if isinstance(self.sounding, BlowTake) else None
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """The state that a picture of the take depends on.
@@ -72,14 +78,20 @@ class Moment:
         return choices.motion and (self.playing or (self.position_s > 0 and in_lab_or_audible))
 
 
+def level_words(choices: Choices, sounding: Take | BlowTake | None = None) -> str:
+    """The label of levels: what 0 dB stands for, of a drum's blow or by the chosen pick-up."""
+    blow = sounding if isinstance(sounding, BlowTake) else None
+    return f"dB re {full_scale_words(choices) if blow is None else f'{blow.full_scale:g} Pa'}"
+
+
 class Panel(QWidget):
     """Subclasses set `key`, `title` and `help`, and override the methods that they need."""
 
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
-    on_the_left = False  # in which deck
-    on_stage: ClassVar[bool] = False  # the picture of the string or the drum, above the decks
+    location: Location = "stage"  # above the decks, or in one
+    every: ClassVar[int] = 1  # of so many moments one is drawn
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -100,6 +112,8 @@ class Panel(QWidget):
         self._cover.setAutoFillBackground(True)
         self._cover.hide()
         self._seen_s = time.monotonic()
+        self._moments = 0
+        self._state: tuple[object, ...] = ()  # of which the picture is
         self._growing: Take | BlowTake | None = None  # jobs rest while it is rendered
         self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
 
@@ -124,12 +138,25 @@ class Panel(QWidget):
     def take_started(self, take: Take | BlowTake) -> None:
         """Take another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
         self._growing, self._grown = take, (-1, time.monotonic())
+        self._state = ()  # or it would hold the last take
 
     def take_finished(self, take: Take) -> None:
         """Take a motion when all of it is rendered, with its errors."""
 
     def show_moment(self, moment: Moment) -> None:
         """Show a moment while the panel is visible. The string has 60 a second, the others 30, and fewer at rest."""
+        self.look()
+        self._moments += 1
+        if self._moments % self.every == 0:
+            self._draw_moment(moment)
+
+    def _draw_moment(self, moment: Moment) -> None:
+        """Draw what has changed since the last moment."""
+
+    def _is_new(self, *state: object) -> bool:
+        """Return True if what a picture depends on has changed since the last call."""
+        before, self._state = self._state, state
+        return state != before
 
     def end(self) -> None:
         """End the panel's thread; called when the window closes."""
@@ -139,7 +166,9 @@ class Panel(QWidget):
         """Start a long job in place of the one under way; `background` has its signals."""
 
         def on_one_core(job: Job) -> object:
-            with _one_core():
+            import torch  # noqa: F401 - whose OpenMP counts threads for each thread that computes
+
+            with threadpool_limits(limits=1, user_api="openmp"):
                 return work(job)
 
         self.look()
@@ -168,10 +197,94 @@ class Panel(QWidget):
         return now_s - self._grown[1] <= GIVEN_UP_S  # else its rendering was abandoned, or failed
 
 
-class StagePanel(Panel):
-    """The picture of the string or the drum, above the decks."""
+class ComputedPanel(Panel):
+    """A line of words above a figure, which is computed once what it depends on has rested for `SETTLED_S`.
 
-    on_stage = True
+    Attributes:
+        progress: the share that is computed.
+    """
+
+    SETTLED_S: ClassVar[float] = 0.0
+
+    def __init__(self, session: Session, library: Library, failed: str = "") -> None:
+        super().__init__(session, library)
+        self.setAccessibleName(self.title)
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self._words = words_label()
+        self.progress = ProgressStrip(f"Progress of the {self.title.lower()}")
+        self._asked: object = None
+        self._begun = False
+        self._unchanged_s = 0.0
+        if failed:
+            self.background.failed.connect(lambda: self._say(failed))
+
+    @property
+    def words(self) -> str:
+        return self._words.text()
+
+    def _wanted(self) -> object:
+        """All that the figure depends on; None: there is nothing to compute."""
+        raise NotImplementedError
+
+    def _clear(self) -> None:
+        """Show that the figure is another one from now on."""
+
+    def _begin(self) -> None:
+        """Begin to compute the figure."""
+        raise NotImplementedError
+
+    def _say(self, words: str, share: float | None = None) -> None:
+        """Write the line of words, and show the share that is computed; None: nothing is."""
+        self._words.say(words)
+        self.progress.show_share(share)
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        self._ask()
+
+    def _ask(self) -> None:
+        """Ask for another figure where another is wanted."""
+        wanted = self._wanted()
+        if wanted != self._asked:
+            self._asked = wanted
+            self._begun, self._unchanged_s = False, 0.0
+            self.background.cancel()
+            self._clear()
+
+    def _draw_moment(self, moment: Moment) -> None:
+        self._ask()
+        self._unchanged_s += moment.elapsed_s
+        if not self._begun and self._asked is not None and self._unchanged_s >= self.SETTLED_S:
+            self._begun = True
+            self._begin()
+
+
+class StagePanel(Panel):
+    """The picture of the string or the drum, above the decks; in Play of the audible source alone."""
+
+    view: StringView | DrumView
+
+    @property
+    def _sources(self) -> tuple[ShownSource, ...]:
+        """The drawn sources: both slots, or in Play the audible one."""
+        sources = shown_sources(self.session.choices, self.library)
+        return tuple(source for source in sources if source.heard or self.session.choices.face != "play")
+
+    def _show_sources(self) -> None:
+        self.view.set_plain(self.session.choices.face == "play")
+        self.view.set_sources(self._sources)
+
+    def _draw_moment(self, moment: Moment) -> None:
+        choices = self.session.choices
+        if not self._is_new(*moment.standing(choices)) and not moment.playing:
+            return
+        if moment.in_motion(choices):
+            self._draw_motion(moment)
+        else:
+            self.view.show_frame(None)
+
+    def _draw_motion(self, moment: Moment) -> None:
+        """Draw the string or the drum as it moves now."""
+        raise NotImplementedError
 
     def _put_on_stage(self, view: StageView) -> None:
         """Lay out the picture, and let its gestures change the listening points."""
@@ -188,31 +301,3 @@ class StagePanel(Panel):
 
     def _reset_listening_point(self, side: str) -> None:
         self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
-
-
-_lock = threading.Lock()
-_holders: list[None] = []
-_usual = [1]
-
-
-@contextmanager
-def _one_core() -> Iterator[None]:
-    """Limit torch to one core while any job is under way; then restore the usual number.
-
-    PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
-    restores it.
-    """
-    import torch
-
-    with _lock:
-        if not _holders:
-            _usual[0] = torch.get_num_threads()
-        _holders.append(None)
-        torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        with _lock:
-            _holders.pop()
-            if not _holders:
-                torch.set_num_threads(_usual[0])

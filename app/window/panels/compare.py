@@ -14,14 +14,11 @@ from PySide6.QtWidgets import QMenu, QToolButton
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets import words
 from app.presets.library import Library, PresetEntry
-from app.session.choices import Session, ShownString
+from app.session.choices import Session
 from app.session.slots import other_preset
-from app.views.controls.parts import tool_button, words_label
-from app.views.controls.progress_strip import ProgressStrip
+from app.views.controls.parts import tool_button
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
-from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
-
-SETTLED_S = 0.5  # a pluck that is still being moved is not computed
+from app.window.panels.base import ComputedPanel, Moment
 
 
 def percent(value: float) -> str:
@@ -63,9 +60,10 @@ COLUMNS = (
 )
 
 
-class ComparePanel(Panel):
+class ComparePanel(ComputedPanel):
     """The table, and a menu of the presets in it."""
 
+    SETTLED_S = 0.5  # a pluck that is still being moved is not computed
     key = "compare"
     title = "Compare"
     help = (
@@ -75,20 +73,13 @@ class ComparePanel(Panel):
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.setAccessibleName("Compare")
-        self.setMinimumHeight(LEAST_HEIGHT)
         self._names: list[str] | None = None  # chosen by the user; None: those of the present string
         self._rows: dict[str, tuple[Basis | None, ComparedRow]] = {}  # None: of an earlier pluck
-        self._tried: tuple[object, ...] = ()  # what the latest job was started for
-        self._unchanged_s = 0.0
-        self._stopped = False
-        self._stale = False  # the table is of choices that have changed since
         self._menu = QMenu(self)
         self._actions: dict[str, QAction] = {}
         presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
-        self._words = words_label()
         self._stop = tool_button("Stop")
         self._stop.clicked.connect(self._stop_or_go_on)
         self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
@@ -96,7 +87,7 @@ class ComparePanel(Panel):
         self.table.row_double_clicked.connect(lambda name: session.update(preset=name))
         self.table.row_entered.connect(lambda name: session.update(preset=name))
         self.table.row_deleted.connect(lambda name: self._toggle(name, False))
-        self.progress = ProgressStrip("Progress of the comparison")
+        self.progress.setAccessibleName("Progress of the comparison")
         self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(lambda: self._set_computing(None))
         self.background.failed.connect(lambda: self._set_computing(None))
@@ -105,21 +96,10 @@ class ComparePanel(Panel):
         self._set_computing(None)
         lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
-    def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"preset", "seconds", "listen", *ShownString.model_fields}:
-            self._unchanged_s = 0.0
-            if self._tried != self._wanted_key():
-                self._abandon()
-            self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
-
-    def show_moment(self, moment: Moment) -> None:
-        self.look()
-        self._unchanged_s += moment.elapsed_s
-        if self._stale:
+    def _draw_moment(self, moment: Moment) -> None:
+        super()._draw_moment(moment)
+        if self._is_new(self._asked, self.session.choices.preset):
             self._show()
-        if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted_key():
-            return
-        self._compute()
 
     def _library_changed(self) -> None:
         self._fill_menu()
@@ -155,12 +135,15 @@ class ComparePanel(Panel):
             return [present] if present is not None else []
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
-    def _wanted_key(self) -> tuple[object, ...]:
-        """The values that the table depends on."""
+    def _wanted(self) -> object:
         return (self._basis, *(entry.name for entry in self._entries))
 
-    def _compute(self) -> None:
-        self._tried, basis = self._wanted_key(), self._basis
+    def _clear(self) -> None:
+        self._set_computing(None)
+
+    def _begin(self) -> None:
+        """Compute the rows that are not of the present pluck."""
+        basis = self._basis
         missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != basis]
         missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
@@ -190,8 +173,7 @@ class ComparePanel(Panel):
         )
 
     def _stop_or_go_on(self) -> None:
-        self._stopped = self.background.busy
-        if self._stopped:
+        if self.background.busy:
             self.background.cancel()
             self._set_computing(None)
         else:
@@ -199,7 +181,7 @@ class ComparePanel(Panel):
             if all(entry.name in done for entry in self._entries):
                 done = set()
             self._rows = {n: (basis if n in done else None, row) for n, (basis, row) in self._rows.items()}
-            self._compute()
+            self._begin()
 
     def _toggle(self, name: str, on: bool) -> None:
         names = [entry.name for entry in self._entries if entry.name != name]
@@ -207,18 +189,10 @@ class ComparePanel(Panel):
 
     def _choose(self, names: list[str] | None) -> None:
         self._names = names
-        if self._tried != self._wanted_key():
-            self._abandon()
+        self._ask()
         self._show()
 
-    def _abandon(self) -> None:
-        """End what is computed for other choices than the present ones; where they come back, it is begun again."""
-        self.background.cancel()
-        self._tried, self._stopped = (), False
-        self._set_computing(None)
-
     def _show(self) -> None:
-        self._stale = False
         entries = self._entries
         basis = self._basis
         present = self.session.choices.preset

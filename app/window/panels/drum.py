@@ -6,10 +6,10 @@ import math
 
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
-from app.rendering import BlowTake, Take
+from app.rendering import BlowTake
 from app.session.choices import Session
 from app.session.listener import Listener
-from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
+from app.session.shown import LEGEND_FIELDS, ShownSource
 from app.session.silence import why_silent
 from app.shared.key_names import note_name
 from app.shared.vocabulary import DIFFERENCE
@@ -23,6 +23,7 @@ DRAWN = ("model", "truth", DIFFERENCE)
 
 
 class DrumPanel(StagePanel):
+    view: DrumView
     of_strings = False
     key = "drum"
     title = "Drum"
@@ -42,7 +43,6 @@ class DrumPanel(StagePanel):
         self._key: int | None = None
         self._shown: PlayedDrum | None = None  # whose place it is
         self._place: Place = (0.0, 0.0)
-        self._standing: tuple[object, ...] = ()
 
     @property
     def place(self) -> Place:
@@ -54,10 +54,8 @@ class DrumPanel(StagePanel):
         if names & {"instrument", "patch"} and choices.drums is not None and self._key is not None:
             self.show_key(self._key)
         if names & {"face", "volume_db", *LEGEND_FIELDS}:
-            self.view.set_plain(choices.face == "play")
-            self.view.set_sources(self._sources)
+            self._show_sources()
             self.view.set_warning(why_silent(choices, self.library))
-            self._standing = ()
         if names & Listener.model_fields.keys():
             self.view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
         if "motion" in names:
@@ -65,10 +63,8 @@ class DrumPanel(StagePanel):
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:
-        """The drawn sources: both slots, or in Play the audible one; of another preset the model plays drums."""
-        choices = self.session.choices
-        sources = tuple(source for source in shown_sources(choices, self.library) if source.source in DRAWN)
-        return tuple(source for source in sources if source.heard) if choices.face == "play" else sources
+        """The sources of the slots; of another preset the model plays drums."""
+        return tuple(source for source in super()._sources if source.source in DRAWN)
 
     @property
     def _drum(self) -> PlayedDrum | None:
@@ -86,16 +82,9 @@ class DrumPanel(StagePanel):
             self._aim(place or drum.place)
         self._shown = drum
 
-    def take_started(self, take: Take | BlowTake) -> None:
-        self._standing = ()
-
-    def show_moment(self, moment: Moment) -> None:
+    def _draw_motion(self, moment: Moment) -> None:
         blow, choices = moment.blow, self.session.choices
-        standing = moment.standing(choices)
-        if not moment.playing and standing == self._standing:
-            return
-        self._standing = standing
-        if blow is None or not moment.in_motion(choices) or not self._looks_like(blow):
+        if blow is None or not self._looks_like(blow):
             self.view.show_frame(None)
             return
         position_s = min(moment.position_s, blow.ready_s)  # the sound may be ahead of the motions: all at one time

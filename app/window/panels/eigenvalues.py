@@ -20,11 +20,11 @@ from app.rendering.subject import Subject, load_subject
 from app.session.choices import Session
 from app.session.slots import subject_of
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, combo_box, lay_out_view, words_label
+from app.views.controls.parts import ENTER_KEYS, combo_box, lay_out_view
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import fit_foot
 from app.views.plots.pointed_plot import PointedPlot
-from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
+from app.window.panels.base import ComputedPanel, Moment
 
 NEAR_PIXELS = 16  # within which a point is pointed at
 CLOSER_PIXELS = 3  # that a point of the string must be nearer than a learned one
@@ -35,9 +35,7 @@ AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
 Array = NDArray[np.float64]
 
 
-class EigenvaluesPanel(Panel):
-    """The plane of points with a line of words above it."""
-
+class EigenvaluesPanel(ComputedPanel):
     key = "eigenvalues"
     title = "Eigenvalues"
     help = (
@@ -46,10 +44,7 @@ class EigenvaluesPanel(Panel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.setAccessibleName("Eigenvalues")
-        self.setMinimumHeight(LEAST_HEIGHT)
-        self._asked: Subject | None = None
+        super().__init__(session, library, "This preset cannot be read")
         self._figure: PoleFigure | None = None
         self._shown = np.zeros(0, np.int64)  # the learned points of the chosen layer
         self._axes = combo_box("Axes", [(text, key) for key, text in AXES.items()])
@@ -59,48 +54,48 @@ class EigenvaluesPanel(Panel):
         self._layer.setToolTip("Which layer's eigenvalues are shown")
         self._layer.activated.connect(lambda _: self._draw())
         self._layer.hide()
-        self._words = words_label()
         self.plane = _Plane()
         self.plane.pointed.connect(self._show_values)
         self.plane.taken.connect(lambda point: self.solo(int(self._modes[point])))
         self.plane.escaped.connect(lambda: self.solo(0))
         theme.changes.theme_changed.connect(self._take_theme)
-        self.background.finished.connect(self.show_figure)
-        self.background.failed.connect(lambda: self.show_figure(None, "This preset cannot be read"))
+        self.background.finished.connect(self._show_figure)
         for control in (self._axes, self._layer):
             control.setStyleSheet(SMALL)
         lay_out_view(self, (self._axes, self._layer), self._words, (), self.plane)
-
-    @property
-    def words(self) -> str:
-        return self._words.text()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "solo" in names:
             self._draw(keep_view=True)
 
     def show_moment(self, moment: Moment) -> None:
+        if not moment.playing or self._asked is None:  # keys may change the string many times a second
+            super().show_moment(moment)
+
+    def _wanted(self) -> Subject | None:
         entry = self.library.find(self.session.choices.preset)
-        if entry is None or (moment.playing and self._asked is not None):  # keys may change it many times a second
-            return
-        subject = subject_of(self.session.choices, entry.path)
-        if subject != self._asked:
-            self._asked = subject
-            self.show_figure(None, "Reading the preset …")
+        return None if entry is None else subject_of(self.session.choices, entry.path)
+
+    def _clear(self) -> None:
+        self._figure = None
+        self._layer.hide()
+        self._draw()
+
+    def _begin(self) -> None:
+        subject = self._wanted()
+        if subject is not None:
+            self._say("Reading the preset …")
             self.compute(lambda job: pole_figure(load_subject(subject)))
 
-    def show_figure(self, figure: PoleFigure | None, words: str = "") -> None:
-        """Show the eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
-        if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
+    def _show_figure(self, figure: PoleFigure) -> None:
+        if self._layer.count() != figure.layers + 1:
             self._layer.clear()
             for layer in range(figure.layers):
                 self._layer.addItem("First layer" if layer == 0 else f"Layer {layer + 1}", layer)
             self._layer.addItem("All layers", None)
+        self._layer.setVisible(figure.layers > 1)
         self._figure = figure
-        self._layer.setVisible(figure is not None and figure.layers > 1)
         self._draw()
-        if figure is None:
-            self._words.say(words)
 
     def _take_theme(self) -> None:
         self._draw(keep_view=True)  # points have pens and brushes of their own

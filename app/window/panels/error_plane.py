@@ -21,17 +21,15 @@ from app.session.choices import Session
 from app.session.slots import info_of, subject_of
 from app.shared.worker import Job
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, lay_out_view, words_label
-from app.views.controls.progress_strip import ProgressStrip
+from app.views.controls.parts import ENTER_KEYS, lay_out_view
 from app.views.plots.axis_label import UprightTicks
 from app.views.plots.colour_maps import share_map
 from app.views.plots.pointed_plot import PointedPlot
-from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
+from app.window.panels.base import ComputedPanel, Moment
 from engine.pluck import Pluck
 from engine.presets import preset_digest
 
 FORM_FIELDS = frozenset({"preset", "string", "shape", "width"})  # other ones are another map
-SETTLED_S = 0.3  # a width that is still being turned is not computed
 MOST_KEPT = 64  # planes of some 13 KB
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
 SMOOTHER = 4  # pixels of the picture to a step of the finest grid
@@ -44,9 +42,10 @@ OUTLINE = 25  # places at which the trained amplitudes are drawn
 Range = tuple[float, float]
 
 
-class ErrorPlanePanel(Panel):
-    """The map with a line of words above it. Positions are shares of the string's length, amplitudes in mm."""
+class ErrorPlanePanel(ComputedPanel):
+    """The map of errors. Positions are shares of the string's length, amplitudes in mm."""
 
+    SETTLED_S = 0.3  # a width that is still being turned is not computed
     key = "error_plane"
     title = "Error map"
     help = (
@@ -55,28 +54,17 @@ class ErrorPlanePanel(Panel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.setAccessibleName("Error map")
-        self.setMinimumHeight(LEAST_HEIGHT)
-        self._words = words_label()
-        self.progress = ProgressStrip("Progress of the error map")
+        super().__init__(session, library, "The error map of this preset could not be computed")
         self.map = _Map()
         self.map.pointed.connect(self._show_values)
         self.map.taken.connect(self._audition)
         self._picture: PlanePicture | None = None
         self._resting = ""
-        self._asked: tuple[object, ...] = ()
-        self._unchanged_s = 0.0
         self._moved = False  # the pluck's mark is of choices that have changed since
         self._planes = _Planes()
         self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(self._show_finished)
-        self.background.failed.connect(lambda: self._say("The error map of this preset could not be computed"))
         lay_out_view(self, (), self._words, (), self.progress, self.map, top=4)
-
-    @property
-    def words(self) -> str:
-        return self._words.text()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         entry = self.library.find(self.session.choices.preset)
@@ -86,31 +74,30 @@ class ErrorPlanePanel(Panel):
             self.map.set_trained(
                 info.trained_range.position, lambda place: info.trained_amplitudes_mm(pluck.moved(position=place))
             )
-        if names & FORM_FIELDS and self._wanted_key() != self._asked:
-            self.background.cancel()
-            self._asked = ()
-            self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
-            self._show(None)
-            self._say("")
+        super().choices_changed(names)
 
-    def show_moment(self, moment: Moment) -> None:
-        self.look()
-        self._unchanged_s += moment.elapsed_s
-        choices = self.session.choices
+    def _draw_moment(self, moment: Moment) -> None:
+        super()._draw_moment(moment)
         if self._moved:
-            self.map.set_pluck(choices.position, choices.amplitude_mm)
+            self.map.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
             self._moved = False
-        entry = self.library.find(choices.preset)
-        if entry is None or self._asked == self._wanted_key() or self._unchanged_s < SETTLED_S:
-            return
-        self._asked = self._wanted_key()
-        subject, pluck = subject_of(choices, entry.path), choices.pluck
-        self._say("Computing the model's error for plucks of this shape …", 0.0)
-        self.compute(lambda job: self._planes.compute(subject, pluck, job))
 
-    def _wanted_key(self) -> tuple[object, ...]:
-        """The values that the plane depends on."""
-        return (self.session.choices.preset, self.session.choices.string, *_pluck_form(self.session.choices.pluck))
+    def _wanted(self) -> object:
+        choices = self.session.choices
+        entry = self.library.find(choices.preset)
+        return None if entry is None else (subject_of(choices, entry.path), *_pluck_form(choices.pluck))
+
+    def _clear(self) -> None:
+        self._show(None)
+        self._say("")
+
+    def _begin(self) -> None:
+        choices = self.session.choices
+        entry = self.library.find(choices.preset)
+        if entry is not None:
+            subject, pluck = subject_of(choices, entry.path), choices.pluck
+            self._say("Computing the model's error for plucks of this shape …", 0.0)
+            self.compute(lambda job: self._planes.compute(subject, pluck, job))
 
     def _show_progress(self, share: float, _: str, picture: PlanePicture | None) -> None:
         self.progress.show_share(share)

@@ -18,7 +18,6 @@ from app.session.choices import Session
 from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.segments import SMALL, Segments
-from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
 from engine.compare.relative import ErrorWindows
@@ -56,9 +55,6 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self.longer.setStyleSheet(f"QToolButton {{{SMALL}}} QToolButton:disabled {{color: {theme.FAINT};}}")
         self.longer.clicked.connect(lambda: session.update(seconds=LONG_S))
         item = self.plot.getPlotItem()
-        item.getAxis("left").enableAutoSIPrefix(False)
-        self._label = UprightLabel(item)
-        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         item.showGrid(x=True, y=True, alpha=0.18)
         colours = {"rmse": theme.MODEL, "mae": theme.DIFFERENCE, "level_db": theme.MODEL}
         self._curves = {name: item.plot(pen=pg.mkPen(colour, width=1)) for name, colour in colours.items()}
@@ -103,9 +99,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
 
     def _draw(self, figures: ErrorWindows) -> None:
         ready = figures.ready
-        drawn_state = (figures, ready, self.quantities.key)
-        if ready and drawn_state != self._shown:
-            self._shown = drawn_state
+        if ready and self._is_new(figures, ready, self.quantities.key):
             self.show_curves(
                 figures.middle_s[:ready], {name: values[:ready] for name, values in figures.curves.items()}
             )

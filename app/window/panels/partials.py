@@ -8,10 +8,9 @@ from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.choices import Session
-from app.views.controls.parts import combo_box, words_label
-from app.views.controls.progress_strip import ProgressStrip
+from app.views.controls.parts import combo_box
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
-from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
+from app.window.panels.base import ComputedPanel
 from engine.compare.partials import LEAST_DECAY_DB
 
 
@@ -55,7 +54,7 @@ COLUMNS = (
 )
 
 
-class PartialsPanel(Panel):
+class PartialsPanel(ComputedPanel):
     """Rows are known by their mode numbers."""
 
     key = "partials"
@@ -66,24 +65,19 @@ class PartialsPanel(Panel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.setAccessibleName("Partials")
-        self.setMinimumHeight(LEAST_HEIGHT)
+        super().__init__(session, library, "The partials of this pluck could not be measured")
         self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
         self._window.setToolTip("The part of the pluck that is measured")
         self._window.activated.connect(self._show)
-        self._words = words_label()
         self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._choose)
         self.table.row_entered.connect(self._choose)
         self.table.escaped.connect(lambda: self.solo(0))
-        self.progress = ProgressStrip("Progress of the partials")
-        self._waiting: Take | None = None  # complete, and not yet measured
+        self._complete: Take | None = None
         self._rows: dict[str, list[PartialRow]] | None = None
         self.background.progressed.connect(self.progress.show_share)
         self.background.finished.connect(self._show_measured)
-        self.background.failed.connect(lambda: self._say("The partials of this pluck could not be measured"))
         lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -91,18 +85,21 @@ class PartialsPanel(Panel):
             self._show_solo()
 
     def take_started(self, take: Take | BlowTake) -> None:
-        self._waiting = self._rows = None
-        self.background.cancel()
+        super().take_started(take)
+        self._complete = self._rows = None
+        self._ask()
         self.table.set_dimmed(True)
         self._say("The partials of the new pluck follow when it is rendered")
 
     def take_finished(self, take: Take) -> None:
-        self._waiting = take
+        self._complete = take
 
-    def show_moment(self, moment: Moment) -> None:
-        self.look()
-        if self._waiting is not None:  # measured only while the panel is visible
-            take, self._waiting = self._waiting, None
+    def _wanted(self) -> Take | None:
+        return self._complete
+
+    def _begin(self) -> None:
+        take = self._complete
+        if take is not None:
             self._say("Measuring the partials of this pluck …", 0.0)
             self.compute(lambda job: take_partials(take, job))
 
@@ -114,10 +111,6 @@ class PartialsPanel(Panel):
         self.progress.show_share(None)
         self._rows = rows
         self._show()
-
-    def _say(self, words: str, share: float | None = None) -> None:
-        self._words.setText(words)
-        self.progress.show_share(share)
 
     def _show(self) -> None:
         if self._rows is None:

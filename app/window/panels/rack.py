@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from app.presets.library import Library
 from app.session.choices import Session
+from app.views.controls.deck import Deck
 from app.views.plots.plots import dress_plots
 from app.window.main_window import MainWindow
-from app.window.panels.base import Panel
+from app.window.panels.base import Location, Panel
 from app.window.panels.compare import ComparePanel
 from app.window.panels.eigenvalues import EigenvaluesPanel
 from app.window.panels.error_plane import ErrorPlanePanel
@@ -25,10 +26,14 @@ def decks(window: MainWindow, session: Session, library: Library) -> list[Panel]
     """The panels of the left and the right deck. Connects decks and session."""
     dress_plots()
     panels: list[Panel] = []
-    for choice, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
+    locations: tuple[tuple[Location, Deck, tuple[type[Panel], ...]], ...] = (
+        ("left", window.left, LEFT),
+        ("right", window.right, RIGHT),
+    )
+    for location, deck, kinds in locations:
         for panel in (kind(session, library) for kind in kinds):
             deck.add(panel.key, panel.title, panel)
-            panel.on_the_left = deck is window.left
+            panel.location = location
             panels.append(panel)
-        deck.chosen.connect(lambda key, choice=choice: session.update(**{choice: key}))
+        deck.chosen.connect(lambda key, choice=f"{location}_view": session.update(**{choice: key}))
     return panels

@@ -15,7 +15,6 @@ from app.session.shown import readable_unit
 from app.views import theme
 from app.views.controls.parts import combo_box
 from app.views.controls.segments import SMALL, Segments
-from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.colour_maps import displacement_map, error_map, magnitudes_of
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
@@ -67,8 +66,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._picture: Picture | None = None
         item = self.plot.getPlotItem()
         item.setYRange(0, 1, padding=0)
-        self._label = UprightLabel(item, ("position",))
-        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._label.set("position")
         self._ticks.set((place, f"{place:g}") for place in PLACES)
         self._image = pg.ImageItem(axisOrder="row-major")
         item.addItem(self._image, ignoreBounds=True)
@@ -113,10 +111,8 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         quantity = self.quantities.key
         times_s = self.plot.times_s
         columns = self.plot.columns
-        drawn_state = (figures, figures.take.ready_frames, figures.ready, quantity, times_s, columns)
-        if drawn_state == self._shown:
+        if not self._is_new(figures, figures.take.ready_frames, figures.ready, quantity, times_s, columns):
             return
-        self._shown = drawn_state
         self._picture = seen = picture(figures, quantity, times_s, columns)
         if seen is None:  # nothing is computed yet of the times in view
             self._image.clear()

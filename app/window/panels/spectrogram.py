@@ -14,13 +14,13 @@ from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
-from app.session.shown import full_scale_words
 from app.views import theme
 from app.views.controls.parts import combo_box
 from app.views.controls.segments import SMALL, Segments
-from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, UprightTicks, frequency_ticks
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, frequency_ticks
 from app.views.plots.colour_maps import level_map
 from app.views.plots.time_plot import TimePlot
+from app.window.panels.base import level_words
 from app.window.panels.time_panel import TimePanel
 
 ROWS = 320
@@ -62,10 +62,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._hop_s = 1.0
         self._highest_hz = 8000.0
         item = self.plot.getPlotItem()
-        axis = item.getAxis("left")
-        axis.enableAutoSIPrefix(False)
-        self._label = UprightLabel(item, ("frequency (Hz)", "Hz"))
-        self._ticks = UprightTicks(axis, item.vb)
+        self._label.set("frequency (Hz)", "Hz")
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
         item.addItem(self._image, ignoreBounds=True)
         self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
@@ -92,12 +89,11 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "pickup" in names:
-            self._bar_label.set(f"dB re {full_scale_words(self.session.choices)}", "dB")
+            self._bar_label.set(level_words(self.session.choices), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._bar_label.set(f"dB re {scale}", "dB")
+        self._bar_label.set(level_words(self.session.choices, take), "dB")
         if take.rate_hz / 2 != self._highest_hz:
             self._highest_hz = take.rate_hz / 2
             self._label_frequencies()
@@ -109,11 +105,9 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         return figures.listened is take.listened
 
     def _draw(self, figures: Spectrogram) -> None:
-        drawn_state = (figures, self.quantities.key, self.logarithmic)
-        if drawn_state != self._shown:
-            if figures.ready == 0:
-                return  # the picture before stays until there is something new
-            self._shown = drawn_state
+        if figures.ready == 0:
+            return  # the picture before stays until there is something new
+        if self._is_new(figures, self.quantities.key, self.logarithmic):
             bins = figures.window_frames // 2 + 1
             lowest_hz = LOWEST_HZ if self.logarithmic else 0.0
             self._rows = FrequencyRows(bins, figures.bin_hz, ROWS, lowest_hz, self.logarithmic)

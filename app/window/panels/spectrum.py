@@ -13,26 +13,19 @@ from PySide6.QtCore import QEvent, QObject, QPointF, Qt
 from PySide6.QtGui import QResizeEvent
 
 from app.analysis.heard import HeardSignal
+from app.analysis.spectrogram import FrequencyRows
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.choices import Session
-from app.session.shown import (
-    DEFAULT_SOURCES,
-    LEGEND_FIELDS,
-    ShownSource,
-    full_scale_words,
-    part_words,
-    shown_sources,
-)
+from app.session.shown import ShownSource, shown_sources
 from app.views import theme
 from app.views.controls.parts import combo_box, faint, lay_out_view
 from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, fit_foot, frequency_ticks, keep_axes
-from app.views.plots.legend import Legend, set_curves
-from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, fit_foot, frequency_ticks, keep_axes
+from app.window.panels.base import LEAST_HEIGHT, Moment, level_words
+from app.window.panels.curves import CurvesPanel
 
-EVERY = 2  # moments
 FLOOR_DB, CEILING_DB = -130.0, 0.0
 WINDOW_S = 0.18
 COLUMNS = 480
@@ -53,8 +46,9 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """The frequencies (COLUMNS,), from LOWEST_HZ to half the rate."""
-        return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
+        """The middles (COLUMNS,) of the columns between LOWEST_HZ and half the rate."""
+        edges = np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS + 1)
+        return np.sqrt(edges[1:] * edges[:-1])
 
     @cached_property
     def _window(self) -> NDArray[np.float32]:
@@ -62,31 +56,18 @@ class Analyser:
         return (window * 2 / window.sum()).astype(np.float32)
 
     @cached_property
-    def _bins(self) -> NDArray[np.float64]:
-        """The columns' places in the padded spectrum, in bins."""
-        return self.column_hz * PADDING * self.window_frames / self.rate_hz
+    def _rows(self) -> FrequencyRows:
+        frames = PADDING * self.window_frames
+        return FrequencyRows(frames // 2 + 1, self.rate_hz / frames, COLUMNS, LOWEST_HZ, logarithmic=True)
 
-    @cached_property
-    def _first_bins(self) -> NDArray[np.intp]:
-        """The first bin of each column, where columns are wider than bins."""
-        return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
-
-    @cached_property
-    def _wide_columns(self) -> NDArray[np.bool_]:
-        last = PADDING * self.window_frames // 2 + 1
-        return np.diff(self._first_bins, append=last) > 1
-
-    def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float64]:
+    def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
         """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
         frames = self.window_frames
         block = np.zeros(frames, np.float32)
         block[: min(frames, len(signal))] = signal[:frames]
         magnitude = np.abs(np.fft.rfft((block - block.mean()) * self._window, PADDING * frames))
-        columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
-        # the loudest bin of a wide column, so that no partial falls between two
-        loudest = np.maximum.reduceat(magnitude, self._first_bins)
-        columns = np.maximum(columns, np.where(self._wide_columns, loudest, 0))
-        return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
+        levels_db = 20 * np.log10(magnitude + 1e-12).astype(np.float32)
+        return np.maximum(self._rows.of(levels_db[np.newaxis])[0], np.float32(FLOOR_DB))
 
 
 @lru_cache(maxsize=4)
@@ -95,10 +76,10 @@ def analyser_at(rate_hz: int) -> Analyser:
     return Analyser(rate_hz)
 
 
-class SpectrumPanel(Panel):
-    """The heard source is on top. The mouse reads a frequency."""
+class SpectrumPanel(CurvesPanel):
+    """The mouse reads a frequency."""
 
-    of_strings = False
+    faint_alpha = 150
     key = "spectrum"
     title = "Spectrum"
     help = (
@@ -108,9 +89,13 @@ class SpectrumPanel(Panel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
+        # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
+        self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
+        self._area_of: str | None = None
+        self._levels_db: dict[str, NDArray[np.float32]] = {}
+        self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
+        super().__init__(session, library, pg.PlotWidget(enableMenu=False))
         self.setMinimumHeight(LEAST_HEIGHT)
-        self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName("Spectrum")
         self.plot.setToolTip(
             "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
@@ -123,65 +108,39 @@ class SpectrumPanel(Panel):
         item = self.plot.getPlotItem()
         item.setLogMode(x=True)
         item.setLabel("bottom", "frequency (Hz)")
-        self._label = UprightLabel(item, ("dB re 10 mm", "dB"))
-        item.showGrid(x=True, y=True, alpha=0.18)
+        self._label.set("dB re 10 mm", "dB")
         keep_axes(item)
         item.hideButtons()
         item.setMouseEnabled(False, False)
         item.getAxis("bottom").setTicks([frequency_ticks()])
         item.getAxis("bottom").enableAutoSIPrefix(False)
-        self._curves: dict[str, pg.PlotDataItem] = {}
-        # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
-        self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
-        self._area_of: str | None = None
         item.addItem(self._area)
-        self.legend = Legend(self.plot)
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
         self._partials_hz = np.zeros(0)
-        self._levels_db: dict[str, NDArray[np.float64]] = {}
-        self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
         self._rate_hz = 16_000  # the highest of what is drawn
-        self._moments = 0
-        self._standing: tuple[object, ...] = ()
-        self._shown: tuple[object, ...] = ()
         self._hovered_hz = math.nan
-        self.set_sources(DEFAULT_SOURCES)
         self._fit()
         self.plot.viewport().installEventFilter(self)
         lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        choices = self.session.choices
-        if names & LEGEND_FIELDS:
-            self.set_sources(shown_sources(choices, self.library), part_words(choices))
-            self._shown = ()
+        super().choices_changed(names)
         if "pickup" in names:
-            self._label.set(f"dB re {full_scale_words(choices)}", "dB")
+            self._label.set(level_words(self.session.choices), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
-        self._shown = self._standing = ()  # which would hold the last take
+        super().take_started(take)
         self._partials_hz = take.partials_hz
-        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._label.set(f"dB re {scale}", "dB")
+        self._label.set(level_words(self.session.choices, take), "dB")
 
-    def show_moment(self, moment: Moment) -> None:
-        self._moments += 1
+    def _draw_moment(self, moment: Moment) -> None:
         take, choices = moment.sounding, self.session.choices
-        if take is None or self._moments % EVERY:
+        if take is None or not self._is_new(*moment.standing(choices)):
             return
-        standing = moment.standing(choices)
-        if standing == self._standing:
-            return
-        self._standing = standing
         signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
         rendered = [signal for signal in signals if signal.there]
-        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in rendered)
-        drawn_state = (take.listened, ready, moment.position_s)
-        if drawn_state == self._shown:
-            return
-        self._shown = drawn_state
         self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
         for signal in signals:
             if signal in rendered:
@@ -204,14 +163,13 @@ class SpectrumPanel(Panel):
             self._fit()
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """Set the sources as `WaveformPanel.set_sources`; slot B's curve is filled."""
-        set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=150)
+        """Set the sources that are drawn; slot B's curve is filled."""
+        super().set_sources(sources, part)
         self._area_of = next((s.source for s in sources if "B" in s.slots and len(sources) > 1), None)
         if self._area_of:
             hue = theme.SOURCE_COLOURS[theme.source_kind(self._area_of)]
             self._area.setBrush(pg.mkBrush(theme.translucent(hue, 28)))
         self._levels_db = {name: levels for name, levels in self._levels_db.items() if name in self._curves}
-        self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
         """Draw the spectrum of a window of signal, (frames,), in units of full scale."""

@@ -9,14 +9,14 @@ from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
 from app.instrument.beyond_training import outside_of_string
 from app.instrument.facts import by_two_numbers
-from app.presets.library import Library
+from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
 from app.session.choices import Choices, Session, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
-from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
+from app.session.shown import LEGEND_FIELDS
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
@@ -36,6 +36,7 @@ WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.m
 
 
 class StringPanel(StagePanel):
+    view: StringView
     key = "string"
     title = "String"
     help = (
@@ -55,8 +56,6 @@ class StringPanel(StagePanel):
         self.view.shape_stepped.connect(self._step_shape)
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
         self._envelope: Envelope | None = None
-        self._standing: tuple[object, ...] = ()
-        self._shown: tuple[object, ...] = ()
         self._take: Take | None = None  # of this pluck, once it is complete
         self._judged: Listened | None = None  # the signals for which the warning was last set
 
@@ -67,54 +66,33 @@ class StringPanel(StagePanel):
         if names & WARNING_FIELDS:
             self._show_pluck()
         if names & {"face", *LEGEND_FIELDS}:
-            self.view.set_plain(self._plain)
-            self.view.set_sources(self._sources)
-            self._shown = self._standing = ()
+            self._show_sources()
         if "face" in names:
             self.view.set_warning(*self._pluck_warning())
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
 
-    @property
-    def _plain(self) -> bool:
-        return self.session.choices.face == "play"
-
-    @property
-    def _sources(self) -> tuple[ShownSource, ...]:
-        """The drawn sources: both slots, or in Play the audible one."""
-        sources = shown_sources(self.session.choices, self.library)
-        return tuple(source for source in sources if source.heard) if self._plain else sources
-
     def take_started(self, take: Take | BlowTake) -> None:
+        super().take_started(take)
         self._envelope = Envelope()
-        self._standing = ()
 
     def take_finished(self, take: Take) -> None:
         self._take = take
         self.view.set_warning(*self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
-        take = moment.take
-        position_s = moment.position_s
-        choices = self.session.choices
         self._judge()
-        standing = moment.standing(choices)
-        if not moment.playing and standing == self._standing:
-            return
-        self._standing = standing
-        if take is None or not moment.in_motion(choices):
+        super().show_moment(moment)
+
+    def _draw_motion(self, moment: Moment) -> None:
+        choices, take = self.session.choices, moment.take
+        if take is None:
             self.view.show_frame(None)
-            self._shown = ()
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
         rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
-        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
-        strobes = [motion.strobes(position_s) for motion in rendered]
-        drawn_state = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
-        if not moment.playing and drawn_state == self._shown:
-            return
-        self._shown = drawn_state
+        position_s = min([moment.position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
         envelope = self._envelope if choices.envelope else None
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
@@ -145,14 +123,10 @@ class StringPanel(StagePanel):
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
-        if silent or self._plain or entry is None:
+        if silent or choices.face == "play" or entry is None:
             return silent, True
         error = math.nan if self._take is None else self._take.error
-        patch, string = choices.patch, choices.string
-        if patch is None or string is None or not choices.plays_patch:
-            return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
-        drawn_string = by_two_numbers(patch, string)  # as the head of the Lab reports it
-        return judged("; ".join(outside_of_string(entry.info, drawn_string, choices.pluck)), error)
+        return judged(outside_of_shown(choices, entry), error)  # as the head of the Lab reports it
 
     # Gestures
 
@@ -170,6 +144,16 @@ class StringPanel(StagePanel):
     def _step_shape(self, steps: int) -> None:
         index = SHAPES.index(self.session.choices.shape)
         self.session.update(shape=SHAPES[(index + steps) % len(SHAPES)])
+
+
+def outside_of_shown(choices: Choices, entry: PresetEntry) -> str:
+    """The differences of the shown string and its pluck from the training of its preset, in words; "": none."""
+    string, patch = choices.string, choices.patch
+    if string is None:
+        return "; ".join(outside_training(entry.info, choices.pluck))
+    if patch is not None and choices.plays_patch:
+        string = by_two_numbers(patch, string)
+    return "; ".join(outside_of_string(entry.info, string, choices.pluck))
 
 
 def _label(choices: Choices) -> str:

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable
 from functools import partial
-from typing import ClassVar, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from PySide6.QtWidgets import QWidget
 
@@ -16,6 +16,7 @@ from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.views.controls.parts import lay_out_view
 from app.views.controls.readout import Readout
+from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 
@@ -25,16 +26,18 @@ G = TypeVar("G", bound=Growing)
 class TimePanel(Panel, Generic[G]):
     """Small controls and a readout above a plot. What is computed is begun when the panel is visible."""
 
-    EVERY: ClassVar[int] = 3  # moments
+    every = 3
 
     def __init__(self, session: Session, library: Library, plot: TimePlot) -> None:
         super().__init__(session, library)
         self.plot, self.readout = plot, Readout()
+        item = plot.getPlotItem()
+        item.getAxis("left").enableAutoSIPrefix(False)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self.plot.seek_asked.connect(self.seek_asked)
         self.plot.hovered.connect(self._hover)
         self._made: G | None = None
-        self._shown: tuple[object, ...] = ()  # what the picture was made of
-        self._moments = 0
 
     def _lay_out(self, *controls: QWidget) -> None:
         lay_out_view(self, controls, self.readout, (), self.plot, gap=0)
@@ -57,15 +60,18 @@ class TimePanel(Panel, Generic[G]):
 
     def take_started(self, take: Take | BlowTake) -> None:
         """Discard what was computed of the take before."""
+        super().take_started(take)
         self.background.cancel()
-        self._made, self._shown = None, ()
+        self._made = None
         self.plot.set_times(take.seconds, take.horizon_s)
 
     def show_moment(self, moment: Moment) -> None:
         self.plot.show_playhead(moment.position_s)
-        self._moments += 1
+        super().show_moment(moment)
+
+    def _draw_moment(self, moment: Moment) -> None:
         take = moment.take if self.of_strings else moment.sounding
-        if take is None or self._moments % self.EVERY:
+        if take is None:
             return
         figures = self._made
         if figures is None or not self._is_of(figures, take):

@@ -6,28 +6,18 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-import pyqtgraph as pg
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
-from app.session.shown import (
-    DEFAULT_SOURCES,
-    LEGEND_FIELDS,
-    ShownSource,
-    part_words,
-    readable_unit,
-    shown_sources,
-)
+from app.session.shown import readable_unit, shown_sources
 from app.views.controls.parts import lay_out_alone
-from app.views.plots.axis_label import UprightLabel
-from app.views.plots.legend import Legend, set_curves
 from app.views.plots.time_plot import TimePlot
-from app.window.panels.base import Moment, Panel
+from app.window.panels.base import Moment
+from app.window.panels.curves import CurvesPanel
 
-EVERY = 2  # moments
 MOST_FRAMES = 262_144  # read in one call, which takes a millisecond
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
@@ -55,10 +45,8 @@ class _Drawn:
         return len(new) > 0
 
 
-class WaveformPanel(Panel):
-    """A panel with a curve for each source; the heard source is on top."""
-
-    of_strings = False
+class WaveformPanel(CurvesPanel):
+    faint_alpha = 130
     key = "waveform"
     title = "Waveform"
     help = (
@@ -68,42 +56,26 @@ class WaveformPanel(Panel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.plot = TimePlot(
-            "Waveform",
+        tip = (
             "Signal of the pick-up. Click moves the playhead; the wheel zooms in time, the right button pans;\n"
-            "double-click shows all. Arrow keys move the playhead, + and − zoom",
+            "double-click shows all. Arrow keys move the playhead, + and − zoom"
         )
+        super().__init__(session, library, TimePlot("Waveform", tip))
         self.plot.seek_asked.connect(self.seek_asked)
-        item = self.plot.getPlotItem()
-        item.showGrid(x=True, y=True, alpha=0.18)
-        item.getAxis("left").enableAutoSIPrefix(False)
+        self.plot.getPlotItem().getAxis("left").enableAutoSIPrefix(False)
         self.plot.horizon.label.setPosition(0.1)  # the legend has the upper edge
-        self._label = UprightLabel(item)
-        self._curves: dict[str, pg.PlotDataItem] = {}
-        self.legend = Legend(self.plot)
         self._take: Sounding | None = None
         self._period_s = 0.0  # of its string; 0: not known
         self._drawn: dict[str, _Drawn] = {}
         self._full = 0.0  # of the axis, in m or m/s
-        self._caught_up: tuple[object, ...] = ()  # progress of the take and choices when all was read
-        self._moments = 0
-        self._shown: tuple[object, ...] = ()
-        self.set_sources(DEFAULT_SOURCES)
         self.set_scale(5.0, "displacement", "mm")
         lay_out_alone(self, self.plot)
 
-    def choices_changed(self, names: frozenset[str]) -> None:
-        if names & LEGEND_FIELDS:
-            choices = self.session.choices
-            self.set_sources(shown_sources(choices, self.library), part_words(choices))
-            self._shown = ()
-
     def take_started(self, take: Take | BlowTake) -> None:
+        super().take_started(take)
         self._take = take
         self._drawn = {}
         self._full = 0.0
-        self._shown = self._caught_up = ()  # which would hold the last take
         self._period_s = 1 / take.fundamental_hz
         self.plot.set_times(take.seconds, take.horizon_s)
         for curve in self._curves.values():
@@ -111,18 +83,15 @@ class WaveformPanel(Panel):
 
     def show_moment(self, moment: Moment) -> None:
         self.plot.show_playhead(moment.position_s)
-        self._moments += 1
+        super().show_moment(moment)
+
+    def _draw_moment(self, moment: Moment) -> None:
         take = self._take
-        if take is None or self._moments % EVERY:
+        if take is None:
             return
-        choices = self.session.choices
-        progress = take.progress, choices
-        if progress != self._caught_up:
-            self._caught_up = () if self._follow(take) else progress
-        ready = {name: drawn.ready for name, drawn in self._drawn.items()}
-        shown = (take.listened, ready, self.plot.times_s, self.plot.columns)
-        if shown != self._shown:
-            self._shown = shown
+        if self._is_new(take.listened, take.progress, self.session.choices, self.plot.times_s, self.plot.columns):
+            if self._follow(take):
+                self._state = ()  # there may be more to read
             self._draw(take)
 
     def _follow(self, take: Sounding) -> bool:
@@ -161,14 +130,6 @@ class WaveformPanel(Panel):
         """Set the vertical axis, from −full to full in `unit`."""
         self.plot.getPlotItem().setYRange(-full, full, padding=0.02)
         self._label.set(f"{quantity} ({unit})", unit)
-
-    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """Set the sources that are drawn, the heard one on top.
-
-        `part` says which part of the sound where it is not all.
-        """
-        set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=130)
-        self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
         """Show the samples so far, (frames,) from time 0, in the unit of the axis; draw all of those in view."""

@@ -158,8 +158,8 @@ class Window:
     def panel(self, key: str) -> Any:
         """A panel, brought to the front of its deck."""
         (panel,) = (each for each in self.controller.panels if each.key == key)
-        if not panel.on_stage:
-            self.change(**{"left_view" if panel.on_the_left else "right_view": key})
+        if panel.location != "stage":
+            self.change(**{f"{panel.location}_view": key})
         return panel
 
     @property

@@ -36,7 +36,7 @@ class Desk:
         self.present = SoundStatus(device=SPEAKERS, gaps=GAPS)
         self.forgotten = 0
         self.notices = window.notices
-        self.control = AudioControl(window, self, None, SoundChoice())  # type: ignore[arg-type]
+        self.control = AudioControl(window, lambda report: self, None, SoundChoice())  # type: ignore[arg-type]
         self.control.open()
         self.control.show_dialog()
         (self.dialog,) = window.findChildren(AudioDialog)

@@ -97,7 +97,7 @@ def test_pads_keys_and_channel_ten_strike_drums_that_ring_light_and_stop(
         kit.key(KEY.Key_Space)  # strikes the drum that was struck last
         kit.wait(lambda sounding=sounding: bool(kit.keys.sounding()) == sounding)
     assert kit.struck[-1].event.key == 45
-    kit.controller.strike(0.1, -0.2, 100.0)
+    kit.controller.instruments.strike(0.1, -0.2, 100.0)
     event = kit.struck[-1].event
     assert (event.key, event.velocity, event.place) == (45, 100, (0.1, -0.2))
     count = len(kit.struck)
@@ -128,7 +128,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window, tm
     kit.change(face="lab")
     assert {each.covered for each in kit.panels if each.of_strings} == {DRUMS_PLAYED}
     for each in kit.panels:
-        if not each.on_stage:
+        if each.location != "stage":
             kit.panel(each.key)
             kit.qtbot.wait(1)
     assert not kit.performance.ready, "no string is plucked"

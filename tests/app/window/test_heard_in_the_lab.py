@@ -28,8 +28,7 @@ from app.playing.note import PluckVoices
 from app.session.choices import Choices
 from app.shared.vocabulary import Source
 from app.views.dialogs.abx_dialog import AbxDialog
-from app.window.controller import Controller
-from app.window.instruments import LOOK_MS
+from app.window.controller import LOOK_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 from engine.kernels.constants import AHEAD, QUANTUM

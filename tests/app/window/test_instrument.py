@@ -294,16 +294,16 @@ def test_a_patch_is_saved_renamed_compared_and_deleted(guitar: Window, named: Ca
     patches.change("knobs.decay", 6.0)
     patches.save()
     assert (read_patch(file).knobs.decay, read_patch(copy).knobs.decay) == (6.0, 5.0), "each by itself"
-    names = {patches.desk.step(1) or patches.entry.name for _ in range(patches.browser.total)}  # type: ignore[union-attr]
+    names = {patches.step(1) or patches.entry.name for _ in range(patches.browser.total)}  # type: ignore[union-attr]
     assert names == set(patches.browser.listed)
     copy.unlink()
     patches.choose("mine")
     patches.rename()
     assert not file.exists() and read_patch(own_patches() / "yours.json").name == "Yours"
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (False, True), "it is saved, and one's own"
-    assert "yours" in patches.desk.favourites and "mine" not in patches.desk.favourites
+    assert "yours" in patches.favourites and "mine" not in patches.favourites
     patches.delete("yours")
-    assert not list(own_patches().glob("*.json")) and "yours" not in patches.desk.favourites
+    assert not list(own_patches().glob("*.json")) and "yours" not in patches.favourites
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
 
 
@@ -312,7 +312,7 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_
     (keys,) = guitar.window.findChildren(PlayingKeys)
     keys.pressed.connect(pressed.append)
     guitar.wait(guitar.window.isActiveWindow)
-    patches.desk.toggle()
+    patches.toggle()
     browser = patches.browser
     guitar.key(KEY.Key_Down, on=browser.search)
     guitar.wait(browser.list.hasFocus)
@@ -418,8 +418,8 @@ def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_i
     dry: list[bool] = []
     monkeypatch.setattr(guitar.notes, "hear_dry", dry.append)
     guitar.change(a="model", b="difference", heard="b")
-    guitar.performance.hear_dry(True)
-    guitar.performance.hear_dry(False)  # a listening test has ended
+    guitar.performance.compare(True)
+    guitar.performance.compare(False)  # a listening test has ended
     guitar.change(heard="a")
     assert dry[-4:] == [True, True, True, False]
 

@@ -160,7 +160,7 @@ def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(
         assert getattr(lab.choices, field) == pytest.approx(value)
     for key, preset in ((KEY.Key_PageDown, "second"), (KEY.Key_PageUp, "first")):
         lab.key(key)
-        assert lab.choices.preset == lab.controller.entry.name == preset  # type: ignore[union-attr]
+        assert lab.choices.preset == lab.performance.entry.name == preset  # type: ignore[union-attr]
     lab.wait_for_take()
     plucks, words = list[float](), lab.controller.history.undo_words
     lab.controller.instruments.played.connect(lambda: plucks.append(lab.choices.position))
@@ -361,9 +361,9 @@ def sounding(
 
 
 def begun(w: Window) -> PluckVoices:
-    """A pluck that sounds."""
+    """A pluck that sounds, with the playhead."""
     note = w.pluck()
-    w.wait(lambda: note.seconds > 0)
+    w.wait(lambda: note.seconds > 0 and w.performance.moving)
     assert isinstance(note, PluckVoices)
     return note
 

@@ -65,7 +65,7 @@ def test_the_window_shows_without_the_engine_and_waits_for_its_parts(
     qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code = (
-        "import sys, app.window.main, app.window.main_window, app.window.appearance\n"
+        "import sys, app.window.main, app.window.main_window\n"
         "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
     )
     if sys.platform != "win32":  # there torch must come before Qt
@@ -420,7 +420,7 @@ def test_a_notice_is_read_whole_over_the_window_moves_nothing_and_is_dismissed_b
         assert settled() == bare and fits(window)
         for part in parts[:3]:
             assert not part.isVisible() or part.height() >= part.minimumSizeHint().height()
-        for desk in (lab.controller.presets, lab.controller.patches.desk):
+        for desk in (lab.controller.presets, lab.controller.patches):
             desk.toggle()
             browser = desk.browser
             lab.wait(lambda: browser.y() > notices.geometry().bottom())  # noqa: B023

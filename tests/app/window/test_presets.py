@@ -241,7 +241,7 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
 ) -> None:
     """The patch is heard in stereo, the recipe in mono; both are of the model of many strings."""
     guitar.change(pickup="displacement", stereo=True)
-    before, entry = guitar.choices, guitar.controller.entry
+    before, entry = guitar.choices, guitar.performance.entry
     assert entry is not None and entry.name == before.patch.preset
     export_sound(SoundRequest(load_preset(entry.path), Pluck(0.3, 2.0), 0.22, 0.6), tmp_path / "a.wav")
     guitar.drop(tmp_path / "a.wav")

@@ -1,0 +1,39 @@
+"""A panel with a curve of the sound of each source in the slots, the heard one on top, and a legend."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import pyqtgraph as pg
+
+from app.presets.library import Library
+from app.session.choices import Session
+from app.session.shown import DEFAULT_SOURCES, LEGEND_FIELDS, ShownSource, part_words, shown_sources
+from app.views.plots.axis_label import UprightLabel
+from app.views.plots.legend import Legend, set_curves
+from app.window.panels.base import Panel
+
+
+class CurvesPanel(Panel):
+    """Curves in `plot` by source; drums have them too."""
+
+    of_strings = False
+    every = 2
+    faint_alpha: ClassVar[int]  # of the curve that is not heard
+
+    def __init__(self, session: Session, library: Library, plot: pg.PlotWidget) -> None:
+        super().__init__(session, library)
+        self.plot, self.legend = plot, Legend(plot)
+        self._label = UprightLabel(plot.getPlotItem())
+        self._curves: dict[str, pg.PlotDataItem] = {}
+        plot.getPlotItem().showGrid(x=True, y=True, alpha=0.18)
+        self.set_sources(DEFAULT_SOURCES)
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if names & LEGEND_FIELDS:
+            self.set_sources(shown_sources(self.session.choices, self.library), part_words(self.session.choices))
+
+    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """Set the sources that are drawn; `part` says which part of the sound where it is not all."""
+        set_curves(self.plot.getPlotItem(), self._curves, sources, self.faint_alpha)
+        self.legend.show_sources(sources, part)
