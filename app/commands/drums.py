@@ -158,25 +158,15 @@ def render(
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
     arguments.check_suffix("OUT.wav", out, ".wav")
     blow = _blow_of(drum, key, velocity, place, preset)
-    from app.export.played import write_played
+    from app.export.played import Played, write_played
     from app.export.wav import WavSettings
     from app.instrument.events import NoteOn, TimedEvent
 
     events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
-    loaded = arguments.open_preset(blow.patch.preset)
+    loaded, played = arguments.open_preset(blow.patch.preset), Played(blow.patch, events, source)
     with progress(blow.patch.name) as report:
-        written = write_played(
-            out,
-            blow.patch,
-            loaded,
-            events,
-            "",
-            source,
-            WavSettings(bits, rate),
-            seconds,
-            lambda done_s: report(min(0.99, done_s / seconds)),
-        )
-    print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.level.peak_db:.1f} dBFS")
+        written = write_played(out, played, loaded, "", WavSettings(bits, rate), seconds, report)
+    print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.peak_db:.1f} dBFS")
 
 
 @drums.command()

@@ -55,28 +55,16 @@ def play(
     if problem := body_problem(patch):
         say(problem)
     loaded = arguments.open_preset(patch.preset)
-    from app.export.played import write_played
+    from app.export.played import Played, write_played
     from app.export.wav import WavSettings
-    from app.instrument.offline import LONGEST_TAIL_S
 
     began_s = time.monotonic()
-    whole_s = seconds if seconds is not None else song.length_s + LONGEST_TAIL_S / 10
     with progress(f"{midi.name} by {patch.name}") as report:
-        written = write_played(
-            out,
-            patch,
-            loaded,
-            song.events,
-            midi.name,
-            source,
-            WavSettings(bits, rate, normalise),
-            seconds,
-            lambda done_s: report(min(0.99, done_s / whole_s)),
-        )
-    if written.level.peak_db < SILENT_DB:
+        played, settings = Played(patch, song.events, source), WavSettings(bits, rate, normalise)
+        written = write_played(out, played, loaded, midi.name, settings, seconds, report)
+    if written.peak_db < SILENT_DB:
         say("note: the file is silent")
-    took_s, level = time.monotonic() - began_s, written.level
     print(
-        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
-        f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
+        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {time.monotonic() - began_s:.1f} s, "
+        f"peak {written.peak_db:.1f} dBFS, {written.clipped} samples clipped"
     )

@@ -5,24 +5,18 @@ The window and the command line both write through this module.
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from app.export.recipe import SoundRecipe
 from app.export.recording import SoundSamples
-from app.export.sound import (
-    Mixed,
-    SoundRequest,
-    Source,
-    render_voices,
-)
-from app.export.wav import Level, WavSettings, write_wav
+from app.export.sound import Mixed, SoundRequest, Source, render_voices
+from app.export.wav import WavSettings, WrittenSound, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.worker import Progress
 from engine.pluck import Pluck
@@ -33,30 +27,17 @@ DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
 
 @dataclass(frozen=True)
-class WavReport:
+class WavReport(WrittenSound):
     """The report of a WAV file that was written.
 
     Attributes:
-        peak_db: the largest sample in dBFS before any clipping; -inf for silence.
-        clipped: samples beyond full scale that were clipped; always 0 in floating point.
-        gain_db: the gain of normalising; 0 without.
         past_training_s: how much of the sound lies past the model's training horizon; 0 for the truth.
         decayed: False where the sound was to end by its decay but reached its longest duration first.
     """
 
     path: Path
-    frames: int
-    rate_hz: int
-    size_bytes: int
-    peak_db: float
-    clipped: int
-    gain_db: float
-    past_training_s: float = 0.0
-    decayed: bool = True
-
-    @property
-    def seconds(self) -> float:
-        return self.frames / self.rate_hz
+    past_training_s: float
+    decayed: bool
 
 
 def export_sound(
@@ -100,8 +81,7 @@ def export_sounds(
     """
     settings = settings_of(request, settings or WavSettings())
     requests = {source: replace(request, source=source) for source in paths}
-    instrument = request.through is not None or request.struck is not None
-    if instrument and "difference" in paths and len(paths) > 1:
+    if request.struck is not None and "difference" in paths and len(paths) > 1:
         raise ValueError("through an instrument, export the difference by itself")
     request = next(iter(requests.values()))
     info = request.preset.info
@@ -122,10 +102,9 @@ def export_sounds(
             path, sound = paths[source], sounds[source]
             with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
-                level = write_wav(file, sound, rate_hz, settings, tags, beside)
-            report = _report(path, file, len(sound), rate_hz, level)
-            past_s = 0.0 if source == "truth" else max(0.0, report.seconds - info.horizon_s)
-            reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
+                written = write_wav(file, sound, rate_hz, settings, tags, beside)
+            past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
+            reports.append(WavReport(*astuple(written), path, past_s, voices.ended))
     return reports
 
 
@@ -155,14 +134,8 @@ def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
 
 @contextmanager
 def _open_whole(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which appears at `path` when the block ends well."""
     with _explain_errors(path), whole_file(path) as file:
         yield file
-
-
-def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level) -> WavReport:
-    size = file.seek(0, io.SEEK_END)
-    return WavReport(path, frames, rate_hz, size, level.peak_db, level.clipped, level.gain_db)
 
 
 @contextmanager
