@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from app.audio.sound_file import UnreadableSound
 from app.export.sampled.levels import headroom_db
-from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource, Zone
+from app.export.sampled.plan import SampledPlan, SampledSource, Zone
 from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from app.patches.patch import Patch
     from engine.presets import Preset
+
+NoteRenderer = Callable[..., "NDArray[np.float32]"]
 
 SUFFIXES = (".sfz", ".sf2")
 LONGEST_STEM = 60
@@ -85,6 +86,10 @@ def export_sampled(
     """Render the samples of a plan and write OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
 
     Until all samples are rendered, nothing else is changed.
+
+    Args:
+        render: is called with patch, key, velocity, the time held, duration and rate, and `advanced`, a function of
+            the seconds rendered that may raise. Returns float32 (frames, channels), ±1 being full scale.
 
     Raises:
         ValueError: see `planned`.
@@ -165,16 +170,4 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     """Render notes of a patch by its model, or by the solved string of the same keys."""
     from app.instrument.offline import render_note  # compiled code, and torch
 
-    def rendered(
-        patch: Patch,
-        key: int,
-        velocity: int,
-        held_s: float,
-        seconds: float,
-        rate_hz: int,
-        *,
-        advanced: Callable[[float], None],
-    ) -> NDArray[np.float32]:
-        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced)
-
-    return rendered
+    return lambda patch, *note, advanced: render_note(patch, preset, *note, source, advanced)
