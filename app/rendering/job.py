@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor
-
 from app.rendering.line import SourceLine
-from app.rendering.loaded import Loaded
 from app.rendering.rendering import Rendering
-from app.rendering.request import RenderListener, RenderRequest
+from app.rendering.request import RenderRequest
 from app.rendering.strobe import Strobe
-from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Pictures, Take, picture_stride
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
@@ -27,25 +22,11 @@ class PluckJob(Rendering[RenderRequest, Take]):
     Requests for the same motion differ in listening points, slow motion or other presets.
     """
 
-    def __init__(
-        self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
-    ) -> None:
-        super().__init__(request, load, listener, helper)
-        self._lines: dict[str, SourceLine] = {}
-        self._strobe: Strobe | None = None
-        self._coming: Listened | None = None  # signals at new listening points, until they are complete
-        self._measured = 1  # pictures; the first is no prediction
-
-    def _seconds_of(self, take: Take) -> float:
-        return take.ready_frames / take.picture_hz
-
-    def _complete(self, take: Take) -> bool:
-        return take.complete and take.listened.complete
+    _strobe: Strobe | None = None
 
     def _satisfied(self, take: Take) -> bool:
         return (
-            self._coming is None
-            and take.listened.ear == self.request.ear
+            super()._satisfied(take)
             and self._strobe == self._wanted_strobe(take)
             and all(name in self._lines and self._lines[name].complete for name in self._source_names())
         )
@@ -55,12 +36,13 @@ class PluckJob(Rendering[RenderRequest, Take]):
         self._show(take)
         self._listen(take)
         self._advance_lines(take)
-        self._measure(take)
+        take.measure()
 
     def _begin(self) -> Take:
         request, loaded = self.request, self._load(self.request.preset)
         info, stride = loaded.preset.info, _stride(loaded.model)
         take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
+        self._lines: dict[str, SourceLine] = {}
         for name, source, program in (
             ("model", loaded.model, loaded.model_program),
             ("truth", loaded.truth, loaded.truth_program),
@@ -146,14 +128,6 @@ class PluckJob(Rendering[RenderRequest, Take]):
 
     def _source_names(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
-
-    def _measure(self, take: Take) -> None:
-        """Add the error of new pictures."""
-        first, stop = self._measured, take.ready_frames
-        if stop > first:
-            model, truth = (take.motions[name].read(first, stop)[None] for name in SOURCES)
-            take.errors.add(model, truth, first - 1, row=0)
-            self._measured = stop
 
 
 def _stride(model: ModelSource) -> int:

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Generic, TypeVar
 
-from app.rendering.blow import BlowRequest, BlowTake
+from app.rendering.blow import BlowRequest
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.subject import Subject
-from app.rendering.take import Take
+from app.rendering.take import Listened, Sounding
 
 Request = TypeVar("Request", RenderRequest, BlowRequest)
-Made = TypeVar("Made", Take, BlowTake)
+Made = TypeVar("Made", bound=Sounding)
 
 
 class Rendering(ABC, Generic[Request, Made]):
@@ -37,6 +37,7 @@ class Rendering(ABC, Generic[Request, Made]):
         self._load = load
         self._listener = listener
         self._helper = helper
+        self._coming: Listened | None = None  # signals at other listening points, until they are complete
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
@@ -59,7 +60,7 @@ class Rendering(ABC, Generic[Request, Made]):
     @property
     def rendered_s(self) -> float:
         """Seconds of the motion that are rendered."""
-        return 0.0 if self.take is None else self._seconds_of(self.take)
+        return 0.0 if self.take is None else self.take.ready_frames / self.take.frames_hz
 
     @property
     def idle(self) -> bool:
@@ -78,7 +79,7 @@ class Rendering(ABC, Generic[Request, Made]):
         self._continue(take)
         if begins:
             self._listener.take_started(take)
-        if not self._finished and self._complete(take):
+        if not self._finished and take.complete and take.listened.complete:
             self._finished = True
             self._listener.take_finished(take)
 
@@ -90,14 +91,6 @@ class Rendering(ABC, Generic[Request, Made]):
     def _continue(self, take: Made) -> None:
         """The next block of it."""
 
-    @abstractmethod
-    def _complete(self, take: Made) -> bool:
-        """Return True if motion, signals and errors are all there, for the first time."""
-
-    @abstractmethod
     def _satisfied(self, take: Made) -> bool:
         """Return True if a complete one is as the latest request has it."""
-
-    @abstractmethod
-    def _seconds_of(self, take: Made) -> float:
-        """The seconds of the motion that are rendered."""
+        return self._coming is None and take.listened.ear == self.request.ear

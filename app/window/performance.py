@@ -311,7 +311,7 @@ class Performance(QObject):
     def _take_finished(self, take: Take | BlowTake) -> None:
         if isinstance(take, BlowTake):
             if self._plays_drums and take is self._blows.shown.take:
-                self._show_error(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
+                self._show_error(f"Error of this blow: {percent(math.sqrt(take.error_course.rel_mse))} over the drum")
             return
         if take is not self.take or self._shown.finished:
             return
