@@ -31,7 +31,7 @@ class Spectrogram:
 
     def __init__(self, take: Sounding, listened: Listened) -> None:
         self.take, self.listened = take, listened
-        self._heard = {name: HeardSignal(listened, name) for name in SOURCES}
+        self._heard = {name: HeardSignal(listened.signals, name) for name in SOURCES}
         rate_hz = take.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP

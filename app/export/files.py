@@ -9,7 +9,7 @@ import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -104,7 +104,7 @@ def export_sounds(
                 tags = _tags(info.title, recipes[source])
                 written = write_wav(file, sound, rate_hz, settings, tags, beside)
             past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
-            reports.append(WavReport(*astuple(written), path, past_s, voices.ended))
+            reports.append(WavReport(**asdict(written), path=path, past_training_s=past_s, decayed=voices.ended))
     return reports
 
 

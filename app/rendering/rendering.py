@@ -8,14 +8,14 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Generic, TypeVar
 
-from app.rendering.blow import BlowRequest
+from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.subject import Subject
-from app.rendering.take import Listened, Sounding
+from app.rendering.take import Listened, Take
 
 Request = TypeVar("Request", RenderRequest, BlowRequest)
-Made = TypeVar("Made", bound=Sounding)
+Made = TypeVar("Made", Take, BlowTake)
 
 
 class Rendering(ABC, Generic[Request, Made]):

@@ -157,7 +157,7 @@ def _write_samples(
         path = folder / plan.file_name(zone)
         note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
         try:
-            sample = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)  # type: ignore[misc]
+            sample = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)
         except ValueError as error:
             raise WriteError(f"{path.name}: {error}") from error
         path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
@@ -170,4 +170,6 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     """Render notes of a patch by its model, or by the solved string of the same keys."""
     from app.instrument.offline import render_note  # compiled code, and torch
 
-    return lambda patch, *note, advanced: render_note(patch, preset, *note, source, advanced)
+    return lambda patch, key, velocity, held_s, seconds, rate_hz, *, advanced: render_note(
+        patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced
+    )

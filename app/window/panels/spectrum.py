@@ -175,7 +175,7 @@ class SpectrumPanel(Panel):
         if standing == self._standing:
             return
         self._standing = standing
-        signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        signals = [HeardSignal(take.listened.signals, s.source, s.gain) for s in shown_sources(choices, self.library)]
         rendered = [signal for signal in signals if signal.there]
         ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in rendered)
         drawn_state = (take.listened, ready, moment.position_s)

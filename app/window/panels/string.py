@@ -106,7 +106,7 @@ class StringPanel(StagePanel):
             self.view.show_frame(None)
             self._shown = ()
             return
-        motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
+        motions = [HeardMotion(take.motions, s.source, s.gain) for s in self._sources]
         rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
