@@ -28,7 +28,10 @@ InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displ
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
 Steps = Annotated[int, typer.Option(min=1, max=MOST_FRAMES, help="Frames after the initial one.")]
 STRING_KINDS = ("linear", "nonlinear")
-Solver = Literal["fast", "dop853"]
+SolverOption = Annotated[
+    Literal["fast", "dop853"],
+    typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against."),
+]
 LONGEST_S = 600.0  # the longest comparison
 
 
@@ -54,9 +57,7 @@ def simulate(
             help="Number of modes; default all below 20 kHz and half the rate, as many as the grid of U0 holds.",
         ),
     ] = None,
-    solver: Annotated[
-        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
-    ] = "fast",
+    solver: SolverOption = "fast",
     substeps: Annotated[
         int | None,
         typer.Option(

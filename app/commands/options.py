@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -33,6 +33,9 @@ Width = Annotated[float, _option("width", "X")]
 Listen = Annotated[float, _option("listen", "X")]
 ListenRight = Annotated[
     float | None, typer.Option(help="Listening point of a right channel; without it the file is mono.", metavar="X")
+]
+ModelOrTruth = Annotated[
+    Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
 ]
 GainDb = Annotated[float, typer.Option(metavar="DB", help="Gain of the difference.")]
 

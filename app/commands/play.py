@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from app.commands import options
 from app.commands.render import SILENT_DB, BitsOption
 from engine.plain_text import one_line
 from training.cli import arguments
@@ -22,9 +23,7 @@ def play(
         str, typer.Option(metavar="INSTRUMENT", help="An instrument's name, or the path of its file.")
     ],
     out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
-    source: Annotated[
-        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
-    ] = "model",
+    source: options.ModelOrTruth = "model",
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = DEFAULT_RATE_HZ,
     bits: BitsOption = "24",
     seconds: Annotated[

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from app.commands import options
 from app.shared.key_names import key_named
 from engine.plain_text import one_line
 from training.cli.console import Failure, progress, say
@@ -37,9 +38,7 @@ def sampled(
     bits: Annotated[
         Literal["16", "24"] | None, typer.Option(help="Of the samples of an SFZ; default 24. A SoundFont has 16.")
     ] = None,
-    source: Annotated[
-        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
-    ] = "model",
+    source: options.ModelOrTruth = "model",
     dry: Annotated[
         bool,
         typer.Option("--dry", help="Leave out the instrument's room, whose tail would end at each key's release."),

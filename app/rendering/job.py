@@ -42,13 +42,10 @@ class PluckJob(Rendering[RenderRequest, Take]):
         request, loaded = self.request, self._load(self.request.preset)
         info, stride = loaded.preset.info, _stride(loaded.model)
         take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-        self._lines: dict[str, SourceLine] = {}
-        for name, source, program in (
-            ("model", loaded.model, loaded.model_program),
-            ("truth", loaded.truth, loaded.truth_program),
-        ):
-            motion = take.motions[name]
-            self._lines[name] = SourceLine(source, program, info, request.pluck, motion, request.seconds, stride)
+        self._lines = {
+            "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
+            "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
+        }
         take.listened = self._listened(request.ear)
         return take
 
@@ -58,10 +55,8 @@ class PluckJob(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info = take.info
-            stride = take.stride
-            source = None
-            program = None
+            info, stride = take.info, take.stride
+            source = program = None
             try:
                 loaded = self._load(path)
                 source, program = loaded.model, loaded.model_program
@@ -69,7 +64,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
             motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(source, program, info, take.pluck, motion, take.seconds, stride)
+            line = self._lines[name] = SourceLine(take, source, program, motion, info, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened

@@ -90,6 +90,4 @@ def _recolour_item(item: Any, swap: _Swap) -> None:
         case pg.AxisItem():
             item.setPen(swap.pen(item.pen()))
             item.setTextPen(swap.pen(item.textPen()))
-        case pg.BarGraphItem():
-            item.setOpts(**{k: swap.brush(v) for k, v in item.opts.items() if k == "brush" and v is not None})
     item.update()
