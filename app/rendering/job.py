@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from app.rendering.line import SourceLine
-from app.rendering.rendering import Rendering
-from app.rendering.request import RenderRequest
+from app.rendering.rendering import Rendering, RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.take import SOURCES, Listened, Pictures, Take, picture_stride
 from app.shared.vocabulary import OTHER

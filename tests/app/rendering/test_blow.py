@@ -14,8 +14,8 @@ import torch
 from app.rendering import Take, blow_job
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, Head
 from app.rendering.blow_job import BlowJob
-from app.rendering.loaded import Loaded
 from app.rendering.strobe import FLASH_HZ
+from app.rendering.subject import Loaded
 from app.rendering.worker import RenderWorker
 from engine.presets import SHIPPED, PresetError, load_preset
 from engine.resonators.drum import DrumModes, modes_of
