@@ -171,12 +171,8 @@ def compare(
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     info = loaded.info
-    steps = round(seconds * info.rate_hz)
-    if steps < 1:
-        raise typer.BadParameter(
-            f"must hold a sample of {info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
-        )
-    facts = _comparison(loaded, pluck, steps)
+    options.check_shortest(seconds, info.rate_hz)
+    facts = _comparison(loaded, pluck, round(seconds * info.rate_hz))
     for warning in facts["warnings"]:
         say(f"warning: {warning}")
     if json:

@@ -56,3 +56,9 @@ def check_pluck(position: float, amplitude_mm: float, shape: PluckShape, width: 
     """The pluck of these options, whose ranges are checked."""
     check(position=position, amplitude_mm=amplitude_mm, width=width)
     return Pluck(position, amplitude_mm, shape, width)
+
+
+def check_shortest(seconds: float, rate_hz: int) -> None:
+    """Raise typer.BadParameter: `seconds` are less than one sample."""
+    if round(seconds * rate_hz) < 1:
+        raise typer.BadParameter(f"must hold a sample of {rate_hz} Hz, not {seconds:g} s", param_hint="--seconds")

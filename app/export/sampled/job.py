@@ -17,16 +17,16 @@ from app.export.sampled.plan import SampledPlan, SampledSource, Zone
 from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
+from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, number_of, pitch_words
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
+from engine.presets import Preset, load_preset
 from engine.result_file import WriteError, explain, replaceable, whole_file
 from engine.whole_file import working_folder
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from engine.presets import Preset
 
 NoteRenderer = Callable[..., "NDArray[np.float32]"]
 
@@ -173,3 +173,36 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     return lambda patch, key, velocity, held_s, seconds, rate_hz, *, advanced: render_note(
         patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced
     )
+
+
+@dataclass(frozen=True)
+class SampledExport:
+    """The export of an instrument for samplers. See `ExportJob`.
+
+    Attributes:
+        preset: the file of the preset that plays the patch.
+    """
+
+    plan: SampledPlan
+    out: Path
+    preset: Path
+
+    @property
+    def folder(self) -> Path:
+        return self.out.parent
+
+    def run(self, progress: Progress) -> str:
+        progress(0.0, "Loading the model")
+        plan = self.plan
+        report = export_sampled(
+            plan, self.out, note_renderer(load_preset(self.preset), plan.source), progress=progress
+        )
+        samples = f"{number_of(report.samples, 'sample')}, {megabytes(report.size_bytes)}"
+        alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_REPORTED_DB else ""
+        level = f"peak {report.peak_db:.1f} dBFS{alike}"
+        lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
+        lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]
+        return "\n".join(lines)
+
+    def cancelled(self) -> str:
+        return "nothing was written."
