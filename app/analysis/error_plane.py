@@ -59,10 +59,7 @@ class PlanePicture:
 def nearest_cell(position: float, amplitude_mm: float) -> tuple[int, int]:
     """Indices of the finest grid's point nearest to a pluck; the pluck may lie outside the grid."""
     amplitude_log = math.log(max(amplitude_mm, 1e-6))
-    return (
-        int(np.abs(POSITIONS - position).argmin()),
-        int(np.abs(np.log(AMPLITUDES_MM) - amplitude_log).argmin()),
-    )
+    return int(np.abs(POSITIONS - position).argmin()), int(np.abs(np.log(AMPLITUDES_MM) - amplitude_log).argmin())
 
 
 @dataclass

@@ -108,11 +108,7 @@ class _Range:
 
 
 def frame_at(
-    take: Take,
-    motions: Iterable[HeardMotion],
-    position_s: float,
-    speed: float,
-    envelope: Envelope | None = None,
+    take: Take, motions: Iterable[HeardMotion], position_s: float, speed: float, envelope: Envelope | None = None
 ) -> StringFrame:
     """The string of each motion at the playhead, as slow motion shows it.
 

@@ -70,17 +70,7 @@ def sampled(
         say(problem)
     preset_path = find_preset(patch.preset, usable_files())
     try:
-        plan = SampledPlan(
-            patch,
-            _keys(keys),
-            every,
-            layers,
-            seconds,
-            rate,
-            form or "flac",
-            bits or "24",
-            source,
-        )
+        plan = SampledPlan(patch, _keys(keys), every, layers, seconds, rate, form or "flac", bits or "24", source)
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

@@ -41,11 +41,7 @@ class WavReport(WrittenSound):
 
 
 def export_sound(
-    request: SoundRequest,
-    path: Path,
-    settings: WavSettings | None = None,
-    *,
-    progress: Progress = lambda *_: None,
+    request: SoundRequest, path: Path, settings: WavSettings | None = None, *, progress: Progress = lambda *_: None
 ) -> WavReport:
     """Render and write a WAV file, whole or not at all.
 

@@ -71,15 +71,7 @@ class ExportedPluck:
         if preset.info.family is not None and struck is None:  # it plays any string at any rate
             preset = of_string(preset, self.string, rate_hz or None)
         return SoundRequest(
-            preset,
-            self.pluck,
-            self.listen,
-            seconds,
-            source,
-            self.listen_right,
-            self.pickup,
-            struck=struck,
-            **more,
+            preset, self.pluck, self.listen, seconds, source, self.listen_right, self.pickup, struck=struck, **more
         )
 
     def compared(self, seconds: float, rate_hz: int) -> Mapping[str, NDArray[np.float32]]:
