@@ -117,10 +117,7 @@ class ErrorPlane:
 
 
 def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
-    """A function of plucks and a job that returns their relative MAEs (plucks,) over the preset's horizon.
-
-    They are infinite where the output is not finite.
-    """
+    """A function of plucks and a job: relative MAEs (plucks,) over the trained horizon, infinite where not finite."""
     import torch
 
     from engine.truth import default_substeps

@@ -49,10 +49,7 @@ class StringFrame:
 
 
 class Envelope:
-    """The range of motion within the last second of a take.
-
-    It is kept by blocks, so that each frame is read only once.
-    """
+    """The range of motion within the last second of a take, kept by blocks: each frame is read only once."""
 
     def __init__(self) -> None:
         self._ranges: dict[str, _Range] = {}

@@ -16,10 +16,7 @@ BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next
 
 
 class PluckJob(Rendering[RenderRequest, Take]):
-    """The rendering of a pluck.
-
-    Requests for the same motion differ in listening points, slow motion or other presets.
-    """
+    """The rendering of a pluck; requests for one motion differ in listening points, slow motion or other presets."""
 
     _strobe: Strobe | None = None
 
@@ -103,10 +100,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take) -> None:
-        """Render a block of model and truth, and others up to its end.
-
-        The model is rendered here, the rest in the helper.
-        """
+        """Render a block of the model here, of the truth in the helper, and there others up to its end."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
         most = BLOCK_FRAMES * truth.stride

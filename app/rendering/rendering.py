@@ -37,10 +37,7 @@ class RenderRequest:
     others: tuple[Path, ...] = ()
 
     def same_motion(self, other: object) -> bool:
-        """Return True if model and truth move alike.
-
-        Only listening points, slow motion or other presets may differ.
-        """
+        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
         return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,

@@ -121,7 +121,7 @@ class StageView(QWidget):
             self._hover(None)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """With Shift arrows move a listening point, and Delete resets them; other keys are the picture's."""
+        """Move a listening point by Shift with arrows, reset them by Shift with Delete; others are the picture's."""
         key, modifiers = Qt.Key(event.key()), event.modifiers()
         across, up = ARROWS.get(key, (0, 0))
         if across and modifiers & Qt.KeyboardModifier.ShiftModifier:
