@@ -157,12 +157,11 @@ def _write_samples(
         path = folder / plan.file_name(zone)
         note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
         try:
-            sample = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)
+            sound, stored = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)
         except ValueError as error:
             raise WriteError(f"{path.name}: {error}") from error
-        path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
-        frames, channels = sample.sound.shape
-        stored_samples[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
+        path.write_bytes(encoded(sound, plan.rate_hz, plan.format, plan.bits))
+        stored_samples[zone] = replace(stored, level_db=round(stored.level_db, 3))
     return stored_samples
 
 
