@@ -178,10 +178,10 @@ def _render_again(file: Path, out: Path | None) -> None:
 
 
 def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
-    from app.export.files import export_sound
+    from app.export.files import export_sounds
 
     with progress("render") as report:
-        written = export_sound(request, out, settings, progress=report)
+        (written,) = export_sounds(request, {request.source: out}, settings, progress=report)
     for note in _notes(request, written):  # after the work, so that a failure is the only line
         say(note)
     if written.peak_db < SILENT_DB:

@@ -40,25 +40,10 @@ class WavReport(WrittenSound):
     decayed: bool
 
 
-def export_sound(
-    request: SoundRequest, path: Path, settings: WavSettings | None = None, *, progress: Progress = lambda *_: None
-) -> WavReport:
-    """Render and write a WAV file, whole or not at all.
-
-    Raises:
-        WriteError: the file cannot be written.
-        PresetError: the preset's file cannot be read any more.
-        Cancelled: `progress` raised it; no file is left.
-        Runaway: the model's output grew without bound or is not finite.
-    """
-    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress)
-    return report
-
-
 def export_sounds(
     request: SoundRequest,
     paths: Mapping[Source, Path],
-    settings: WavSettings | None = None,
+    settings: WavSettings,
     *,
     progress: Progress = lambda *_: None,
 ) -> list[WavReport]:
@@ -73,9 +58,13 @@ def export_sounds(
         The reports in the order of `paths`.
 
     Raises:
-        As `export_sound`.
+        WriteError: a file cannot be written; none is left.
+        PresetError: the preset's file cannot be read any more.
+        Cancelled: `progress` raised it; no file is left.
+        Runaway: the model's output grew without bound or is not finite.
     """
-    settings = settings_of(request, settings or WavSettings())
+    if request.decay_db is not None:  # it ends by its decay, behind a longer fade-out
+        settings = replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
     requests = {source: replace(request, source=source) for source in paths}
     if request.struck is not None and "difference" in paths and len(paths) > 1:
         raise ValueError("through an instrument, export the difference by itself")
@@ -102,13 +91,6 @@ def export_sounds(
             past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
             reports.append(WavReport(**asdict(written), path=path, past_training_s=past_s, decayed=voices.ended))
     return reports
-
-
-def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
-    """The settings with the longer fade-out of a sound that ends by its decay."""
-    if request.decay_db is None:
-        return settings
-    return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:

@@ -14,7 +14,6 @@ import soundfile
 from app.export import sound
 from app.export.files import (
     default_file_name,
-    export_sound,
     export_sounds,
 )
 from app.export.recipe import SoundRecipe
@@ -34,7 +33,7 @@ from engine.values.ear import Ear
 from engine.voices import Mixer, Voice, model_program, offline, truth_program
 from engine.voices.ear import weights_of
 from engine.voices.voice import ATTACK_S
-from tests.app.sounds import render_sound
+from tests.app.sounds import export_sound, render_sound
 
 PLAIN = WavSettings("32f", fade_out_s=0)
 

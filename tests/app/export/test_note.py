@@ -10,7 +10,6 @@ import pytest
 import soundfile
 
 from app.export.choices import ExportChoices
-from app.export.files import export_sound
 from app.export.note import ExportedPluck, HeardNote, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
 from app.export.sound import SoundRequest
@@ -25,6 +24,7 @@ from engine.presets import SHIPPED, load_preset
 from engine.sources import ModelSource
 from engine.values.ear import Ear
 from engine.voices import model_program, voice_blocks
+from tests.app.sounds import export_sound
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")
