@@ -110,7 +110,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
     ready = envelopes.ready if detail == "envelope" else take.ready_frames
     first = int(times_s[0] * rate_hz) // stride
     last = int(np.ceil(times_s[1] * rate_hz / stride)) + 1
-    edges = np.arange(first, last + 1) if last - first <= columns else _edges(first, last, columns)
+    edges = np.linspace(first, last, min(last - first, columns) + 1).astype(np.int64)
     edges = edges[edges <= ready]  # only whole columns, so that what has been drawn does not change
     if len(edges) < 2:
         return None
@@ -130,10 +130,6 @@ def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail
     if column_s * take.frames_hz <= 1:
         return "frames"
     return "extremes" if column_s * take.fundamental_hz <= LARGEST_SHARE else "envelope"
-
-
-def _edges(first: int, last: int, columns: int) -> NDArray[np.int64]:
-    return np.linspace(first, last, columns + 1).astype(np.int64)
 
 
 def _extremes(motion: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:

@@ -89,7 +89,9 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
     with whole_file(path) as file:
         npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         for block in blocks:
-            file.write(_check_finite(block).astype("<f8").tobytes())
+            if not np.isfinite(block).all():
+                raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
+            file.write(block.astype("<f8").tobytes())
             done += block.size
             report(done / math.prod(shape))
 
@@ -117,9 +119,3 @@ def _load(path: Path) -> np.ndarray:
     if not isinstance(array, np.ndarray):
         raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")
     return array
-
-
-def _check_finite(block: Array) -> Array:
-    if not np.isfinite(block).all():
-        raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
-    return block

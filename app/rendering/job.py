@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from app.rendering.line import SourceLine
 from app.rendering.rendering import Rendering, RenderRequest
 from app.rendering.strobe import Strobe
-from app.rendering.take import SOURCES, Listened, Pictures, Take, picture_stride
+from app.rendering.take import SOURCES, Listened, Pictures, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
 from engine.sources import ModelSource
 from engine.values.ear import Ear
 
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
@@ -120,4 +123,4 @@ class PluckJob(Rendering[RenderRequest, Take]):
 
 def _stride(model: ModelSource) -> int:
     """Samples between pictures; 1 for a model that must step through every frame, which are then all kept."""
-    return picture_stride(model.rate_hz) if model.any_frame else 1
+    return math.ceil(model.rate_hz / PICTURE_HZ) if model.any_frame else 1

@@ -22,14 +22,8 @@ from engine.sources import StringSource
 from engine.values.ear import Ear
 
 SOURCES = ("model", "truth")
-PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 WINDOW_PERIODS = 2.0  # of the fundamental, in which errors are measured: shorter windows would show its phase
 _TINY = 1e-6  # of a frame: tolerance for rounding
-
-
-def picture_stride(rate_hz: int) -> int:
-    """Samples between two pictures."""
-    return math.ceil(rate_hz / PICTURE_HZ)
 
 
 class FrameSeries:
