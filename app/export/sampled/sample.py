@@ -63,7 +63,7 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> tuple[NDArray[np.
     peak = float(level.max())
     if peak <= 10 ** (INAUDIBLE_DBFS / 20):
         silence = np.zeros((FEWEST_FRAMES, sound.shape[1]))
-        return silence, StoredSample(*silence.shape, 0.0, INAUDIBLE_DBFS)
+        return silence, StoredSample(len(silence), sound.shape[1], 0.0, INAUDIBLE_DBFS)
     audible_frames = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
     end = audible_frames + round(END_FADE_S * rate_hz)
     cut = end > len(sound)
@@ -74,7 +74,7 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> tuple[NDArray[np.
     gain_db = math.floor(100 * (PEAK_DBFS - 20 * math.log10(peak))) / 100
     sound = faded_out(sound, fade) * 10 ** (gain_db / 20)
     sound = np.pad(sound, ((0, max(0, FEWEST_FRAMES - len(sound))), (0, 0)))
-    return sound, StoredSample(*sound.shape, gain_db, level_db, cut)
+    return sound, StoredSample(len(sound), sound.shape[1], gain_db, level_db, cut)
 
 
 def encoded(sound: NDArray[np.float64], rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
