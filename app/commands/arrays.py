@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -96,10 +97,11 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
             report(done / math.prod(shape))
 
 
-def blocks_of(steps: int) -> Iterator[int]:
-    """The lengths of the blocks of at most `FRAMES_AT_ONCE` frames that make up `steps`."""
+def blocks_of(advance: Callable[[Any, int], tuple[Array, Any]], state: Any, steps: int) -> Iterator[Array]:
+    """The next `steps` frames, in blocks of at most `FRAMES_AT_ONCE`, that `advance` makes from a state."""
     for first in range(0, steps, FRAMES_AT_ONCE):
-        yield min(FRAMES_AT_ONCE, steps - first)
+        block, state = advance(state, min(FRAMES_AT_ONCE, steps - first))
+        yield block
 
 
 def _load(path: Path) -> np.ndarray:

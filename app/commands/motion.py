@@ -224,15 +224,13 @@ def _error_sums(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
     info = preset.info
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
-    model, truth = ModelSource(preset), TruthSource(info)
-    model_state, truth_state = model.start(initial), truth.start(initial)
+    sources = ModelSource(preset), TruthSource(info)
+    motions = (arrays.blocks_of(source.advance, source.start(initial), steps) for source in sources)
     sums, done = ErrorSums(steps), 0
     with progress("compare") as report:
-        for count in arrays.blocks_of(steps):
-            predicted, model_state = model.advance(model_state, count)
-            true, truth_state = truth.advance(truth_state, count)
+        for predicted, true in zip(*motions, strict=True):
             sums.add(predicted, true, first=done)
-            done += count
+            done += true.shape[1]
             report(done / steps)
     return sums
 
@@ -260,8 +258,7 @@ def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps
     def motion(initial: Array) -> Iterator[Array]:
         state = ModalState.at_rest(resonator.to_modes(initial))
         yield resonator.to_grid(state.amplitude[:, None])
-        for count in blocks_of(steps):
-            amplitudes, state = solver.advance(state, count)
+        for amplitudes in blocks_of(solver.advance, state, steps):
             yield resonator.to_grid(amplitudes)
 
     return motion
@@ -300,9 +297,6 @@ def _predicted_motion(preset: Preset, steps: int) -> Motion:
     def motion(initial: Array) -> Iterator[Array]:
         start = project(initial, preset.info.modes)
         yield start[:, None]
-        state = source.start(start)
-        for count in blocks_of(steps):
-            frames, state = source.advance(state, count)
-            yield frames
+        yield from blocks_of(source.advance, source.start(start), steps)
 
     return motion

@@ -56,7 +56,7 @@ def sampled(
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
     from engine.folders import usable_files
-    from engine.presets import find_preset
+    from engine.presets import find_preset, load_preset
 
     soundfont = out.suffix.lower() == ".sf2"
     if soundfont and (form or bits):
@@ -81,11 +81,8 @@ def sampled(
     if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
     say(f"{words}; {pitch}")
-    from engine.presets import load_preset
-
-    render = note_renderer(load_preset(preset_path), source)
     with progress("sampled") as report:
-        written = export_sampled(plan, out, render, progress=report)
+        written = export_sampled(plan, out, note_renderer(load_preset(preset_path), source), progress=report)
     for note in notes(plan, written, "--dry leaves"):
         say(f"note: {note}")
     print(f"{one_line(str(out))}: {written.samples} samples, {megabytes(written.size_bytes)}; {pitch}")
