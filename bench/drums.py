@@ -109,7 +109,8 @@ def measured_modes() -> tuple[MeasuredMode, ...]:
     found = []
     for name, measured in MEASURED_HZ.items():
         modes = drum_of(str(DRUM_FILES / f"{name}.toml"), None)[1].modes
-        computed = {(m, n): hz for m, n, hz, *_ in reversed(mode_rows(modes, MODES_COMPARED))}  # of a pair the lower
+        rows = reversed([*mode_rows(modes, MODES_COMPARED)])
+        computed = {(row["m"], row["n"]): row["hz"] for row in rows}  # of a pair the lower
         found += [MeasuredMode(name, f"({m},{n})", hz, computed[m, n]) for (m, n), hz in measured.items()]
     return tuple(found)
 

@@ -83,7 +83,7 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
         moved.append(_finish(job))
     moved_s, moved_wall_s = map(min, zip(*moved, strict=True))
     megabytes = take.bytes("model") / MEGABYTE
-    return TakeCost(path.stem, SECONDS, take.picture_hz, rendered_s, megabytes, moved_s, moved_wall_s)
+    return TakeCost(path.stem, SECONDS, take.frames_hz, rendered_s, megabytes, moved_s, moved_wall_s)
 
 
 def _finish(job: PluckJob) -> tuple[float, float]:

@@ -125,7 +125,7 @@ def _compare_one(
     work_s = 0.0
     note = ""
     try:
-        _warm_up(source, basis, info)
+        source.advance(source.start(_initial(basis, info)), WARM_UP_FRAMES)
         for predicted, spent_s in _frames(source, basis, info, job):
             block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
             predicted = predicted.astype(np.float32)
@@ -164,10 +164,6 @@ def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> I
         block, state = source.advance(state, min(FRAMES_AT_ONCE, steps - first))
         yield block, time.thread_time() - started_s
         job.check()
-
-
-def _warm_up(source: StringSource, basis: Basis, info: PresetInfo) -> None:
-    source.advance(source.start(_initial(basis, info)), WARM_UP_FRAMES)
 
 
 def _initial(basis: Basis, info: PresetInfo) -> NDArray[np.float64]:

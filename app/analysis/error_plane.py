@@ -59,10 +59,7 @@ class PlanePicture:
 def nearest_cell(position: float, amplitude_mm: float) -> tuple[int, int]:
     """Indices of the finest grid's point nearest to a pluck; the pluck may lie outside the grid."""
     amplitude_log = math.log(max(amplitude_mm, 1e-6))
-    return (
-        int(np.abs(POSITIONS - position).argmin()),
-        int(np.abs(np.log(AMPLITUDES_MM) - amplitude_log).argmin()),
-    )
+    return int(np.abs(POSITIONS - position).argmin()), int(np.abs(np.log(AMPLITUDES_MM) - amplitude_log).argmin())
 
 
 @dataclass
@@ -120,10 +117,7 @@ class ErrorPlane:
 
 
 def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
-    """A function of plucks and a job that returns their relative MAEs (plucks,) over the preset's horizon.
-
-    They are infinite where the output is not finite.
-    """
+    """A function of plucks and a job: relative MAEs (plucks,) over the trained horizon, infinite where not finite."""
     import torch
 
     from engine.truth import default_substeps

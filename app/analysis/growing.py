@@ -22,10 +22,6 @@ class Growing(Protocol):
 
 
 def keep_up(growing: Growing, job: Job) -> None:
-    """Compute all results as the take grows.
-
-    Raises:
-        Cancelled: they are no longer wanted.
-    """
+    """Compute all results as the take grows. Raises Cancelled: they are no longer wanted."""
     while not growing.complete:
         job.wait(0.0 if growing.advance() else LOOK_AGAIN_S)

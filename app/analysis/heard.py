@@ -14,35 +14,30 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering import SOURCES, Take
+from app.rendering import SOURCES
 from app.rendering.strobe import Strobe
-from app.rendering.take import Listened, Pictures, Signal
+from app.rendering.take import Pictures, Signal
 from app.shared.vocabulary import DIFFERENCE
 
-Owner = TypeVar("Owner", Take, Listened)
 Each = TypeVar("Each", Pictures, Signal)
 
 
 @dataclass(frozen=True)
-class _Heard(Generic[Owner, Each]):
+class _Heard(Generic[Each]):
     """A source of a take, times `gain`."""
 
-    of: Owner
+    by_source: Mapping[str, Each]
     source: str
     gain: float = 1.0
 
-    @property
-    def _by_source(self) -> Mapping[str, Each]:
-        raise NotImplementedError
-
     @cached_property
     def _series(self) -> list[Each]:
-        return [self._by_source[name] for name in _parts(self.source)]
+        return [self.by_source[name] for name in _parts(self.source)]
 
     @property
     def there(self) -> bool:
         """Return True if any of it has been rendered; another preset's model may begin after the take."""
-        return all(name in self._by_source for name in _parts(self.source)) and self.ready > 0
+        return all(name in self.by_source for name in _parts(self.source)) and self.ready > 0
 
     @property
     def rate_hz(self) -> float:
@@ -64,12 +59,8 @@ class _Heard(Generic[Owner, Each]):
         return _subtract_parts([series.read(first, stop) for series in self._series], self.gain)
 
 
-class HeardMotion(_Heard[Take, Pictures]):
-    """Displacement of a source on its grid in m, at its own rate of pictures."""
-
-    @property
-    def _by_source(self) -> Mapping[str, Pictures]:
-        return self.of.motions
+class HeardMotion(_Heard[Pictures]):
+    """Displacement of a source on its grid in m, at its own rate of pictures: of the motions of a take."""
 
     @property
     def grid_points(self) -> int:
@@ -84,12 +75,8 @@ class HeardMotion(_Heard[Take, Pictures]):
         return [motion.strobe_at(position_s) for motion in self._series]
 
 
-class HeardSignal(_Heard[Listened, Signal]):
-    """The signal that a pick-up senses of a source at the listening points, in m or m/s."""
-
-    @property
-    def _by_source(self) -> Mapping[str, Signal]:
-        return self.of.signals
+class HeardSignal(_Heard[Signal]):
+    """The signal that a pick-up senses of a source at the listening points, in m or m/s: of those of a take."""
 
     @property
     def rate_hz(self) -> int:

@@ -49,10 +49,7 @@ class StringFrame:
 
 
 class Envelope:
-    """The range of motion within the last second of a take.
-
-    It is kept by blocks, so that each frame is read only once.
-    """
+    """The range of motion within the last second of a take, kept by blocks: each frame is read only once."""
 
     def __init__(self) -> None:
         self._ranges: dict[str, _Range] = {}
@@ -108,11 +105,7 @@ class _Range:
 
 
 def frame_at(
-    take: Take,
-    motions: Iterable[HeardMotion],
-    position_s: float,
-    speed: float,
-    envelope: Envelope | None = None,
+    take: Take, motions: Iterable[HeardMotion], position_s: float, speed: float, envelope: Envelope | None = None
 ) -> StringFrame:
     """The string of each motion at the playhead, as slow motion shows it.
 

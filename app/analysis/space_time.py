@@ -64,7 +64,7 @@ class Envelopes:
 
     def __init__(self, take: Take) -> None:
         self.take = take
-        self.stride = max(round(STRIDE_S * take.picture_hz), 1)  # pictures
+        self.stride = max(round(STRIDE_S * take.frames_hz), 1)  # pictures
         self.ready = 0
         columns = take.frames // self.stride  # the rest at the end, below a millisecond, is left out
         self._largest_m = {name: np.empty((columns, take.info.grid_points), np.float32) for name in QUANTITIES}
@@ -95,7 +95,7 @@ class Envelopes:
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
         """The 1.5-fold median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
-        column_s = self.stride / self.take.picture_hz
+        column_s = self.stride / self.take.frames_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]
         return 1.5 * float(np.median(peaks_m)) if len(peaks_m) else 0.0
@@ -104,13 +104,13 @@ class Envelopes:
 def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], columns: int) -> Picture | None:
     """The image of `times_s` as far as it is ready, in about `columns` columns; None where nothing is."""
     take = envelopes.take
-    rate_hz = take.picture_hz
+    rate_hz = take.frames_hz
     detail = detail_for(take, times_s, columns)
     stride = envelopes.stride if detail == "envelope" else 1
     ready = envelopes.ready if detail == "envelope" else take.ready_frames
     first = int(times_s[0] * rate_hz) // stride
     last = int(np.ceil(times_s[1] * rate_hz / stride)) + 1
-    edges = np.arange(first, last + 1) if last - first <= columns else _edges(first, last, columns)
+    edges = np.linspace(first, last, min(last - first, columns) + 1).astype(np.int64)
     edges = edges[edges <= ready]  # only whole columns, so that what has been drawn does not change
     if len(edges) < 2:
         return None
@@ -127,13 +127,9 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
 def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
     """The detail of a column where `times_s` is drawn in so many columns."""
     column_s = (times_s[1] - times_s[0]) / columns
-    if column_s * take.picture_hz <= 1:
+    if column_s * take.frames_hz <= 1:
         return "frames"
     return "extremes" if column_s * take.fundamental_hz <= LARGEST_SHARE else "envelope"
-
-
-def _edges(first: int, last: int, columns: int) -> NDArray[np.int64]:
-    return np.linspace(first, last, columns + 1).astype(np.int64)
 
 
 def _extremes(motion: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:

@@ -31,7 +31,7 @@ class Spectrogram:
 
     def __init__(self, take: Sounding, listened: Listened) -> None:
         self.take, self.listened = take, listened
-        self._heard = {name: HeardSignal(listened, name) for name in SOURCES}
+        self._heard = {name: HeardSignal(listened.signals, name) for name in SOURCES}
         rate_hz = take.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
@@ -56,7 +56,8 @@ class Spectrogram:
         return self.take.rate_hz / self.window_frames
 
     def advance(self) -> bool:
-        count = min(self._ready_columns() - self.ready, COLUMNS_AT_A_TIME)
+        rendered = self._columns_of(min(signal.ready for signal in self._heard.values()))
+        count = min(rendered - self.ready, COLUMNS_AT_A_TIME)
         if count <= 0:
             return False
         model, truth = (self._transforms(name, count) for name in ("model", "truth"))
@@ -66,11 +67,8 @@ class Spectrogram:
         self.ready += count
         return True
 
-    def _ready_columns(self) -> int:
-        """The number of columns whose window is rendered to its end."""
-        return self._columns_of(min(signal.ready for signal in self._heard.values()))
-
     def _columns_of(self, frames: int) -> int:
+        """The number of columns whose window lies in so many frames."""
         half = self.window_frames // 2
         return (frames - half - 1) // self.hop + 1 if frames > half else 0
 

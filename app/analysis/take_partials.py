@@ -67,13 +67,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
         return {}
     block = max(1, FRAMES_AT_ONCE // length) * length
     tracks, first = [], 0
-    true = true_phasors(
-        info.resonator,
-        _initial(take.pluck, info.grid_points, info.modes),
-        info.rate_hz,
-        last,
-        block,
-    )
+    true = true_phasors(info.resonator, _initial(take.pluck, info.grid_points, info.modes), info.rate_hz, last, block)
     for truth, model in zip(true, _model_modes(take, last, block), strict=True):
         tracks.append(track_partials(model, truth, length))
         first += truth.shape[1]

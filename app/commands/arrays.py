@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -89,15 +90,18 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
     with whole_file(path) as file:
         npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         for block in blocks:
-            file.write(_check_finite(block).astype("<f8").tobytes())
+            if not np.isfinite(block).all():
+                raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
+            file.write(block.astype("<f8").tobytes())
             done += block.size
             report(done / math.prod(shape))
 
 
-def blocks_of(steps: int) -> Iterator[int]:
-    """The lengths of the blocks of at most `FRAMES_AT_ONCE` frames that make up `steps`."""
+def blocks_of(advance: Callable[[Any, int], tuple[Array, Any]], state: Any, steps: int) -> Iterator[Array]:
+    """The next `steps` frames, in blocks of at most `FRAMES_AT_ONCE`, that `advance` makes from a state."""
     for first in range(0, steps, FRAMES_AT_ONCE):
-        yield min(FRAMES_AT_ONCE, steps - first)
+        block, state = advance(state, min(FRAMES_AT_ONCE, steps - first))
+        yield block
 
 
 def _load(path: Path) -> np.ndarray:
@@ -117,9 +121,3 @@ def _load(path: Path) -> np.ndarray:
     if not isinstance(array, np.ndarray):
         raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")
     return array
-
-
-def _check_finite(block: Array) -> Array:
-    if not np.isfinite(block).all():
-        raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
-    return block

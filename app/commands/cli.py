@@ -16,17 +16,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import (
-    drums,
-    info,
-    learn,
-    listing,
-    motion,
-    play,
-    plugin,
-    render,
-    sampled,
-)
+from app.commands import drums, info, learn, listing, motion, play, plugin, render, sampled
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -47,8 +37,7 @@ cli = typer.Typer(
 
 @cli.callback()
 def start(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
 ) -> None:
     """Play learned strings, compare them with the physics, and export them as WAV.
 

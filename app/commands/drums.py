@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.motion import Solver
+from app.commands.motion import SolverOption
 from app.commands.render import BitsOption
 from app.shared.vocabulary import PlayedSource
 from engine.bounds import MOST_FRAMES
@@ -18,8 +20,6 @@ from training.cli.arguments import Json
 from training.cli.console import Failure, ProgressReport, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from app.commands.arrays import Array
     from app.instrument.drum_keys import DrumKey
     from app.patches.patch import Patch
@@ -73,10 +73,7 @@ def modes(
     drum_modes = drum_key.modes
     drops = {str(velocity): drum_key.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
     facts = {"modes": len(drum_modes), "hardest_m_s": drum_key.played.hardest_m_s, "drop_cents": drops}
-    rows = [
-        {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
-        for m, n, hz, t60, mass in mode_rows(drum_modes, min(count, len(drum_modes)))
-    ]
+    rows = [*mode_rows(drum_modes, min(count, len(drum_modes)))]
     if json:
         print_json({**facts, "lowest": rows})
         return
@@ -99,9 +96,7 @@ def simulate(
     rate: Rate = 48_000,
     points: Points = 33,
     linear: Annotated[bool, typer.Option("--linear", help="Without tension modulation.")] = False,
-    solver: Annotated[
-        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
-    ] = "fast",
+    solver: SolverOption = "fast",
 ) -> None:
     """Simulate the motion of a struck drum by the physics.
 
@@ -158,25 +153,15 @@ def render(
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
     arguments.check_suffix("OUT.wav", out, ".wav")
     blow = _blow_of(drum, key, velocity, place, preset)
-    from app.export.played import write_played
+    from app.export.played import Played, write_played
     from app.export.wav import WavSettings
     from app.instrument.events import NoteOn, TimedEvent
 
     events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
-    loaded = arguments.open_preset(blow.patch.preset)
+    loaded, played = arguments.open_preset(blow.patch.preset), Played(blow.patch, events, source)
     with progress(blow.patch.name) as report:
-        written = write_played(
-            out,
-            blow.patch,
-            loaded,
-            events,
-            "",
-            source,
-            WavSettings(bits, rate),
-            seconds,
-            lambda done_s: report(min(0.99, done_s / seconds)),
-        )
-    print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.level.peak_db:.1f} dBFS")
+        written = write_played(out, played, loaded, "", WavSettings(bits, rate), seconds, report)
+    print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.peak_db:.1f} dBFS")
 
 
 @drums.command()
@@ -318,15 +303,8 @@ def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressR
     from engine.truth import ModalState, solve_dop853
 
     state = ModalState(*(torch.from_numpy(part)[None] for part in (struck_drum.amplitudes_m, struck_drum.speeds_m_s)))
-    amplitudes = solve_dop853(struck_drum.resonator, state, rate_hz, steps, report=report)[0, 1:]
-    first = 0
-
-    def following(count: int) -> Tensor:
-        nonlocal first
-        first += count
-        return amplitudes[first - count : first]
-
-    return following
+    rows = iter(solve_dop853(struck_drum.resonator, state, rate_hz, steps, report=report)[0, 1:])
+    return lambda count: torch.stack([*islice(rows, count)])
 
 
 def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, report: ProgressReport) -> None:
@@ -362,11 +340,8 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
     arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
-def mode_rows(drum_modes: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
-    """Return m, n, frequency in Hz, T60 in s and the relative mass with air of the lowest modes."""
-    import math
-
-    rows = []
+def mode_rows(drum_modes: DrumModes, count: int) -> Iterator[dict[str, float]]:
+    """The lowest modes; `air_mass`: with air, relative to that without."""
     circles = dict[tuple[int, int], int]()
     surface = drum_modes.surface
     for place in range(count):
@@ -374,6 +349,5 @@ def mode_rows(drum_modes: DrumModes, count: int) -> list[tuple[int, int, float, 
         m, n = int(surface.m[place]), int(surface.n[place])
         if surface.round:
             circles[m, n] = n = circles.get((m, n), 0) + 1
-        t60_s = math.log(1000) / max(sigma, 1e-9)
-        rows.append((m, n, omega / math.tau, t60_s, float(drum_modes.scale[place]) ** -2))
-    return rows
+        decay = {"hz": omega / math.tau, "t60_s": math.log(1000) / max(sigma, 1e-9)}
+        yield {"m": m, "n": n, **decay, "air_mass": float(drum_modes.scale[place]) ** -2}

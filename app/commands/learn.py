@@ -58,12 +58,7 @@ def learn(
         require_found(learned)
     kept = keep(name, learned, instrument)
     if json:
-        files = {
-            "preset": str(kept.preset),
-            "patch": str(kept.patch),
-            "body": str(kept.body),
-            "report": str(kept.report),
-        }
+        files = {name: str(getattr(kept, name)) for name in ("preset", "patch", "body", "report")}
         print_json({**files, "recordings": [as_data(recording) for recording in learned]})
         return
     for recording in learned:

@@ -28,7 +28,10 @@ InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displ
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
 Steps = Annotated[int, typer.Option(min=1, max=MOST_FRAMES, help="Frames after the initial one.")]
 STRING_KINDS = ("linear", "nonlinear")
-Solver = Literal["fast", "dop853"]
+SolverOption = Annotated[
+    Literal["fast", "dop853"],
+    typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against."),
+]
 LONGEST_S = 600.0  # the longest comparison
 
 
@@ -54,9 +57,7 @@ def simulate(
             help="Number of modes; default all below 20 kHz and half the rate, as many as the grid of U0 holds.",
         ),
     ] = None,
-    solver: Annotated[
-        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
-    ] = "fast",
+    solver: SolverOption = "fast",
     substeps: Annotated[
         int | None,
         typer.Option(
@@ -170,12 +171,8 @@ def compare(
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     info = loaded.info
-    steps = round(seconds * info.rate_hz)
-    if steps < 1:
-        raise typer.BadParameter(
-            f"must hold a sample of {info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
-        )
-    facts = _comparison(loaded, pluck, steps)
+    options.check_shortest(seconds, info.rate_hz)
+    facts = _comparison(loaded, pluck, round(seconds * info.rate_hz))
     for warning in facts["warnings"]:
         say(f"warning: {warning}")
     if json:
@@ -227,15 +224,13 @@ def _error_sums(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
     info = preset.info
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
-    model, truth = ModelSource(preset), TruthSource(info)
-    model_state, truth_state = model.start(initial), truth.start(initial)
+    sources = ModelSource(preset), TruthSource(info)
+    motions = (arrays.blocks_of(source.advance, source.start(initial), steps) for source in sources)
     sums, done = ErrorSums(steps), 0
     with progress("compare") as report:
-        for count in arrays.blocks_of(steps):
-            predicted, model_state = model.advance(model_state, count)
-            true, truth_state = truth.advance(truth_state, count)
+        for predicted, true in zip(*motions, strict=True):
             sums.add(predicted, true, first=done)
-            done += count
+            done += true.shape[1]
             report(done / steps)
     return sums
 
@@ -263,8 +258,7 @@ def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps
     def motion(initial: Array) -> Iterator[Array]:
         state = ModalState.at_rest(resonator.to_modes(initial))
         yield resonator.to_grid(state.amplitude[:, None])
-        for count in blocks_of(steps):
-            amplitudes, state = solver.advance(state, count)
+        for amplitudes in blocks_of(solver.advance, state, steps):
             yield resonator.to_grid(amplitudes)
 
     return motion
@@ -303,9 +297,6 @@ def _predicted_motion(preset: Preset, steps: int) -> Motion:
     def motion(initial: Array) -> Iterator[Array]:
         start = project(initial, preset.info.modes)
         yield start[:, None]
-        state = source.start(start)
-        for count in blocks_of(steps):
-            frames, state = source.advance(state, count)
-            yield frames
+        yield from blocks_of(source.advance, source.start(start), steps)
 
     return motion

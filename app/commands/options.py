@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -34,6 +34,9 @@ Listen = Annotated[float, _option("listen", "X")]
 ListenRight = Annotated[
     float | None, typer.Option(help="Listening point of a right channel; without it the file is mono.", metavar="X")
 ]
+ModelOrTruth = Annotated[
+    Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
+]
 GainDb = Annotated[float, typer.Option(metavar="DB", help="Gain of the difference.")]
 
 
@@ -53,3 +56,9 @@ def check_pluck(position: float, amplitude_mm: float, shape: PluckShape, width: 
     """The pluck of these options, whose ranges are checked."""
     check(position=position, amplitude_mm=amplitude_mm, width=width)
     return Pluck(position, amplitude_mm, shape, width)
+
+
+def check_shortest(seconds: float, rate_hz: int) -> None:
+    """Raise typer.BadParameter: `seconds` are less than one sample."""
+    if round(seconds * rate_hz) < 1:
+        raise typer.BadParameter(f"must hold a sample of {rate_hz} Hz, not {seconds:g} s", param_hint="--seconds")

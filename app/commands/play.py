@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from app.commands import options
 from app.commands.render import SILENT_DB, BitsOption
 from engine.plain_text import one_line
 from training.cli import arguments
@@ -22,9 +23,7 @@ def play(
         str, typer.Option(metavar="INSTRUMENT", help="An instrument's name, or the path of its file.")
     ],
     out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
-    source: Annotated[
-        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
-    ] = "model",
+    source: options.ModelOrTruth = "model",
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = DEFAULT_RATE_HZ,
     bits: BitsOption = "24",
     seconds: Annotated[
@@ -55,28 +54,16 @@ def play(
     if problem := body_problem(patch):
         say(problem)
     loaded = arguments.open_preset(patch.preset)
-    from app.export.played import write_played
+    from app.export.played import Played, write_played
     from app.export.wav import WavSettings
-    from app.instrument.offline import LONGEST_TAIL_S
 
     began_s = time.monotonic()
-    whole_s = seconds if seconds is not None else song.length_s + LONGEST_TAIL_S / 10
     with progress(f"{midi.name} by {patch.name}") as report:
-        written = write_played(
-            out,
-            patch,
-            loaded,
-            song.events,
-            midi.name,
-            source,
-            WavSettings(bits, rate, normalise),
-            seconds,
-            lambda done_s: report(min(0.99, done_s / whole_s)),
-        )
-    if written.level.peak_db < SILENT_DB:
+        played, settings = Played(patch, song.events, source), WavSettings(bits, rate, normalise)
+        written = write_played(out, played, loaded, midi.name, settings, seconds, report)
+    if written.peak_db < SILENT_DB:
         say("note: the file is silent")
-    took_s, level = time.monotonic() - began_s, written.level
     print(
-        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
-        f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
+        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {time.monotonic() - began_s:.1f} s, "
+        f"peak {written.peak_db:.1f} dBFS, {written.clipped} samples clipped"
     )

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from app.export.files import WavReport
     from app.export.sound import SoundRequest
     from app.export.wav import WavSettings
-    from engine.presets import Preset
 
 Value = TypeVar("Value")
 SILENT_DB = -120.0  # peak below which a note says that the file is silent
@@ -93,13 +92,7 @@ def render(
     PRESET, OUT.wav, --position, --amplitude-mm and --seconds are needed, except with --recipe.
     """
     if recipe is not None:
-        sources = {name: context.get_parameter_source(name) for name in context.params}
-        names = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-        if out is not None or names - {"preset", "recipe"}:
-            raise typer.BadParameter(
-                "holds all that its sound was made with; give OUT.wav alone beside it",
-                param_hint="--recipe",
-            )
+        _check_alone(context)
         _render_again(recipe, Path(preset) if preset else None)
         return
     if out is not None:
@@ -111,12 +104,17 @@ def render(
     position, amplitude_mm = _require("--position", position), _require("--amplitude-mm", amplitude_mm)
     seconds = _require("--seconds", seconds)
     pluck = options.check_pluck(position, amplitude_mm, shape, width)
-    check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
-    from app.export.sound import SoundRequest
-    from app.export.wav import WavSettings
+    from app.export.sound import DECAY_RANGE_DB, LONGEST_S, SoundRequest
+    from app.export.wav import RATE_RANGE_HZ, WavSettings
 
+    arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
+    options.check(listen=listen, listen_right=listen_right, difference_gain_db=difference_gain_db)
+    if decay_db is not None:
+        arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
+    if rate is not None:
+        arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     loaded = arguments.open_preset_to_render(preset, string, rate, modes)
-    check_shortest(loaded, seconds)
+    options.check_shortest(seconds, loaded.info.rate_hz)
     try:
         request = SoundRequest(
             loaded, pluck, listen, seconds, source, listen_right, pickup, difference_gain_db, decay_db
@@ -126,31 +124,13 @@ def render(
     _write(request, out, WavSettings(bits, rate, normalise))
 
 
-def check_sound(
-    seconds: float,
-    rate: int | None,
-    listen: float,
-    listen_right: float | None,
-    difference_gain_db: float,
-    decay_db: float | None,
-) -> None:
-    """Check the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
-    from app.export.sound import DECAY_RANGE_DB, LONGEST_S
-    from app.export.wav import RATE_RANGE_HZ
-
-    arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-    options.check(listen=listen, listen_right=listen_right, difference_gain_db=difference_gain_db)
-    if decay_db is not None:
-        arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
-    if rate is not None:
-        arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
-
-
-def check_shortest(preset: Preset, seconds: float) -> None:
-    """Check that `seconds` are one sample of the preset's own rate at least. Raises typer.BadParameter."""
-    if round(seconds * preset.info.rate_hz) < 1:
+def _check_alone(context: typer.Context) -> None:
+    """Raise typer.BadParameter: more is given than a recipe and the file to write, which comes in place of PRESET."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    names = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    if names - {"preset", "recipe"}:
         raise typer.BadParameter(
-            f"must hold a sample of {preset.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
+            "holds all that its sound was made with; give OUT.wav alone beside it", param_hint="--recipe"
         )
 
 
@@ -198,10 +178,10 @@ def _render_again(file: Path, out: Path | None) -> None:
 
 
 def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
-    from app.export.files import export_sound
+    from app.export.files import export_sounds
 
     with progress("render") as report:
-        written = export_sound(request, out, settings, progress=report)
+        (written,) = export_sounds(request, {request.source: out}, settings, progress=report)
     for note in _notes(request, written):  # after the work, so that a failure is the only line
         say(note)
     if written.peak_db < SILENT_DB:

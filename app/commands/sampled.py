@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from app.commands import options
 from app.shared.key_names import key_named
 from engine.plain_text import one_line
 from training.cli.console import Failure, progress, say
@@ -37,9 +38,7 @@ def sampled(
     bits: Annotated[
         Literal["16", "24"] | None, typer.Option(help="Of the samples of an SFZ; default 24. A SoundFont has 16.")
     ] = None,
-    source: Annotated[
-        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
-    ] = "model",
+    source: options.ModelOrTruth = "model",
     dry: Annotated[
         bool,
         typer.Option("--dry", help="Leave out the instrument's room, whose tail would end at each key's release."),
@@ -57,7 +56,7 @@ def sampled(
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
     from engine.folders import usable_files
-    from engine.presets import find_preset
+    from engine.presets import find_preset, load_preset
 
     soundfont = out.suffix.lower() == ".sf2"
     if soundfont and (form or bits):
@@ -71,17 +70,7 @@ def sampled(
         say(problem)
     preset_path = find_preset(patch.preset, usable_files())
     try:
-        plan = SampledPlan(
-            patch,
-            _keys(keys),
-            every,
-            layers,
-            seconds,
-            rate,
-            form or "flac",
-            bits or "24",
-            source,
-        )
+        plan = SampledPlan(patch, _keys(keys), every, layers, seconds, rate, form or "flac", bits or "24", source)
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
@@ -92,11 +81,8 @@ def sampled(
     if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
     say(f"{words}; {pitch}")
-    from engine.presets import load_preset
-
-    render = note_renderer(load_preset(preset_path), source)
     with progress("sampled") as report:
-        written = export_sampled(plan, out, render, progress=report)
+        written = export_sampled(plan, out, note_renderer(load_preset(preset_path), source), progress=report)
     for note in notes(plan, written, "--dry leaves"):
         say(f"note: {note}")
     print(f"{one_line(str(out))}: {written.samples} samples, {megabytes(written.size_bytes)}; {pitch}")

@@ -5,24 +5,18 @@ The window and the command line both write through this module.
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from app.export.recipe import SoundRecipe
 from app.export.recording import SoundSamples
-from app.export.sound import (
-    Mixed,
-    SoundRequest,
-    Source,
-    render_voices,
-)
-from app.export.wav import Level, WavSettings, write_wav
+from app.export.sound import Mixed, SoundRequest, Source, render_voices
+from app.export.wav import WavSettings, WrittenSound, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.worker import Progress
 from engine.pluck import Pluck
@@ -33,55 +27,23 @@ DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
 
 @dataclass(frozen=True)
-class WavReport:
+class WavReport(WrittenSound):
     """The report of a WAV file that was written.
 
     Attributes:
-        peak_db: the largest sample in dBFS before any clipping; -inf for silence.
-        clipped: samples beyond full scale that were clipped; always 0 in floating point.
-        gain_db: the gain of normalising; 0 without.
         past_training_s: how much of the sound lies past the model's training horizon; 0 for the truth.
         decayed: False where the sound was to end by its decay but reached its longest duration first.
     """
 
     path: Path
-    frames: int
-    rate_hz: int
-    size_bytes: int
-    peak_db: float
-    clipped: int
-    gain_db: float
-    past_training_s: float = 0.0
-    decayed: bool = True
-
-    @property
-    def seconds(self) -> float:
-        return self.frames / self.rate_hz
-
-
-def export_sound(
-    request: SoundRequest,
-    path: Path,
-    settings: WavSettings | None = None,
-    *,
-    progress: Progress = lambda *_: None,
-) -> WavReport:
-    """Render and write a WAV file, whole or not at all.
-
-    Raises:
-        WriteError: the file cannot be written.
-        PresetError: the preset's file cannot be read any more.
-        Cancelled: `progress` raised it; no file is left.
-        Runaway: the model's output grew without bound or is not finite.
-    """
-    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress)
-    return report
+    past_training_s: float
+    decayed: bool
 
 
 def export_sounds(
     request: SoundRequest,
     paths: Mapping[Source, Path],
-    settings: WavSettings | None = None,
+    settings: WavSettings,
     *,
     progress: Progress = lambda *_: None,
 ) -> list[WavReport]:
@@ -96,12 +58,15 @@ def export_sounds(
         The reports in the order of `paths`.
 
     Raises:
-        As `export_sound`.
+        WriteError: a file cannot be written; none is left.
+        PresetError: the preset's file cannot be read any more.
+        Cancelled: `progress` raised it; no file is left.
+        Runaway: the model's output grew without bound or is not finite.
     """
-    settings = settings_of(request, settings or WavSettings())
+    if request.decay_db is not None:  # it ends by its decay, behind a longer fade-out
+        settings = replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
     requests = {source: replace(request, source=source) for source in paths}
-    instrument = request.through is not None or request.struck is not None
-    if instrument and "difference" in paths and len(paths) > 1:
+    if request.struck is not None and "difference" in paths and len(paths) > 1:
         raise ValueError("through an instrument, export the difference by itself")
     request = next(iter(requests.values()))
     info = request.preset.info
@@ -122,18 +87,10 @@ def export_sounds(
             path, sound = paths[source], sounds[source]
             with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
-                level = write_wav(file, sound, rate_hz, settings, tags, beside)
-            report = _report(path, file, len(sound), rate_hz, level)
-            past_s = 0.0 if source == "truth" else max(0.0, report.seconds - info.horizon_s)
-            reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
+                written = write_wav(file, sound, rate_hz, settings, tags, beside)
+            past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
+            reports.append(WavReport(**asdict(written), path=path, past_training_s=past_s, decayed=voices.ended))
     return reports
-
-
-def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
-    """The settings with the longer fade-out of a sound that ends by its decay."""
-    if request.decay_db is None:
-        return settings
-    return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
@@ -155,14 +112,8 @@ def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
 
 @contextmanager
 def _open_whole(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which appears at `path` when the block ends well."""
     with _explain_errors(path), whole_file(path) as file:
         yield file
-
-
-def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level) -> WavReport:
-    size = file.seek(0, io.SEEK_END)
-    return WavReport(path, frames, rate_hz, size, level.peak_db, level.clipped, level.gain_db)
 
 
 @contextmanager

@@ -62,10 +62,7 @@ def recordings_folder() -> Path:
 
 
 class Journal:
-    """The file of one recording, which no other process has while this one does.
-
-    `close` leaves it for the next start; `delete` removes it.
-    """
+    """The file of one recording, of this process alone; `close` leaves it to the next start, `delete` removes it."""
 
     def __init__(self, path: Path, lock: QLockFile) -> None:
         self.path, self._lock = path, lock
@@ -73,11 +70,7 @@ class Journal:
 
     @classmethod
     def begun(cls, folder: Path, recorded: datetime) -> Journal:
-        """A new journal, with its first line written.
-
-        Raises:
-            OSError: the folder cannot be made or written.
-        """
+        """A new journal, with its first line written. Raises OSError: the folder cannot be made or written."""
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
         if (lock := _lock_of(path)) is None:

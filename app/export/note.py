@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,21 +56,13 @@ class ExportedPluck:
         """Return True if an instrument plays it, and its string can be heard without that instrument."""
         return self.struck is not None and not self.struck.of_drum
 
-    def request(
-        self,
-        source: Source,
-        seconds: float,
-        rate_hz: int,
-        alone: bool = False,
-        difference_gain_db: float = 0.0,
-        decay_db: float | None = None,
-    ) -> SoundRequest:
+    def request(self, source: Source, seconds: float, rate_hz: int, alone: bool = False, **more: Any) -> SoundRequest:
         """The request to render it.
 
         Args:
             rate_hz: of the sound; 0: the preset's own.
             alone: the string without its instrument.
-            decay_db: as in `SoundRequest`.
+            more: further fields of `SoundRequest`.
 
         Raises:
             PresetError: the preset cannot be used.
@@ -78,16 +71,7 @@ class ExportedPluck:
         if preset.info.family is not None and struck is None:  # it plays any string at any rate
             preset = of_string(preset, self.string, rate_hz or None)
         return SoundRequest(
-            preset,
-            self.pluck,
-            self.listen,
-            seconds,
-            source,
-            self.listen_right,
-            self.pickup,
-            difference_gain_db,
-            decay_db,
-            struck=struck,
+            preset, self.pluck, self.listen, seconds, source, self.listen_right, self.pickup, struck=struck, **more
         )
 
     def compared(self, seconds: float, rate_hz: int) -> Mapping[str, NDArray[np.float32]]:
@@ -173,21 +157,17 @@ class NoteExport:
         return next(iter(self.paths.values())).parent
 
     def run(self, progress: Progress) -> str:
-        of_family = self.note.string is not None or self.note.struck is not None
-        return "\n".join(_words(self.written(progress), of_family))
-
-    def written(self, progress: Progress) -> list[WavReport]:
-        """Write the files as `run`, with reports in place of words."""
         choices, decays = self.choices, self.choices.until_decayed
         request = self.note.request(
             next(iter(self.paths)),
             choices.longest_s if decays else choices.seconds,
             choices.rate_hz,
             choices.alone,
-            choices.difference_gain_db if "difference" in self.paths else 0.0,
-            choices.decay_db if decays else None,
+            difference_gain_db=choices.difference_gain_db if "difference" in self.paths else 0.0,
+            decay_db=choices.decay_db if decays else None,
         )
-        return export_sounds(request, self.paths, choices.wav, progress=progress)
+        of_family = self.note.string is not None or self.note.struck is not None
+        return "\n".join(_words(export_sounds(request, self.paths, choices.wav, progress=progress), of_family))
 
     def cancelled(self) -> str:
         return "no file was written."

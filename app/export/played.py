@@ -9,8 +9,8 @@ from pathlib import Path
 
 from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
-from app.export.wav import Level, WavSettings, write_wav
-from app.instrument.events import TimedEvent
+from app.export.wav import WavSettings, WrittenSound, write_wav
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
@@ -22,16 +22,8 @@ from engine.presets import Preset, load_preset, preset_digest
 from engine.result_file import whole_file
 
 RATE_HZ = 48_000
-TAIL_S = 6.0  # a guess at how long it rings after the last event, for progress
+TAIL_S = 6.0  # a guess at how long it rings after the last note, for progress
 DEFAULT = WavSettings("24", RATE_HZ)
-
-
-@dataclass(frozen=True)
-class PlayedFile:
-    """The duration and the level of a file that was written."""
-
-    seconds: float
-    level: Level
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +33,13 @@ class Played:
     Attributes:
         patch: with which it began.
         events: `PatchTurned` among them have the pick-up through which it was heard.
-        source: that was heard: "model", "truth" or "difference".
+        source: that is heard: "model", "truth" or "difference".
         difference_gain_db: the gain of the difference.
-        recorded: when it began; None: not known.
+        recorded: when it began; None: not known, or it was not played.
     """
 
     patch: Patch
-    events: tuple[TimedEvent, ...]
+    events: Sequence[TimedEvent]
     source: PlayedSource = "model"
     difference_gain_db: float = 0.0
     recorded: datetime | None = None
@@ -55,29 +47,27 @@ class Played:
 
 def write_played(
     path: Path,
-    patch: Patch,
+    played: Played,
     preset: Preset,
-    events: Sequence[TimedEvent],
     midi: str,
-    source: PlayedSource = "model",
     settings: WavSettings = DEFAULT,
     seconds: float | None = None,
-    advanced: Callable[[float], None] = lambda seconds: None,
-    difference_gain_db: float = 0.0,
-    recorded: datetime | None = None,
-) -> PlayedFile:
+    progress: Callable[[float], None] = lambda share: None,
+) -> WrittenSound:
     """Write a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
+        preset: plays the patch.
         midi: the name of the MIDI file with the events.
-        recorded: when they were played; None: they were not.
-        source, seconds, advanced, difference_gain_db: see `render_events`.
+        seconds: its length; None: until all has decayed.
+        progress: is called with the share that is done, at most 0.99; may raise, to end it.
 
     Raises:
-        ValueError: a key has no possible string, or `source` is unknown.
+        ValueError: a key has no possible string, or the source is unknown.
         PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
+    patch, source, recorded = played.patch, played.source, played.recorded
     rate_hz = settings.rate_hz or RATE_HZ
     origin = InstrumentSound(
         program=PROGRAM,
@@ -86,26 +76,31 @@ def write_played(
         preset=preset.name,
         preset_sha256=preset_digest(preset.path),
         source=source,
-        difference_gain_db=difference_gain_db if source == DIFFERENCE else 0.0,
+        difference_gain_db=played.difference_gain_db if source == DIFFERENCE else 0.0,
         rate_hz=rate_hz,
         bits=settings.bits,
         midi=name_text(midi),
         recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
     )
+    events, gain_db = played.events, played.difference_gain_db
+    notes_s = (entry.time_s for entry in events if isinstance(entry.event, NoteOn | NoteOff))
+    whole_s = max(notes_s, default=0.0) + TAIL_S if seconds is None else seconds
+
+    def advanced(done_s: float) -> None:
+        progress(min(0.99, done_s / whole_s))
+
     with whole_file(path) as file:
         sound = Recording(channels_played(patch, events))
-        blocks = render_events(
-            patch, preset, events, rate_hz, source, seconds, advanced=advanced, difference_gain_db=difference_gain_db
-        )
-        for block in blocks:
+        for block in render_events(
+            patch, preset, events, rate_hz, source, seconds, advanced=advanced, difference_gain_db=gain_db
+        ):
             sound.append(block)
         tags = {
             "title": name_text(f"{path.stem}: {patch.name}"),
             "software": f"{PROGRAM} {program_version()}",
             "comment": origin.model_dump_json(),
         }
-        level = write_wav(file, sound, rate_hz, settings, tags)
-    return PlayedFile(len(sound) / rate_hz, level)
+        return write_wav(file, sound, rate_hz, settings, tags)
 
 
 def recorded_files(path: Path) -> tuple[Path, Path]:
@@ -136,23 +131,10 @@ class PlayedExport:
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
         with whole_file(midi_file) as file:
             file.write(midi_bytes(played.events, played.patch))
-        whole_s = played.events[-1].time_s + TAIL_S
-        written = write_played(
-            sound_file,
-            played.patch,
-            load_preset(self.preset),
-            played.events,
-            midi_file.name,
-            played.source,
-            self.settings,
-            advanced=lambda done_s: progress(min(0.99, done_s / whole_s)),
-            difference_gain_db=played.difference_gain_db,
-            recorded=played.recorded,
-        )
-        sound, level = (
-            source_words(played.source, played.difference_gain_db),
-            f"peak {written.level.peak_db:.1f} dBFS",
-        )
+        preset = load_preset(self.preset)
+        written = write_played(sound_file, played, preset, midi_file.name, self.settings, progress=progress)
+        sound = source_words(played.source, played.difference_gain_db)
+        level = f"peak {written.peak_db:.1f} dBFS"
         return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {sound}, {level}."
 
     def cancelled(self) -> str:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from app.audio.sound_file import UnreadableSound, open_sound
-from app.export.sound import LONGEST_S, SoundRequest, Through
+from app.export.sound import LONGEST_S, SoundRequest
 from app.export.struck import StruckKey
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.patches.fields import String
@@ -29,7 +29,7 @@ from engine.schema import explained, parse_json
 from engine.values.ear import Pickup
 
 # fields of `SoundRequest`
-REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source", "through")
+REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source")
 
 
 class RecipeError(Exception):
@@ -94,6 +94,7 @@ class SoundRecipe(Value):
         string: the string that a preset of many played, with so many `modes`; None: the preset's own.
         horizon_s: the training horizon, past which the model extrapolates.
         full_scale_m: the displacement that is 0 dBFS, of a string alone.
+        through: always null.
     """
 
     format: Literal[1] = 1
@@ -118,7 +119,7 @@ class SoundRecipe(Value):
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
     string: String | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
-    through: Through | None = None
+    through: None = None
     struck: StruckKey | None = None
 
     @classmethod
@@ -148,21 +149,6 @@ class SoundRecipe(Value):
             modes=info.modes if many else None,
             struck=None if request.struck is None else StruckKey.of(request.struck),
         )
-
-    def request(self, preset: Preset) -> SoundRequest:
-        """The request that renders the sound again.
-
-        Args:
-            preset: as loaded from its file; if it is of many strings, the recipe's string is chosen here.
-
-        Raises:
-            ValueError: values do not go together, or the instrument is not here.
-        """
-        if self.string is not None:
-            preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
-        arguments: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
-        struck = None if self.struck is None else self.struck.found()[0]
-        return SoundRequest(preset, **arguments, difference_gain_db=self.difference_gain_db, struck=struck)
 
     @property
     def settings(self) -> WavSettings:
@@ -214,9 +200,20 @@ def read_recipe(path: Path) -> SoundRecipe:
 
 
 def request_of(recipe: SoundRecipe, preset: Preset, path: Path) -> SoundRequest:
-    """The request of the recipe in the file at `path`. Raises RecipeError where its values do not go together."""
+    """The request that renders the sound of the file at `path` again.
+
+    Args:
+        preset: as loaded from its file; if it is of many strings, the recipe's string is chosen here.
+
+    Raises:
+        RecipeError: values do not go together, or the instrument is not here.
+    """
     try:
-        return recipe.request(preset)
+        if recipe.string is not None:
+            preset = of_string(preset, recipe.string, recipe.preset_rate_hz, recipe.modes)
+        requested = {name: getattr(recipe, name) for name in REQUESTED}
+        struck = None if recipe.struck is None else recipe.struck.found()[0]
+        return SoundRequest(preset, **requested, difference_gain_db=recipe.difference_gain_db, struck=struck)
     except ValueError as error:
         raise _unusable_error(path, str(error)) from error
 

@@ -51,20 +51,12 @@ class Recording:
     def __getitem__(self, frames: slice) -> NDArray[np.float64]:
         first, last, _ = frames.indices(self._frames)
         self._file.seek(first * self._frame_bytes)
-        count = max(0, last - first) * self._frame_bytes
-        return np.frombuffer(_read(self._file, count), np.float32).reshape(-1, self.points).astype(np.float64)
+        values = np.fromfile(self._file, np.float32, max(0, last - first) * self.points)
+        return values.reshape(-1, self.points).astype(np.float64)
 
     @property
     def _frame_bytes(self) -> int:
         return 4 * self.points
-
-
-def _read(file: Any, count: int) -> bytes:
-    parts = []
-    while count > 0 and (part := file.read(count)):
-        parts.append(part)
-        count -= len(part)
-    return b"".join(parts)
 
 
 def blocks(sound: SoundSamples, frames: int = BLOCK_FRAMES) -> Iterator[tuple[int, NDArray[np.floating]]]:

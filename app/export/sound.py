@@ -5,30 +5,26 @@ It is rendered by the same voices that a sound device plays, so that a file hold
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from app.export.recording import BLOCK_FRAMES, Recording, SoundSamples, blocks
 from app.export.struck import Struck
-from app.instrument.bodies import body_digest
-from app.instrument.effects import channels_of, effects_from
-from app.patches.patch import BodyChoice
-from app.shared.value import Value
+from app.instrument.effects import channels_of
+from app.instrument.events import TimedEvent
+from app.instrument.offline import render_events
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Source
 from app.shared.worker import Progress
 from engine import bounds
-from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
 from engine.values.ear import PICKUPS, Ear, Pickup
-from engine.values.effects import Amp, Room
 from engine.voices import model_program, truth_program, voice_blocks
 
 Voice = Literal["model", "truth"]
@@ -37,38 +33,10 @@ SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
 DECAYED_FOR_SURE_DB = 30.0  # rendering continues until the whole string is so far below the wanted decay
-MOST_GAIN = 1e6
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
+QUIET_FOR_S = 1.0  # for which a key is to be quiet until it has decayed: longer than strings beat
 
 Samples = NDArray[np.float64]
-
-
-class Through(Value):
-    """The parts that an instrument added to a string plucked by hand, in recipes of earlier versions.
-
-    Attributes:
-        instrument: its name.
-        gain: the factor of the string, which makes all keys equally loud; with the instrument's level.
-        level_db: of the instrument, in `gain` too: its amplifier does not count it as drive.
-        body_sha256: of the file of a body of the user's own.
-    """
-
-    instrument: str
-    gain: float = Field(ge=0, le=MOST_GAIN)
-    body: BodyChoice = BodyChoice()
-    room: Room = Room()
-    amp: Amp = Amp()
-    level_db: float = 0.0
-    body_sha256: str = ""
-
-    @property
-    def effects(self) -> Effects | None:
-        """Raise ValueError: the body is not here, or another of its name."""
-        if body_digest(self.body.name) != self.body_sha256:
-            raise ValueError(
-                f"the body {self.body.name} is not the one of {self.instrument}; get its file and add it"
-            )
-        return effects_from(self.body, self.room, self.amp, self.level_db)
 
 
 @dataclass(frozen=True)
@@ -84,10 +52,8 @@ class SoundRequest:
         difference_gain_db: gain of the difference.
         decay_db: the sound ends where both model and truth have fallen this far below their maximum. So all
             files of a pluck have the same length. None: it lasts `seconds`.
-        through: level, amplifier, body and room of an instrument; a difference has its level alone. None: the string
-            alone.
-        struck: a key of an instrument that `preset` plays, in place of pluck, listening points and pick-up. Its
-            difference is heard without amplifier, body and room too.
+        struck: a key of an instrument that `preset` plays, in place of pluck, listening points and pick-up; without
+            variation. Its difference is heard without amplifier, body and room.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.
@@ -102,7 +68,6 @@ class SoundRequest:
     pickup: Pickup = "displacement"
     difference_gain_db: float = 0.0
     decay_db: float | None = None
-    through: Through | None = None
     struck: Struck | None = None
 
     def __post_init__(self) -> None:
@@ -113,22 +78,15 @@ class SoundRequest:
             raise ValueError(f"seconds must be above 0 and at most {LONGEST_S:g}, not {self.seconds:g}")
         bounds.check_choice("source", self.source, SOURCES)
         bounds.check_choice("pickup", self.pickup, PICKUPS)
-        stereo = self.listen_right is not None or self.effects is not None or self.struck is not None
-        if self.source == "both" and stereo:
+        if self.source == "both" and (self.listen_right is not None or self.struck is not None):
             raise ValueError("model and truth cannot share one file in stereo; choose two files, or mono")
-        if self.through is not None and self.struck is not None:
-            raise ValueError("an instrument plays a key, or is added to a pluck; leave out one of the two")
         bounds.check_all(self, {"decay_db": DECAY_RANGE_DB, "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB})
 
     @property
-    def effects(self) -> Effects | None:
-        """Amplifier, body and room."""
-        return None if self.through is None or self.source == "difference" else self.through.effects
-
-    @property
-    def points(self) -> tuple[float, ...]:
-        """The listening points."""
-        return (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+    def ear(self) -> Ear:
+        """The listening points with their pick-up."""
+        points = (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+        return Ear(points, self.pickup)
 
 
 @dataclass(frozen=True)
@@ -141,11 +99,6 @@ class Voices:
 
     sounds: Mapping[Voice, SoundSamples]
     ended: bool = True
-
-    def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
-        """All samples of a source: (frames,), or (frames, 2) in stereo and for "both"."""
-        mixed = Mixed(self, source, difference_gain_db)[:]
-        return mixed[:, 0] if mixed.shape[1] == 1 else mixed
 
 
 @dataclass(frozen=True)
@@ -177,20 +130,6 @@ def voices_of(source: Source) -> tuple[Voice, ...]:
     return ("model",) if source == "model" else ("truth",) if source == "truth" else VOICES
 
 
-def render_sound(request: SoundRequest, rate_hz: int = 0, *, progress: Progress = lambda *_: None) -> Samples:
-    """The samples of a request, (frames,) or (frames, 2).
-
-    Args:
-        rate_hz: 0 for the preset's own.
-
-    Raises:
-        Cancelled: `progress` raised it.
-        Runaway: the model's output grew without bound or is not finite.
-    """
-    voices = render_voices(request, (request.source,), rate_hz, progress=progress)
-    return voices.samples(request.source, request.difference_gain_db)
-
-
 def render_voices(
     request: SoundRequest,
     sources: Iterable[Source],
@@ -201,14 +140,15 @@ def render_voices(
 ) -> Voices:
     """Render model and truth once for any number of sources of one pluck.
 
-    `request.source` counts for body and room alone, which a difference does not have.
+    `request.source` counts for amplifier, body and room of a key alone, which a difference does not have.
 
     Args:
         rate_hz: of the samples; 0 for the preset's own.
         all_voices: render both whatever the sources; a model that runs away is left out if no source needs it.
 
     Raises:
-        As `render_sound`.
+        Cancelled: `progress` raised it.
+        Runaway: the model's output grew without bound or is not finite.
     """
     sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
     needed = {voice for source in sources for voice in voices_of(source)}
@@ -251,32 +191,49 @@ def decayed_frames(sound: SoundSamples, rate_hz: int, decay_db: float) -> int:
 
 def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callable[[float], None]) -> Recording:
     """The samples (frames, channels) of the voice that a device would play."""
-    preset, info = request.preset, request.preset.info
     decay_db = None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB
     if request.struck is not None:
-        struck_recording = Recording(channels_of(request.struck.patch))
-        dry = request.source == "difference"
-        for block in request.struck.sound(preset, voice, rate_hz, request.seconds, decay_db, dry, progress):
+        recording = Recording(channels_of(request.struck.patch))
+        for block in _struck_blocks(request, request.struck, voice, rate_hz, decay_db, progress):
             if not np.isfinite(block).all():
-                raise Runaway(len(struck_recording) / rate_hz)
-            struck_recording.append(block)
-        return struck_recording
-    program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
-    ear = Ear(request.points, request.pickup)
-    through, recording = request.through, None
-    for block in voice_blocks(
-        program,
-        ModelSource(preset) if program.rendered else None,
-        info,
-        request.pluck,
-        ear,
-        request.seconds,
-        progress,
-        decay_db,
-        1.0 if through is None else through.gain,
-        request.effects,
-    ):
-        recording = recording or Recording(block.shape[1])
+                raise Runaway(len(recording) / rate_hz)
+            recording.append(block)
+        return recording
+    preset, ear = request.preset, request.ear
+    program = truth_program(preset.info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
+    source = ModelSource(preset) if program.rendered else None
+    recording = Recording(len(ear.points))
+    for block in voice_blocks(program, source, preset.info, request.pluck, ear, request.seconds, progress, decay_db):
         recording.append(block)
-    assert recording is not None
     return recording
+
+
+def _struck_blocks(
+    request: SoundRequest,
+    struck: Struck,
+    voice: Voice,
+    rate_hz: int,
+    decay_db: float | None,
+    progress: Callable[[float], None],
+) -> Iterator[NDArray[np.float32]]:
+    """Blocks (frames, channels) of a key, until it has been quiet for QUIET_FOR_S where it may end by its decay."""
+    seconds = request.seconds
+    peak, quiet = 0.0, 0
+    for block in render_events(
+        struck.patch,
+        request.preset,
+        [TimedEvent(0.0, struck.event)],
+        rate_hz,
+        voice,
+        seconds,
+        limited=False,
+        advanced=lambda done_s: progress(min(done_s / seconds, 1.0)),
+        varied=False,
+        dry=request.source == "difference",
+    ):
+        yield block
+        loudest = float(np.abs(block).max(initial=0.0))
+        peak = max(peak, loudest)
+        quiet = quiet + len(block) if loudest < peak * 10 ** (-(decay_db or np.inf) / 20) else 0
+        if decay_db is not None and quiet > QUIET_FOR_S * rate_hz:
+            return

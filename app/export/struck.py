@@ -1,19 +1,15 @@
-"""A key of an instrument, struck and held: what its sound follows from, and how a file names it."""
+"""A key of an instrument, struck and held, and how a file names it."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, fields
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from app.instrument.bodies import body_digest
-from app.instrument.events import KEYS, NoteOn, TimedEvent
-from app.instrument.offline import render_events
+from app.instrument.events import KEYS, NoteOn
 from app.patches.drums import Drums
 from app.patches.fields import Name
 from app.patches.library import list_patches
@@ -21,9 +17,7 @@ from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from app.shared.value import Value
 from engine.pluck import Pluck
-from engine.presets import Preset
 
-QUIET_FOR_S = 1.0  # longer than strings beat
 Side = Annotated[float, Field(ge=-1, le=1)]
 
 
@@ -47,12 +41,8 @@ class StruckKey(Value):
 
     @classmethod
     def of(cls, struck: Struck) -> StruckKey:
-        event, patch = struck.event, struck.patch
-        return cls(
-            instrument=patch.name,
-            instrument_sha256=_digest(patch),
-            **asdict(event),
-        )
+        patch = struck.patch
+        return cls(instrument=patch.name, instrument_sha256=_digest(patch), **asdict(struck.event))
 
     def found(self) -> tuple[Struck, bool]:
         """The instrument of that name with this key, and whether it is the same to the last value.
@@ -88,45 +78,3 @@ class Struck:
         """The description for people."""
         stroke = f"at velocity {self.event.velocity}" if self.event.pluck is None else "plucked by hand"
         return f"{self.patch.name}, {note_name(self.event.key)} {stroke}"
-
-    def sound(
-        self,
-        preset: Preset,
-        source: str,
-        rate_hz: int,
-        seconds: float,
-        decay_db: float | None,
-        dry: bool,
-        progress: Callable[[float], None],
-    ) -> Iterator[NDArray[np.float32]]:
-        """Blocks (frames, channels) of model or truth, as the instrument plays them; without variation.
-
-        Args:
-            preset: plays the instrument.
-            seconds: the duration, or the longest.
-            decay_db: it may end where it has fallen this far below its peak; None: it does not.
-            dry: without amplifier, body and room.
-
-        Raises:
-            ValueError: the key has no string.
-        """
-        blocks = render_events(
-            self.patch,
-            preset,
-            [TimedEvent(0.0, self.event)],
-            rate_hz,
-            source,
-            seconds,
-            limited=False,
-            advanced=lambda done_s: progress(min(done_s / seconds, 1.0)),
-            varied=False,
-            dry=dry,
-        )
-        peak, quiet = 0.0, 0
-        for block in blocks:
-            yield block
-            loudest = float(np.abs(block).max(initial=0.0))
-            peak = max(peak, loudest)
-            quiet = quiet + len(block) if loudest < peak * 10 ** (-(decay_db or np.inf) / 20) else 0
-            if decay_db is not None and quiet > QUIET_FOR_S * rate_hz:
-                return

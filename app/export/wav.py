@@ -57,12 +57,24 @@ class WavSettings:
 
 
 @dataclass(frozen=True)
-class Level:
-    """Peak in dBFS before clipping (-inf: silence), number of samples clipped, and the gain applied."""
+class WrittenSound:
+    """The sound of a file that was written.
 
+    Attributes:
+        peak_db: the largest sample in dBFS before any clipping; -inf for silence.
+        clipped: samples beyond full scale that were clipped; always 0 in floating point.
+        gain_db: the gain of normalising; 0 without.
+    """
+
+    frames: int
+    rate_hz: int
     peak_db: float
     clipped: int
     gain_db: float
+
+    @property
+    def seconds(self) -> float:
+        return self.frames / self.rate_hz
 
 
 def write_wav(
@@ -72,7 +84,7 @@ def write_wav(
     settings: WavSettings,
     tags: Mapping[str, str],
     beside: Sequence[SoundSamples] = (),
-) -> Level:
+) -> WrittenSound:
     """Write a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
 
     It is written block by block, so that memory does not grow with its length.
@@ -112,7 +124,7 @@ def write_wav(
             clipped += cut
     noting.check()
     _zero_time(file, channels)
-    return Level(_decibel(peak * gain), clipped, _decibel(gain))
+    return WrittenSound(len(sound), rate_hz, _decibel(peak * gain), clipped, _decibel(gain))
 
 
 class _Noting:

@@ -66,11 +66,6 @@ class SongPart:
     events: list[TimedEvent]
     left_out: str
 
-    @property
-    def length_s(self) -> float:
-        """The time of the last note or release."""
-        return max(entry.time_s for entry in self.events if isinstance(entry.event, NoteOn | NoteOff))
-
 
 def event_of(message: Sequence[int]) -> Event | None:
     """The event of a whole message of MIDI, by its bytes; None for kinds that no patch plays."""

@@ -9,8 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering.loaded import Loaded
-from app.rendering.subject import StringOf, Subject
+from app.rendering.subject import Loaded, StringOf, Subject
 from engine.pluck import Pluck
 from engine.presets import Preset, load_preset
 from engine.presets.of_string import of_string

@@ -1,7 +1,7 @@
 """The rendering of plucks and blows to pictures and signals: the take, and the worker thread that renders it."""
 
 from app.rendering.blow import BlowRequest, BlowTake
-from app.rendering.request import RenderListener, RenderRequest
+from app.rendering.rendering import RenderListener, RenderRequest
 from app.rendering.take import SOURCES, Sounding, Take
 from app.rendering.worker import RenderWorker
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.strobe import FLASH_HZ
-from app.rendering.take import SOURCES, Listened
+from app.rendering.take import SOURCES, WINDOW_PERIODS, Listened, Sounding
 from engine.compare.relative import ErrorWindows
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
@@ -33,7 +33,6 @@ MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points 
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
-WINDOW_PERIODS = 2.0  # of the lowest mode, in which errors are measured: shorter windows would show its phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +55,11 @@ class BlowRequest:
         """Return True if model and truth move alike: only listening points may differ."""
         if not isinstance(other, BlowRequest):
             return False
-        own_motion, other_motion = (
-            (request.preset, request.modes.drum, len(request.modes), request.strike, request.seconds)
-            for request in (self, other)
-        )
-        return own_motion == other_motion
+        return self._motion == other._motion
+
+    @property
+    def _motion(self) -> tuple[object, ...]:
+        return self.preset, self.modes.drum, len(self.modes), self.strike, self.seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,63 +137,40 @@ class ModalMotion:
         self.ready = stop
 
 
-class BlowTake:
+class BlowTake(Sounding):
     """The motion, sound and errors of model and truth of a blow, which grow while they are rendered.
+
+    Its frames are samples, the first at the blow, and one more than `seconds` has. Its fundamental is that of the
+    lowest mode at rest, its signals are in Pa at 1 m, with a column for each direction. Errors are over the whole
+    surface. The model was trained on no drum.
 
     Attributes:
         head: the drum's shapes on a grid.
         motions: by source.
-        errors: of the model, over the whole surface.
-        listened: signals by source in Pa at 1 m, one column for each direction; replaced as a whole.
-        fundamental_hz: of its lowest mode at rest.
-        frames: samples, the first at the blow, and one more than `seconds` has.
     """
+
+    full_scale = FULL_SCALE_PA
+    ready_frames = 0
 
     def __init__(self, request: BlowRequest, head: Head) -> None:
         self.request = request
         self.head = head
-        self.seconds = request.seconds
+        self.seconds = self.horizon_s = request.seconds
+        self.rate_hz = RATE_HZ
         self.frames = int(request.seconds * RATE_HZ) + 2
+        self.frames_hz = RATE_HZ
         self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
+        self.partials_hz = np.asarray(request.modes.omega / math.tau)
         omega, sigma = request.modes.omega[0], request.modes.sigma[0]
         self.fundamental_hz = math.sqrt(max(omega**2 - sigma**2, 1.0)) / math.tau
         window_s = WINDOW_PERIODS / self.fundamental_hz
-        self.errors = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
+        self.error_course = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
         self.listened = Listened(request.ear)
-        self.ready_frames = 0
-
-    @property
-    def complete(self) -> bool:
-        return self.ready_frames == self.frames
 
     @property
     def ready_s(self) -> float:
         """The latest time at which both sources can be shown."""
         return max(0, min(motion.ready for motion in self.motions.values()) - 1) / FLASH_HZ
-
-    @property
-    def rate_hz(self) -> int:
-        return RATE_HZ
-
-    @property
-    def horizon_s(self) -> float:
-        """The whole duration: the model was trained on no drum."""
-        return self.seconds
-
-    @property
-    def partials_hz(self) -> Array:
-        """The frequencies of the partials at rest, (modes,)."""
-        return np.asarray(self.request.modes.omega / math.tau)
-
-    @property
-    def full_scale(self) -> float:
-        """The pressure of 0 dB, in Pa."""
-        return FULL_SCALE_PA
-
-    @property
-    def progress(self) -> tuple[object, ...]:
-        """A value that changes whenever more of it is ready, or signals are replaced."""
-        return self.ready_frames, self.listened, *(part.ready_frames for part in self.listened.signals.values())
 
     @property
     def scale(self) -> Array:

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from concurrent.futures import Executor
 
 import numpy as np
 
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, ModalMotion, head_of
-from app.rendering.loaded import Loaded
 from app.rendering.rendering import Rendering
-from app.rendering.request import RenderListener
 from app.rendering.strobe import FLASH_HZ
-from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Signal
 from engine.presets import PresetError
 from engine.resonators.base import Array
@@ -26,23 +21,6 @@ TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its 
 class BlowJob(Rendering[BlowRequest, BlowTake]):
     """The rendering of a blow of a preset of many strings."""
 
-    def __init__(
-        self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
-    ) -> None:
-        super().__init__(request, load, listener, helper)
-        self._movers: dict[str, _Mover] = {}
-        self._weights = np.zeros((0, 0))  # of the signals that are rendered
-        self._coming: tuple[Listened, dict[str, _Mover]] | None = None  # signals of other listening points
-
-    def _seconds_of(self, take: BlowTake) -> float:
-        return take.ready_frames / RATE_HZ
-
-    def _complete(self, take: BlowTake) -> bool:
-        return take.complete
-
-    def _satisfied(self, take: BlowTake) -> bool:
-        return self._coming is None and take.listened.ear == self.request.ear
-
     def _continue(self, take: BlowTake) -> None:
         """A block of both sources, or of the signals at other listening points."""
         if not take.complete:
@@ -52,9 +30,17 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 
     def _begin(self) -> BlowTake:
         take = BlowTake(self.request, head_of(self.request.modes))
-        self._movers = self._begin_movers()
-        take.listened, self._weights = _listened(self.request), _weights(self.request)
+        take.listened = self._begin_signals()
         return take
+
+    def _begin_signals(self) -> Listened:
+        """Begin both sources at the blow, to be heard from the directions of the request."""
+        request = self.request
+        points = request.ear.points
+        self._movers = self._begin_movers()
+        # amplitudes in m @ weights (modes, points) = pressure in Pa at 1 m
+        self._weights = np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in points], axis=1)
+        return Listened(request.ear, {name: Signal(RATE_HZ, len(points), request.seconds) for name in SOURCES})
 
     def _begin_movers(self) -> dict[str, _Mover]:
         request = self.request
@@ -65,10 +51,10 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
             raise PresetError(f"{request.preset}: {error}") from error
         return {"model": _Mover(play(struck_drum, RATE_HZ)), "truth": _Mover(true_motion(struck_drum, RATE_HZ))}
 
-    def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:
+    def _blocks(self, frames: int) -> dict[str, Array]:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
-        truth = self._helper.submit(movers["truth"].advance, frames)
-        blocks = {"model": movers["model"].advance(frames), "truth": truth.result()}
+        truth = self._helper.submit(self._movers["truth"].advance, frames)
+        blocks = {"model": self._movers["model"].advance(frames), "truth": truth.result()}
         moving = 1 + max(
             (int(np.flatnonzero(part.any(axis=0)).max(initial=0)) for part in blocks.values()), default=0
         )
@@ -77,24 +63,27 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
     def _render(self, take: BlowTake) -> None:
         first = take.ready_frames
         count = min(BLOCK_FRAMES, take.frames - first)
-        blocks = self._blocks(self._movers, count)
-        _append(take.listened, blocks, self._weights)
+        blocks = self._blocks(count)
+        self._append(take.listened, blocks)
         moving = blocks["truth"].shape[1]
-        take.errors.add(blocks["model"], blocks["truth"], take.request.modes.scale[:moving] ** 2)
+        take.error_course.add(blocks["model"], blocks["truth"], take.request.modes.scale[:moving] ** 2)
         for name, block in blocks.items():
             self._movers[name].show(block, take.motions[name], take.request.modes.omega)
         take.ready_frames = first + count
 
     def _listen(self, take: BlowTake) -> None:
         """Render the signals for other listening points; those that are there stay until these are complete."""
-        if self._coming is None:
-            self._coming, self._weights = (_listened(self.request), self._begin_movers()), _weights(self.request)
-        listened, movers = self._coming
-        done = listened.signals["truth"].ready_frames
-        blocks = self._blocks(movers, min(BLOCK_FRAMES, listened.signals["truth"].frames - done))
-        _append(listened, blocks, self._weights)
+        listened = self._coming = self._coming or self._begin_signals()
+        truth = listened.signals["truth"]
+        self._append(listened, self._blocks(min(BLOCK_FRAMES, truth.frames - truth.ready_frames)))
         if listened.complete:
             take.listened, self._coming = listened, None
+
+    def _append(self, listened: Listened, blocks: dict[str, Array]) -> None:
+        for name, block in blocks.items():
+            signal = listened.signals[name]
+            samples = block[: signal.frames - signal.ready_frames] @ self._weights[: block.shape[1]]
+            signal.append(samples.astype(np.float32))
 
 
 class _Mover:
@@ -139,20 +128,3 @@ class _Mover:
             flash = numbers % between == 0
             motion.append(size[flash], angles[flash])
         self._done, self._last = stop, q[-2:]
-
-
-def _listened(request: BlowRequest) -> Listened:
-    points, seconds = len(request.ear.points), request.seconds
-    return Listened(request.ear, {name: Signal(RATE_HZ, points, seconds) for name in SOURCES})
-
-
-def _weights(request: BlowRequest) -> Array:
-    """The weights (modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
-    return np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in request.ear.points], axis=1)
-
-
-def _append(listened: Listened, blocks: dict[str, Array], weights: Array) -> None:
-    for name, block in blocks.items():
-        signal = listened.signals[name]
-        samples = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
-        signal.append(samples.astype(np.float32))

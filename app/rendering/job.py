@@ -2,50 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor
+import math
 
 from app.rendering.line import SourceLine
-from app.rendering.loaded import Loaded
-from app.rendering.rendering import Rendering
-from app.rendering.request import RenderListener, RenderRequest
+from app.rendering.rendering import Rendering, RenderRequest
 from app.rendering.strobe import Strobe
-from app.rendering.subject import Subject
-from app.rendering.take import SOURCES, Listened, Pictures, Take, picture_stride
+from app.rendering.take import SOURCES, Listened, Pictures, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
 from engine.sources import ModelSource
 from engine.values.ear import Ear
 
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
 class PluckJob(Rendering[RenderRequest, Take]):
-    """The rendering of a pluck.
+    """The rendering of a pluck; requests for one motion differ in listening points, slow motion or other presets."""
 
-    Requests for the same motion differ in listening points, slow motion or other presets.
-    """
-
-    def __init__(
-        self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
-    ) -> None:
-        super().__init__(request, load, listener, helper)
-        self._lines: dict[str, SourceLine] = {}
-        self._strobe: Strobe | None = None
-        self._coming: Listened | None = None  # signals at new listening points, until they are complete
-        self._measured = 1  # pictures; the first is no prediction
-
-    def _seconds_of(self, take: Take) -> float:
-        return take.ready_frames / take.picture_hz
-
-    def _complete(self, take: Take) -> bool:
-        return take.complete and take.listened.complete
+    _strobe: Strobe | None = None
 
     def _satisfied(self, take: Take) -> bool:
         return (
-            self._coming is None
-            and take.listened.ear == self.request.ear
+            super()._satisfied(take)
             and self._strobe == self._wanted_strobe(take)
             and all(name in self._lines and self._lines[name].complete for name in self._source_names())
         )
@@ -55,18 +35,16 @@ class PluckJob(Rendering[RenderRequest, Take]):
         self._show(take)
         self._listen(take)
         self._advance_lines(take)
-        self._measure(take)
+        take.measure()
 
     def _begin(self) -> Take:
         request, loaded = self.request, self._load(self.request.preset)
         info, stride = loaded.preset.info, _stride(loaded.model)
         take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-        for name, source, program in (
-            ("model", loaded.model, loaded.model_program),
-            ("truth", loaded.truth, loaded.truth_program),
-        ):
-            motion = take.motions[name]
-            self._lines[name] = SourceLine(source, program, info, request.pluck, motion, request.seconds, stride)
+        self._lines = {
+            "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
+            "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
+        }
         take.listened = self._listened(request.ear)
         return take
 
@@ -76,10 +54,8 @@ class PluckJob(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info = take.info
-            stride = take.stride
-            source = None
-            program = None
+            info, stride = take.info, take.stride
+            source = program = None
             try:
                 loaded = self._load(path)
                 source, program = loaded.model, loaded.model_program
@@ -87,7 +63,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
             motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(source, program, info, take.pluck, motion, take.seconds, stride)
+            line = self._lines[name] = SourceLine(take, source, program, motion, info, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened
@@ -127,10 +103,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take) -> None:
-        """Render a block of model and truth, and others up to its end.
-
-        The model is rendered here, the rest in the helper.
-        """
+        """Render a block of the model here, of the truth in the helper, and there others up to its end."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
         most = BLOCK_FRAMES * truth.stride
@@ -147,15 +120,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
     def _source_names(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
-    def _measure(self, take: Take) -> None:
-        """Add the error of new pictures."""
-        first, stop = self._measured, take.ready_frames
-        if stop > first:
-            model, truth = (take.motions[name].read(first, stop)[None] for name in SOURCES)
-            take.errors.add(model, truth, first - 1, row=0)
-            self._measured = stop
-
 
 def _stride(model: ModelSource) -> int:
     """Samples between pictures; 1 for a model that must step through every frame, which are then all kept."""
-    return picture_stride(model.rate_hz) if model.any_frame else 1
+    return math.ceil(model.rate_hz / PICTURE_HZ) if model.any_frame else 1

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.rendering.listening import Listening
 from app.rendering.strobe import Flashes, Strobe
-from app.rendering.take import Pictures, Signal
+from app.rendering.take import Pictures, Signal, Take
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
@@ -25,9 +25,8 @@ class SourceLine:
     Args:
         source: None for a string at rest.
         program: of its voice, at the preset's rate; None where `source` is.
-        motion: filled with the pictures.
-        seconds: of the take.
-        stride: samples between two pictures.
+        motion: filled with the pictures, `stride` samples apart.
+        info: of the source's preset.
 
     Attributes:
         frames: samples in all, the initial displacement first.
@@ -36,22 +35,21 @@ class SourceLine:
 
     def __init__(
         self,
+        take: Take,
         source: StringSource | None,
         program: Program | None,
-        info: PresetInfo,
-        pluck: Pluck,
         motion: Pictures,
-        seconds: float,
+        info: PresetInfo,
         stride: int,
     ) -> None:
         self.rate_hz = info.rate_hz
         self.stride = stride
         self.motion = motion
-        self.frames = int(seconds * info.rate_hz + 1e-6) + 1
-        self._seconds = seconds
+        self.frames = int(take.seconds * info.rate_hz + 1e-6) + 1
+        self._seconds = take.seconds
         self._source = source
         self._program = program
-        self._initial = _initial_m(pluck, info.grid_points, info.modes)
+        self._initial = _initial_m(take.pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
         self._flashes: Flashes | None = None
         self._shown: _Frames | None = None  # renders flashes that were requested after the pictures

@@ -1,4 +1,4 @@
-"""A motion that the worker renders, block by block: the frame of a pluck's and of a blow's job."""
+"""A motion that the worker renders, block by block: its request, and the frame of a pluck's and of a blow's job."""
 
 from __future__ import annotations
 
@@ -6,13 +6,60 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 from app.rendering.blow import BlowRequest, BlowTake
-from app.rendering.loaded import Loaded
-from app.rendering.request import RenderListener, RenderRequest
-from app.rendering.subject import Subject
-from app.rendering.take import Take
+from app.rendering.subject import Loaded, Subject
+from app.rendering.take import Listened, Take
+from engine.pluck import Pluck
+from engine.values.ear import Ear
+
+
+@dataclass(frozen=True)
+class RenderRequest:
+    """The pictures and signals of a pluck.
+
+    Attributes:
+        preset: the file, with another string for one of many.
+        seconds: the duration.
+        ear: listening points, pick-up and soloed mode.
+        speed: of slow motion; 1 is real time.
+        others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
+    """
+
+    preset: Subject
+    pluck: Pluck
+    seconds: float
+    ear: Ear
+    speed: float = 1.0
+    others: tuple[Path, ...] = ()
+
+    def same_motion(self, other: object) -> bool:
+        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
+        return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
+            other.preset,
+            other.pluck,
+            other.seconds,
+        )
+
+
+class RenderListener(Protocol):
+    """The listener to the worker's results, called in the worker's thread."""
+
+    def take_started(self, take: Take | BlowTake) -> None:
+        """Show that a new pluck or blow has its first block."""
+
+    def take_finished(self, take: Take | BlowTake) -> None:
+        """Report that its motion, signals and errors are complete."""
+
+    def other_failed(self, preset: str, message: str) -> None:
+        """Report that another preset's model cannot be rendered beside this one; as a source it is at rest."""
+
+    def render_failed(self, message: str, detail: str) -> None:
+        """Report that nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""
+
 
 Request = TypeVar("Request", RenderRequest, BlowRequest)
 Made = TypeVar("Made", Take, BlowTake)
@@ -37,6 +84,7 @@ class Rendering(ABC, Generic[Request, Made]):
         self._load = load
         self._listener = listener
         self._helper = helper
+        self._coming: Listened | None = None  # signals at other listening points, until they are complete
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
@@ -59,7 +107,7 @@ class Rendering(ABC, Generic[Request, Made]):
     @property
     def rendered_s(self) -> float:
         """Seconds of the motion that are rendered."""
-        return 0.0 if self.take is None else self._seconds_of(self.take)
+        return 0.0 if self.take is None else self.take.ready_frames / self.take.frames_hz
 
     @property
     def idle(self) -> bool:
@@ -78,7 +126,7 @@ class Rendering(ABC, Generic[Request, Made]):
         self._continue(take)
         if begins:
             self._listener.take_started(take)
-        if not self._finished and self._complete(take):
+        if not self._finished and take.complete and take.listened.complete:
             self._finished = True
             self._listener.take_finished(take)
 
@@ -90,14 +138,6 @@ class Rendering(ABC, Generic[Request, Made]):
     def _continue(self, take: Made) -> None:
         """The next block of it."""
 
-    @abstractmethod
-    def _complete(self, take: Made) -> bool:
-        """Return True if motion, signals and errors are all there, for the first time."""
-
-    @abstractmethod
     def _satisfied(self, take: Made) -> bool:
         """Return True if a complete one is as the latest request has it."""
-
-    @abstractmethod
-    def _seconds_of(self, take: Made) -> float:
-        """The seconds of the motion that are rendered."""
+        return self._coming is None and take.listened.ear == self.request.ear

@@ -8,27 +8,22 @@ of ready ones is raised; values below it never change.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.strobe import Flashes, Strobe
-from engine.compare.relative import ErrorSums
+from engine.compare.relative import ErrorSums, ErrorWindows
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource
 from engine.values.ear import Ear
 
 SOURCES = ("model", "truth")
-PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
+WINDOW_PERIODS = 2.0  # of the fundamental, in which errors are measured: shorter windows would show its phase
 _TINY = 1e-6  # of a frame: tolerance for rounding
-
-
-def picture_stride(rate_hz: int) -> int:
-    """Samples between two pictures."""
-    return math.ceil(rate_hz / PICTURE_HZ)
 
 
 class FrameSeries:
@@ -120,50 +115,60 @@ class Listened:
         return all(name in self.signals and self.signals[name].complete for name in SOURCES)
 
 
-class Sounding(Protocol):
-    """The sound of a pluck or of a blow, which grows as it is rendered.
+class Sounding(ABC):
+    """The motion and sound of a pluck or of a blow, which grow as they are rendered.
 
     Attributes:
         seconds: the duration.
-        listened: signals by source; replaced as a whole.
+        rate_hz: of the signals of model and truth.
+        horizon_s: the end of the time that the model was trained for. Where it was trained on none, of the motion.
+        listened: signals by source; replaced as a whole when the listening points change.
+        partials_hz: the frequencies of the partials at rest, (modes,), rising.
+        frames: of the motions of model and truth when complete, `frames_hz` a second.
+        error_course: the model's errors over time, of all frames after the first that are ready.
     """
 
     seconds: float
+    rate_hz: int
+    horizon_s: float
     listened: Listened
     fundamental_hz: float
+    partials_hz: NDArray[np.float64]
+    frames: int
+    frames_hz: float
+    error_course: ErrorWindows
 
     @property
-    def rate_hz(self) -> int: ...
+    @abstractmethod
+    def ready_frames(self) -> int:
+        """Frames that are ready of both model and truth."""
 
     @property
-    def horizon_s(self) -> float:
-        """The end of the time that the model was trained for. Where it was trained on none, the end of the motion."""
-
-    @property
-    def partials_hz(self) -> NDArray[np.float64]:
-        """The frequencies of the partials at rest, (modes,), rising."""
+    def complete(self) -> bool:
+        """Return True if all frames of model and truth are ready."""
+        return self.ready_frames == self.frames
 
     @property
     def full_scale(self) -> float:
         """The level of 0 dB, in the unit of the signals."""
+        return self.listened.ear.full_scale
 
     @property
     def progress(self) -> tuple[object, ...]:
         """A value that changes whenever more of it is ready, or signals are replaced."""
+        return self.ready_frames, self.listened, *(part.ready_frames for part in self.listened.signals.values())
 
 
-class Take:
+class Take(Sounding):
     """Motions and signals of model and truth for a pluck, and of other presets' models beside them.
 
+    Its frames are pictures; its fundamental is that of the string at small amplitudes.
+
     Attributes:
-        seconds: the duration.
-        frames: pictures of model and truth when complete.
         stride: samples between two pictures of model and truth.
         model: renders more of the model where it is needed; has no state.
         model_ends_s: the time of the last valid frame where the model's output ran away; it is at rest from then on.
         motions: by source; those of other presets' models each at its own rate and on its own grid.
-        listened: the signals of all of them; replaced as a whole when the listening points change.
-        fundamental_hz: of the string at small amplitudes.
         errors: of the model, over the pictures after the first that are ready.
     """
 
@@ -184,27 +189,17 @@ class Take:
         self.stride = stride
         self.model = model
         self.model_ends_s: float | None = None
-        self.motions = {name: Pictures(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
+        self.rate_hz = info.rate_hz
+        self.horizon_s = info.horizon_s
+        self.frames_hz = info.rate_hz / stride
+        self.motions = {name: Pictures(self.frames_hz, info.grid_points, seconds) for name in SOURCES}
         self.frames = self.motions["truth"].frames
         self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
-        self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
+        self.partials_hz = np.asarray(info.resonator.omega / math.tau)
+        self.fundamental_hz = float(self.partials_hz[0])
         self.errors = ErrorSums(self.frames - 1)
-
-    @property
-    def rate_hz(self) -> int:
-        return self.info.rate_hz
-
-    @property
-    def horizon_s(self) -> float:
-        return self.info.horizon_s
-
-    @property
-    def partials_hz(self) -> NDArray[np.float64]:
-        return np.asarray(self.info.resonator.omega / math.tau)
-
-    @property
-    def full_scale(self) -> float:
-        return self.listened.ear.full_scale
+        self.error_course = ErrorWindows(self.frames - 1, WINDOW_PERIODS / self.fundamental_hz, self.frames_hz)
+        self._measured = 1  # pictures; the first is no prediction
 
     @property
     def error(self) -> float:
@@ -215,34 +210,27 @@ class Take:
     def errors_by_training(self) -> tuple[float, ...]:
         """Relative mean absolute errors within the time of the training, and beyond it where it reaches there."""
         ends_s = 0.0, self.horizon_s, max(self.seconds, self.horizon_s)
-        return tuple(window.rel_mae for window in self.errors.windows(self.picture_hz, ends_s))
-
-    @property
-    def picture_hz(self) -> float:
-        """Pictures of model and truth per second."""
-        return self.info.rate_hz / self.stride
+        return tuple(window.rel_mae for window in self.errors.windows(self.frames_hz, ends_s))
 
     @property
     def ready_frames(self) -> int:
-        """Pictures that are ready of both model and truth."""
         return min(self.motions[name].ready_frames for name in SOURCES)
 
     @property
-    def complete(self) -> bool:
-        """Return True if all pictures of model and truth are ready."""
-        return self.ready_frames == self.frames
-
-    @property
     def progress(self) -> tuple[object, ...]:
-        """A value that changes whenever more of it is ready, or signals or flashes are replaced."""
-        motions, signals = list(self.motions.values()), list(self.listened.signals.values())
-        flashes = [motion.flashes for motion in motions if motion.flashes is not None]
-        return (
-            self.listened,
-            *(motion.ready_frames for motion in motions),
-            *(signal.ready_frames for signal in signals),
-            *((motion_flashes, motion_flashes.ready) for motion_flashes in flashes),
-        )
+        """A value as that of any sound, which flashes change too."""
+        motions = self.motions.values()
+        flashes = [(motion.flashes, motion.flashes.ready) for motion in motions if motion.flashes is not None]
+        return *super().progress, *(motion.ready_frames for motion in motions), *flashes
+
+    def measure(self) -> None:
+        """Add the errors of new pictures."""
+        first, stop = self._measured, self.ready_frames
+        if stop > first:
+            model, truth = (self.motions[name].read(first, stop) for name in SOURCES)
+            self.errors.add(model[None], truth[None], first - 1, row=0)
+            self.error_course.add(model, truth)
+            self._measured = stop
 
     def bytes(self, source: str) -> int:
         """Memory that a source takes, in bytes."""

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 
 from app.rendering.blow import BlowRequest
 from app.rendering.job import PluckJob
-from app.rendering.loaded import Loaded
-from app.rendering.request import RenderListener, RenderRequest
-from app.rendering.subject import Subject
+from app.rendering.rendering import RenderListener, RenderRequest
+from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
 from engine.presets import PresetError

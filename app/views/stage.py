@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import (
     QColor,
     QFontMetrics,
+    QKeyEvent,
     QLinearGradient,
+    QMouseEvent,
     QPainter,
     QPen,
     QPixmap,
@@ -29,6 +32,7 @@ MARGIN_BOTTOM = 40
 LEGEND_Y = 17.5  # the middle of the line above the picture
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 GRAB_PIXELS = 14  # how near a mark counts as on it
+ARROWS = {Qt.Key.Key_Left: (-1, 0), Qt.Key.Key_Right: (1, 0), Qt.Key.Key_Up: (0, 1), Qt.Key.Key_Down: (0, -1)}
 STEP = 0.01  # of a listening point, for a key
 FOOT = 8.0  # pixels: half the width of a mark
 LABEL_GAP = 8  # pixels between the words of two marks
@@ -42,6 +46,8 @@ class StageView(QWidget):
     drag_started = Signal()
     drag_ended = Signal()
     motion_toggled = Signal(bool)
+
+    CURSORS: ClassVar[dict[str | None, Qt.CursorShape]]  # by part, without the marks
 
     def __init__(self, name: str, tip: str, parent: QWidget | None) -> None:
         super().__init__(parent)
@@ -92,6 +98,55 @@ class StageView(QWidget):
         """Set the sources that the slots hold; the frames given to `show_frame` should have these motions."""
         self._sources = sources
         self.update()
+
+    def set_listening_points(self, left: float | None, right: float | None = None) -> None:
+        """Set the points where it is heard; None: has no mark, as the right one in mono, or both at a bridge."""
+        points = {"left": left, "right": right}
+        self._listening = {side: position for side, position in points.items() if position is not None}
+        self.update()
+
+    # Gestures
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
+            return
+        dragged, self._drag = self._drag, None
+        self.drag_ended.emit()
+        self._drop(dragged)
+        self._hover(self._part_at(event.position()))
+        self.update()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        if self._drag is None:
+            self._hover(None)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move a listening point by Shift with arrows, reset them by Shift with Delete; others are the picture's."""
+        key, modifiers = Qt.Key(event.key()), event.modifiers()
+        across, up = ARROWS.get(key, (0, 0))
+        if across and modifiers & Qt.KeyboardModifier.ShiftModifier:
+            self._step_mark(modifiers, across)
+        elif key == Qt.Key.Key_Delete and modifiers & Qt.KeyboardModifier.ShiftModifier:
+            self._reset_marks()
+        elif not self._take_key(key, across, up, modifiers):
+            super().keyPressEvent(event)
+
+    def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
+        """Take a key, of an arrow with its direction; return False where it means nothing here."""
+        raise NotImplementedError
+
+    def _drop(self, part: str) -> None:
+        """End the drag of a part."""
+
+    def _part_at(self, at: QPointF) -> str | None:
+        """The part that can be grabbed there, of a mark its side; None: none."""
+        raise NotImplementedError
+
+    def _hover(self, part: str | None) -> None:
+        self.setCursor(self.CURSORS.get(part, Qt.CursorShape.SizeHorCursor))
+        if part != self._hovered:
+            self._hovered = part
+            self.update()
 
     # Marks of listening points
 

@@ -103,8 +103,6 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")
     choices = {"instrument": instrument, **restored_choices(recipe)}
-    if recipe.through is not None:
-        notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:
         low, high = OF_CHOICES["seconds"].limits
         limits = f"the window's range ({low:g} … {high:g} s)"

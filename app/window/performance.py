@@ -414,7 +414,7 @@ class Performance(QObject):
             return
         self._shown.finished = True
         if isinstance(take, BlowTake):
-            self._show_error(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
+            self._show_error(f"Error of this blow: {percent(math.sqrt(take.error_course.rel_mse))} over the drum")
             return
         for panel in self._panels:
             panel.take_finished(take)

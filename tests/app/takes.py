@@ -12,3 +12,4 @@ def append_to(take: Take, model_m: NDArray[np.float32], truth_m: NDArray[np.floa
     """Adds pictures (frames, grid_points) in m of model and truth."""
     take.motions["model"].append(model_m)
     take.motions["truth"].append(truth_m)
+    take.measure()

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 
 from app.audio.sound_file import UnreadableSound
 from app.export.sampled.levels import headroom_db
-from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource, Zone
+from app.export.sampled.plan import SampledPlan, SampledSource, Zone
 from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
+from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, number_of, pitch_words
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
+from engine.presets import Preset, load_preset
 from engine.result_file import WriteError, explain, replaceable, whole_file
 from engine.whole_file import working_folder
 
@@ -26,8 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from app.patches.patch import Patch
-    from engine.presets import Preset
+NoteRenderer = Callable[..., "NDArray[np.float32]"]
 
 SUFFIXES = (".sfz", ".sf2")
 LONGEST_STEM = 60
@@ -85,6 +86,10 @@ def export_sampled(
     """Render the samples of a plan and write OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
 
     Until all samples are rendered, nothing else is changed.
+
+    Args:
+        render: is called with patch, key, velocity, the time held, duration and rate, and `advanced`, a function of
+            the seconds rendered that may raise. Returns float32 (frames, channels), ±1 being full scale.
 
     Raises:
         ValueError: see `planned`.
@@ -152,12 +157,11 @@ def _write_samples(
         path = folder / plan.file_name(zone)
         note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
         try:
-            sample = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)  # type: ignore[misc]
+            sound, stored = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)
         except ValueError as error:
             raise WriteError(f"{path.name}: {error}") from error
-        path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
-        frames, channels = sample.sound.shape
-        stored_samples[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
+        path.write_bytes(encoded(sound, plan.rate_hz, plan.format, plan.bits))
+        stored_samples[zone] = replace(stored, level_db=round(stored.level_db, 3))
     return stored_samples
 
 
@@ -165,16 +169,39 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     """Render notes of a patch by its model, or by the solved string of the same keys."""
     from app.instrument.offline import render_note  # compiled code, and torch
 
-    def rendered(
-        patch: Patch,
-        key: int,
-        velocity: int,
-        held_s: float,
-        seconds: float,
-        rate_hz: int,
-        *,
-        advanced: Callable[[float], None],
-    ) -> NDArray[np.float32]:
-        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced)
+    return lambda patch, key, velocity, held_s, seconds, rate_hz, *, advanced: render_note(
+        patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced
+    )
 
-    return rendered
+
+@dataclass(frozen=True)
+class SampledExport:
+    """The export of an instrument for samplers. See `ExportJob`.
+
+    Attributes:
+        preset: the file of the preset that plays the patch.
+    """
+
+    plan: SampledPlan
+    out: Path
+    preset: Path
+
+    @property
+    def folder(self) -> Path:
+        return self.out.parent
+
+    def run(self, progress: Progress) -> str:
+        progress(0.0, "Loading the model")
+        plan = self.plan
+        report = export_sampled(
+            plan, self.out, note_renderer(load_preset(self.preset), plan.source), progress=progress
+        )
+        samples = f"{number_of(report.samples, 'sample')}, {megabytes(report.size_bytes)}"
+        alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_REPORTED_DB else ""
+        level = f"peak {report.peak_db:.1f} dBFS{alike}"
+        lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
+        lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]
+        return "\n".join(lines)
+
+    def cancelled(self) -> str:
+        return "nothing was written."

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,28 +30,6 @@ RANGES = {
     "seconds": SECONDS_RANGE,
     "rate_hz": SAMPLED_RATE_RANGE_HZ,
 }
-
-
-class NoteRenderer(Protocol):
-    """A renderer of one note of a patch, struck at the first frame and released after `held_s`.
-
-    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. `advanced` is
-    called several times a second with the seconds rendered, and may raise to stop the rendering. Raises ValueError
-    where there is no such note.
-    """
-
-    def __call__(
-        self,
-        patch: Patch,
-        key: int,
-        velocity: int,
-        held_s: float,
-        seconds: float,
-        rate_hz: int,
-        /,
-        *,
-        advanced: Callable[[float], None],
-    ) -> NDArray[np.float32]: ...
 
 
 @dataclass(frozen=True)

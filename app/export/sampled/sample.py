@@ -24,25 +24,14 @@ _SUBTYPES: dict[SampleBits, str] = {"16": "PCM_16", "24": "PCM_24"}
 
 
 @dataclass(frozen=True)
-class Sample:
-    """A note that is ready to be stored.
+class StoredSample:
+    """A note as it is stored.
 
     Attributes:
-        sound: float64 (frames, channels), its peak at PEAK_DBFS.
         gain_db: by how much it was raised above the level at which it was rendered.
         level_db: root mean square of its first 0.4 s, over all channels, as rendered.
         cut: whether it still rang at its last frame.
     """
-
-    sound: NDArray[np.float64]
-    gain_db: float
-    level_db: float
-    cut: bool
-
-
-@dataclass(frozen=True)
-class StoredSample:
-    """A sample in its file; `gain_db`, `level_db` and `cut` as in `Sample`."""
 
     frames: int
     channels: int
@@ -56,8 +45,11 @@ class StoredSample:
         return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
 
 
-def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
+def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> tuple[NDArray[np.float64], StoredSample]:
     """Prepare a rendered note, (frames, channels), where ±1 is full scale.
+
+    Returns:
+        The sound to be stored, (frames, channels), its peak at PEAK_DBFS, and what is to be known of it.
 
     Raises:
         ValueError: there are no frames, or a value is not finite.
@@ -70,7 +62,8 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
     level = np.abs(sound).max(axis=1)
     peak = float(level.max())
     if peak <= 10 ** (INAUDIBLE_DBFS / 20):
-        return Sample(np.zeros((FEWEST_FRAMES, sound.shape[1])), 0.0, INAUDIBLE_DBFS, False)
+        silence = np.zeros((FEWEST_FRAMES, sound.shape[1]))
+        return silence, StoredSample(len(silence), sound.shape[1], 0.0, INAUDIBLE_DBFS)
     audible_frames = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
     end = audible_frames + round(END_FADE_S * rate_hz)
     cut = end > len(sound)
@@ -80,13 +73,13 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
     level_db = max(INAUDIBLE_DBFS, 10 * math.log10(float(np.mean(part**2))))
     gain_db = math.floor(100 * (PEAK_DBFS - 20 * math.log10(peak))) / 100
     sound = faded_out(sound, fade) * 10 ** (gain_db / 20)
-    missing = max(0, FEWEST_FRAMES - len(sound))
-    return Sample(np.pad(sound, ((0, missing), (0, 0))), gain_db, level_db, cut)
+    sound = np.pad(sound, ((0, max(0, FEWEST_FRAMES - len(sound))), (0, 0)))
+    return sound, StoredSample(len(sound), sound.shape[1], gain_db, level_db, cut)
 
 
-def encoded(sample: Sample, rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
+def encoded(sound: NDArray[np.float64], rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
     """The whole file; the same samples make the same bytes."""
     buffer = io.BytesIO()
-    numbers, _ = quantised(sample.sound, bits)
+    numbers, _ = quantised(sound, bits)
     soundfile.write(buffer, numbers, rate_hz, _SUBTYPES[bits], format=form.upper())
     return buffer.getvalue()

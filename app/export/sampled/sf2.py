@@ -150,10 +150,7 @@ def _raised_db(attenuation_cb: int, zone: Zone) -> float:
 
 
 def release_timecents(patch: Patch) -> int:
-    """The release of the volume envelope: 60 dB in the damping time.
-
-    Strings that ring on have the longest release there is.
-    """
+    """The release of the volume envelope: 60 dB in the damping time; of strings that ring on, the longest."""
     if patch.damping.let_ring:
         return TIMECENTS_RANGE[1]
     seconds = patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
@@ -239,10 +236,7 @@ def _preset(name: bytes, bag: int) -> bytes:
 
 
 def _header(plan: SampledPlan, channel: _Channel) -> bytes:
-    """The header of a sample: its place, in frames, and its key (7.10).
-
-    Its loop is not played, but has to lie within it.
-    """
+    """The header of a sample: place, in frames, and key (7.10); its loop, not played, has to lie within it."""
     end = channel.start + channel.frames
     places = (channel.start, end, channel.start + 8, end - 8)
     return struct.pack(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from app.export.sampled.job import SampledReport
+from typing import TYPE_CHECKING
+
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND
+
+if TYPE_CHECKING:
+    from app.export.sampled.job import SampledReport
 
 SMALLEST_REPORTED_DB = 0.05
 _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's header, or its rows of a SoundFont

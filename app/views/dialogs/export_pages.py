@@ -27,8 +27,7 @@ from app.export.plugin.formats import FORMATS, PluginError, check_compiler, inst
 from app.export.plugin.job import PluginExport
 from app.export.recipe import source_words
 from app.export.sampled.choices import SampledChoices
-from app.export.sampled.export import SampledExport
-from app.export.sampled.job import plain_stem, planned
+from app.export.sampled.job import SampledExport, plain_stem, planned
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
 from app.export.sound import DECAY_RANGE_DB, LONGEST_S

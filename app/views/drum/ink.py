@@ -114,10 +114,7 @@ def paint_scale(painter: QPainter, axes: HeadAxes, head: int, scale_m: float) ->
 
 
 def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
-    """Paint the place of the strike: a ring with a dot.
-
-    It is `clear` with the keyboard or the pointer on the drum.
-    """
+    """Paint the place of the strike, a ring with a dot; `clear` with the keyboard or the pointer on the drum."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(QColor(theme.BACKGROUND), 3.5))
     painter.drawEllipse(at, PLACE_RADIUS, PLACE_RADIUS)

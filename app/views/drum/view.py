@@ -7,10 +7,11 @@ beneath it moves a listening point. Arrow keys move the place, Enter strikes the
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from app.views.drum.axes import HeadAxes, Place, Shape
@@ -32,14 +33,12 @@ from app.views.stage import StageView
 
 STEP, FINE_STEP = 0.05, 0.01  # of the arrow keys, in half-lengths
 MARK_TIP = "Drag to hear the drum from another side; double-click resets. Shift and arrow keys move it"
-TIPS: dict[str | None, str] = {  # by what the pointer is on
-    None: "Click to strike the drum with the velocity of the keys; with Shift as hard as it goes.\n"
-    "Arrow keys move the place, Enter strikes there",
-    "left": MARK_TIP,
-    "right": MARK_TIP.replace("Shift", "Ctrl, Shift"),
-}
+STRIKE_TIP = (
+    "Click to strike the drum with the velocity of the keys; with Shift as hard as it goes.\n"
+    "Arrow keys move the place, Enter strikes there"
+)
+TIPS = {"left": MARK_TIP, "right": MARK_TIP.replace("Shift", "Ctrl, Shift")}
 
-_Key = Qt.Key
 _Shift = Qt.KeyboardModifier.ShiftModifier
 _Control = Qt.KeyboardModifier.ControlModifier
 
@@ -51,8 +50,10 @@ class DrumView(StageView):
     place_moved = Signal(float, float)
     place_reset = Signal()
 
+    CURSORS: ClassVar = {None: Qt.CursorShape.ArrowCursor, "drum": Qt.CursorShape.CrossCursor}
+
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Drum", TIPS[None] or "", parent)
+        super().__init__("Drum", STRIKE_TIP, parent)
         self._name = ""
         self._shape: Shape = "circle"
         self._sides = (1.0, 1.0)
@@ -84,11 +85,9 @@ class DrumView(StageView):
         where = f", heard from {angles}" if angles else ""
         self.setAccessibleDescription(f"{self._name}, struck at {place_words(self._place)}{where}")
 
-    def set_listening_points(self, left: float, right: float | None = None) -> None:
-        """Set the directions the drum is heard from; `right` is None in mono."""
-        self._listening = {"left": left} if right is None else {"left": left, "right": right}
+    def set_listening_points(self, left: float | None, right: float | None = None) -> None:
+        super().set_listening_points(left, right)
         self._describe()
-        self.update()
 
     def set_motion(self, shown: bool) -> None:
         """Set the state of the button; the frames given to `show_frame` should agree with it."""
@@ -138,50 +137,27 @@ class DrumView(StageView):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._drag is None:
-            self._hover(event.position())
+            part = self._part_at(event.position())
+            self._hover(part)
+            self.setToolTip(TIPS.get(part or "", STRIKE_TIP))
             return
         point = self.axes.point(0, event.position().x())
         self.listening_point_moved.emit(self._drag, min(max(point, 0.0), 1.0))
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton and self._drag is not None:
-            self._drag = None
-            self.drag_ended.emit()
-            self._hover(event.position())
-            self.update()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
-        sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key, 0)
-        upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key, 0)
-        if sideways and modifiers & _Shift:
-            self._step_mark(modifiers, sideways)
-        elif (sideways or upwards) and not modifiers & _Control:
+    def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
+        if (across or up) and not modifiers & _Control:
             step = FINE_STEP if modifiers & _Shift else STEP
-            place = self._place[0] + step * sideways, self._place[1] + step * upwards
+            place = self._place[0] + step * across, self._place[1] + step * up
             if self.axes.holds(place):
                 self.place_moved.emit(*place)
-        elif key == _Key.Key_Delete and modifiers & _Shift:
-            self._reset_marks()
-        elif key == _Key.Key_Delete:
+        elif key == Qt.Key.Key_Delete:
             self.place_reset.emit()
         else:
-            super().keyPressEvent(event)
+            return False
+        return True
 
-    def leaveEvent(self, event: object) -> None:
-        if self._drag is None and self._hovered is not None:
-            self._hovered = None
-            self.update()
-
-    def _hover(self, at: QPointF) -> None:
-        side = self._mark_under(at)
-        on_drum = side is None and self.axes.place(at) is not None
-        shapes = Qt.CursorShape
-        self.setCursor(shapes.SizeHorCursor if side else shapes.CrossCursor if on_drum else shapes.ArrowCursor)
-        self.setToolTip(TIPS[side])
-        if side != self._hovered:
-            self._hovered = side
-            self.update()
+    def _part_at(self, at: QPointF) -> str | None:
+        return self._mark_under(at) or ("drum" if self.axes.place(at) is not None else None)
 
     def _mark_x(self, point: float) -> float:
         return self.axes.x(0, point)

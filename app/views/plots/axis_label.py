@@ -50,10 +50,7 @@ def fit_foot(plot: pg.PlotWidget) -> None:
 
 
 class UprightTicks:
-    """The numbers of a vertical axis.
-
-    Of a given list it has as many as there is room for, its ends before the others.
-    """
+    """The numbers of a vertical axis: of a given list as many as there is room for, its ends before the others."""
 
     def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
         self._axis, self._box = axis, box

@@ -33,18 +33,12 @@ def magnitudes_of(signed: pg.ColorMap) -> pg.ColorMap:
 
 
 def level_map() -> pg.ColorMap:
-    """The colours of levels: from the background by violet and amber to white.
-
-    In the light theme they go by amber and red to dark blue.
-    """
+    """The colours of levels: by violet and amber to white; in the light theme by amber and red to dark blue."""
     return _shift_to_ground("inferno" if theme.is_dark() else "CET-L17", 0.0, theme.PANEL)
 
 
 def share_map() -> pg.ColorMap:
-    """The colours of shares: near the background at 0, the strongest contrast at 1.
-
-    The lightness alone shows it too.
-    """
+    """The colours of shares, by lightness alone too: near the background at 0, the strongest contrast at 1."""
     dark = ["#10202e", "#1d5a78", "#8a6f52", "#f0a63c", "#fff1d6"]
     light = ["#f2f6f9", "#a9cde0", "#d8b287", "#b5650b", "#4a2300"]
     return pg.ColorMap([0, 0.3, 0.55, 0.78, 1], dark if theme.is_dark() else light, mapping="clip")

@@ -71,13 +71,10 @@ def _recolour_item(item: Any, swap: _Swap) -> None:
                 item.setFillBrush(swap.brush(item.opts["fillBrush"]))
             item.setSymbolPen(swap.pen(item.opts["symbolPen"]))
             item.setSymbolBrush(swap.brush(item.opts["symbolBrush"]))
-        case pg.PlotCurveItem() if not isinstance(item.parentItem(), pg.PlotDataItem):
+        case pg.PlotCurveItem() | pg.ScatterPlotItem() if not isinstance(item.parentItem(), pg.PlotDataItem):
             item.setPen(swap.pen(item.opts["pen"]))
             if item.opts["brush"] is not None:
                 item.setBrush(swap.brush(item.opts["brush"]))
-        case pg.ScatterPlotItem() if not isinstance(item.parentItem(), pg.PlotDataItem):
-            item.setPen(swap.pen(item.opts["pen"]))
-            item.setBrush(swap.brush(item.opts["brush"]))
         case pg.InfiniteLine():
             item.setPen(swap.pen(item.pen))
             item.setHoverPen(swap.pen(item.hoverPen))
@@ -90,6 +87,4 @@ def _recolour_item(item: Any, swap: _Swap) -> None:
         case pg.AxisItem():
             item.setPen(swap.pen(item.pen()))
             item.setTextPen(swap.pen(item.textPen()))
-        case pg.BarGraphItem():
-            item.setOpts(**{k: swap.brush(v) for k, v in item.opts.items() if k == "brush" and v is not None})
     item.update()

@@ -67,10 +67,7 @@ class TimePlot(KeptPlot):
         item.setXRange(0, self._seconds, padding=0)
 
     def set_times(self, seconds: float, horizon_s: float) -> None:
-        """Set the length of the take, and for how long its model was trained.
-
-        The view is kept where the take before was as long.
-        """
+        """Set the length of the take and of its model's training; the view is kept after a take as long."""
         item = self.getPlotItem()
         item.setLimits(xMin=0, xMax=seconds, minXRange=min(SHORTEST_VIEW_S, seconds))
         if seconds != self._seconds:

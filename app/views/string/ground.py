@@ -49,10 +49,7 @@ def paint_grid(painter: QPainter, axes: StringAxes) -> None:
 
 
 def scale(axes: StringAxes) -> tuple[float, ...]:
-    """The displacements that have a line and a figure, as shares of the span.
-
-    There are as many as the height has room for.
-    """
+    """The displacements that have a line and a figure, as shares of the span: as many as the height has room for."""
     return next(marks for marks in SCALES if 2 * axes.half_height >= SCALE_LINE * (len(marks) - 1))
 
 

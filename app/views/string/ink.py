@@ -69,10 +69,7 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front:
 
 
 def _hidden_pieces(axes: StringAxes, below: NDArray[np.float32], above: NDArray[np.float32]) -> list[QLineF]:
-    """Short parts of a line that lies under another: together they make both a line of two colours.
-
-    They stand still while the string moves, and none is where the lines part.
-    """
+    """Short parts of a line under another, which make both a line of two colours; they stand still as it moves."""
     starts = np.arange(EVERY / 2, axes.length - PIECE, EVERY)
     ends = starts + PIECE
     firsts, lasts = (_heights(axes, below, at) for at in (starts, ends))
@@ -131,10 +128,7 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """Paint the handle: `full` on a string at rest, a ring while it moves.
-
-    It has its values where it is full or grabbed.
-    """
+    """Paint the handle: `full` on a string at rest, else a ring; with its values where it is full or grabbed."""
     painter.setPen(Qt.PenStyle.NoPen)
     if grabbed:
         painter.setBrush(theme.translucent(theme.TEXT, 50))

@@ -8,17 +8,11 @@ double-click on handle or marker resets it.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import (
-    QKeyEvent,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPixmap,
-    QWheelEvent,
-)
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.analysis.moment import StringFrame
@@ -51,7 +45,6 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
     "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
 }
 
-_Key = Qt.Key
 _Shift = Qt.KeyboardModifier.ShiftModifier
 _Control = Qt.KeyboardModifier.ControlModifier
 
@@ -65,6 +58,8 @@ class StringView(StageView):
     width_stepped = Signal(float)  # notches of the wheel
     shape_stepped = Signal(int)  # so many shapes on or back
     envelope_toggled = Signal(bool)
+
+    CURSORS: ClassVar = {None: Qt.CursorShape.CrossCursor, "pluck": Qt.CursorShape.OpenHandCursor}
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("String", TIPS[None] or "", parent)
@@ -93,15 +88,6 @@ class StringView(StageView):
         """Set the pluck as chosen; it is drawn while no motion is shown."""
         self._pluck = pluck
         self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
-        self.update()
-
-    def set_listening_points(self, left: float | None, right: float | None = None) -> None:
-        """Set the points where the string is heard.
-
-        `right` is None in mono, both at the bridge, which has no marker.
-        """
-        points = {"left": left, "right": right}
-        self._listening = {side: position for side, position in points.items() if position is not None}
         self.update()
 
     def set_trained(self, trained: TrainedPlucks) -> None:
@@ -204,16 +190,9 @@ class StringView(StageView):
         elif self._drag is not None:
             self.listening_point_moved.emit(self._drag, position)
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
-            return
-        drag, self._drag = self._drag, None
-        self.drag_ended.emit()
-        if drag == "pluck":
+    def _drop(self, part: str) -> None:
+        if part == "pluck":
             self.pluck_released.emit()
-        self._hovered = None
-        self._hover(self._part_at(event.position()))
-        self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self._part_at(event.position()) != "pluck":
@@ -229,38 +208,21 @@ class StringView(StageView):
             self.width_stepped.emit(notches)
         event.accept()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
-        sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
-        upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
-        if sideways is not None and modifiers & _Shift:
-            self._step_mark(modifiers, sideways)
-        elif sideways is not None and modifiers & _Control:
-            self.shape_stepped.emit(sideways)
-        elif upwards is not None and modifiers & _Control:
-            self.width_stepped.emit(float(upwards))
-        elif sideways is not None:
-            self.pluck_drawn.emit(self._pluck.position + 0.01 * sideways, self._pluck.amplitude_mm)
-        elif upwards is not None:
-            step_mm = 0.5 * (FINE if modifiers & _Shift else 1.0)
-            self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
-        elif key == _Key.Key_Delete and modifiers & _Shift:
-            self._reset_marks()
-        elif key == _Key.Key_Delete:
+    def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
+        position, amplitude_mm = self._pluck.position, self._pluck.amplitude_mm
+        if across and modifiers & _Control:
+            self.shape_stepped.emit(across)
+        elif up and modifiers & _Control:
+            self.width_stepped.emit(float(up))
+        elif across:
+            self.pluck_drawn.emit(position + 0.01 * across, amplitude_mm)
+        elif up:
+            self.pluck_drawn.emit(position, amplitude_mm + 0.5 * (FINE if modifiers & _Shift else 1.0) * up)
+        elif key == Qt.Key.Key_Delete:
             self.pluck_reset.emit()
         else:
-            super().keyPressEvent(event)
-
-    def leaveEvent(self, event: object) -> None:
-        if self._drag is None:
-            self._hover(None)
-
-    def _hover(self, on: str | None) -> None:
-        cursors = {None: Qt.CursorShape.CrossCursor, "pluck": Qt.CursorShape.OpenHandCursor}
-        self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
-        if on != self._hovered:
-            self._hovered = on
-            self.update()
+            return False
+        return True
 
     def _part_at(self, at: QPointF) -> str | None:
         """The part that can be grabbed there: "pluck", a side, or None for the bare string."""

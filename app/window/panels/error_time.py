@@ -10,7 +10,6 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 
-from app.analysis.error_course import ErrorCourse
 from app.presets import words
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
@@ -92,10 +91,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._show_legend()
 
     def _begin(self, take: Sounding) -> ErrorWindows:
-        if isinstance(take, BlowTake):
-            return take.errors
-        assert isinstance(take, Take)
-        return ErrorCourse(take)
+        return take.error_course
 
     def _draw(self, figures: ErrorWindows) -> None:
         ready = figures.ready

@@ -139,7 +139,7 @@ class SpectrumPanel(CurvesPanel):
         take, choices = moment.sounding, self.session.choices
         if take is None or not self._is_new(*moment.standing(choices)):
             return
-        signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        signals = [HeardSignal(take.listened.signals, s.source, s.gain) for s in shown_sources(choices, self.library)]
         rendered = [signal for signal in signals if signal.there]
         self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
         for signal in signals:

@@ -89,7 +89,7 @@ class StringPanel(StagePanel):
         if take is None:
             self.view.show_frame(None)
             return
-        motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
+        motions = [HeardMotion(take.motions, s.source, s.gain) for s in self._sources]
         rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
         position_s = min([moment.position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])

@@ -102,7 +102,10 @@ class WaveformPanel(CurvesPanel):
         choices, has_grown = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            origin, earlier = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
+            origin, earlier = (
+                HeardSignal(take.listened.signals, source.source, source.gain),
+                before.get(source.source),
+            )
             if not origin.there:
                 continue  # another preset's model, not yet rendered
             drawn = earlier if earlier is not None and earlier.origin == origin else _Drawn(origin)

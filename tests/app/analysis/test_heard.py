@@ -35,7 +35,7 @@ def take(hear: Callable[[Take, Ear], None]) -> Take:
 
 
 def test_a_signal_is_the_takes_own_at_the_first_point(take: Take) -> None:
-    heard = HeardSignal(take.listened, "truth")
+    heard = HeardSignal(take.listened.signals, "truth")
     assert heard.there
     assert (heard.ready, heard.frames, heard.rate_hz) == (2_001, 2_001, 4_000)
     assert heard.read(100, 300) == pytest.approx(take.motion_m("truth")[100:300, 37], abs=1e-9)
@@ -46,15 +46,15 @@ def test_a_signal_is_the_takes_own_at_the_first_point(take: Take) -> None:
 
 def test_the_difference_has_its_gain(take: Take, hear: Callable[[Take, Ear], None]) -> None:
     hear(take, Ear((0.25,)))  # where the second mode is largest
-    difference = HeardSignal(take.listened, DIFFERENCE, 10.0).read(0, 9_999)
+    difference = HeardSignal(take.listened.signals, DIFFERENCE, 10.0).read(0, 9_999)
     hear(take, Ear((0.25,), solo=2))
-    alone = HeardSignal(take.listened, "truth").read(0, 9_999)
+    alone = HeardSignal(take.listened.signals, "truth").read(0, 9_999)
     assert np.abs(alone).max() == pytest.approx(1e-4, rel=1e-3)
     assert difference == pytest.approx(alone, abs=1e-7)  # a tenth, ten times as loud
 
 
 def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Take) -> None:
-    motion, signal = HeardMotion(take, "preset:other"), HeardSignal(take.listened, "preset:other")
+    motion, signal = HeardMotion(take.motions, "preset:other"), HeardSignal(take.listened.signals, "preset:other")
     assert not motion.there
     assert not signal.there
     take.motions["preset:other"] = Pictures(1_000, 11, 0.5)

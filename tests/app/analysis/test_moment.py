@@ -30,7 +30,7 @@ def sine_take(seconds: float = 1.0) -> Take:
 
 
 def both(take: Take) -> list[HeardMotion]:
-    return [HeardMotion(take, name) for name in ("model", "truth")]
+    return [HeardMotion(take.motions, name) for name in ("model", "truth")]
 
 
 def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
@@ -63,7 +63,7 @@ def test_the_difference_and_another_preset_move_too() -> None:
     """The difference with its gain; the other at its own rate and on its own grid, once there is something of it."""
     take = sine_take()
     take.motions["preset:other"] = Pictures(1_000, 11, 1.0)
-    motions = [HeardMotion(take, DIFFERENCE, 10.0), HeardMotion(take, "preset:other")]
+    motions = [HeardMotion(take.motions, DIFFERENCE, 10.0), HeardMotion(take.motions, "preset:other")]
     assert set(frame_at(take, motions, 0.5, 1.0).shapes) == {DIFFERENCE}
     take.motions["preset:other"].append(
         np.linspace(0, 1e-3, 1_001, dtype=np.float32)[:, None] * np.ones(11, np.float32)

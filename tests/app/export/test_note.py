@@ -10,10 +10,9 @@ import pytest
 import soundfile
 
 from app.export.choices import ExportChoices
-from app.export.files import export_sound
 from app.export.note import ExportedPluck, HeardNote, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
-from app.export.sound import SoundRequest, Through, render_sound
+from app.export.sound import SoundRequest
 from app.export.struck import Struck
 from app.instrument.effects import effects_of
 from app.instrument.events import NoteOn, TimedEvent
@@ -22,10 +21,10 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
-from engine.resonators.sine_transform import project
 from engine.sources import ModelSource
 from engine.values.ear import Ear
-from engine.voices import Mixer, Voice, model_program, voice_blocks
+from engine.voices import model_program, voice_blocks
+from tests.app.sounds import export_sound
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")
@@ -36,31 +35,9 @@ def a_note(**more: object) -> ExportedPluck:
     return ExportedPluck(PRESET, 4_000, Pluck(0.35, 4.0), 0.37, **more)  # type: ignore[arg-type]
 
 
-def of_an_earlier_version(source: str = "model") -> SoundRequest:
-    """A pluck by hand that an instrument's body, room and level were added to."""
-    added = {name: getattr(GUITAR, name) for name in ("body", "room", "amp", "level_db")}
-    through = Through(instrument=GUITAR.name, gain=0.5, **added)
-    return SoundRequest(load_preset(PRESET), Pluck(0.35, 4.0), 0.37, 0.3, source, through=through)  # type: ignore[arg-type]
-
-
 def write(note: ExportedPluck, path: Path, choices: ExportChoices = FIXED, source: str = "model") -> np.ndarray:
     NoteExport(note, {source: path}, choices).run(lambda *_: None)  # type: ignore[dict-item]
     return soundfile.read(path, dtype="float32", always_2d=True)[0]
-
-
-def test_body_room_and_level_of_earlier_recipes_are_those_that_a_device_was_given() -> None:
-    found = render_sound(of_an_earlier_version(), 48_000).astype(np.float32)
-    preset = load_preset(PRESET)
-    program = model_program(preset, 48_000)
-    voice = Voice(program, project(Pluck(0.35, 4.0).displacement(101), preset.info.modes), Ear((0.37,)), 0.5)
-    voice.sound_through_effects()
-    mixer = Mixer(48_000, limited=False)
-    mixer.set_effects(effects_of(GUITAR))
-    mixer.add(voice)
-    played = mixer.render(len(found))
-    assert found.shape == (14_400, 2)
-    assert (found == played).all()
-    assert np.abs(found).max() > 0.01
 
 
 @pytest.mark.parametrize("preset", [PRESET, SHIPPED / "nylon_nonlinear_gaussian_16k_lru.safetensors"])
@@ -80,16 +57,11 @@ def test_what_is_compared_is_the_string_alone(preset: Path) -> None:
 @pytest.mark.parametrize("source", ["model", "difference"])
 def test_the_recipe_renders_it_again(tmp_path: Path, source: str) -> None:
     first, again = tmp_path / "a.wav", tmp_path / "b.wav"
-    export_sound(of_an_earlier_version(source), first, FIXED.wav)
+    request = SoundRequest(load_preset(PRESET), Pluck(0.35, 4.0), 0.37, 0.3, source)  # type: ignore[arg-type]
+    export_sound(request, first, FIXED.wav)
     recipe = read_recipe(first)
     export_sound(request_of(recipe, load_preset(PRESET), first), again, recipe.settings)
     assert first.read_bytes() == again.read_bytes()
-
-
-def test_a_difference_of_an_earlier_recipe_has_its_level_alone() -> None:
-    old = of_an_earlier_version("difference")
-    dry, levelled = (render_sound(each) for each in (replace(old, through=None), old))
-    assert (levelled == 0.5 * dry).all()
 
 
 def test_a_key_can_be_written_without_its_instrument(tmp_path: Path) -> None:
@@ -116,13 +88,6 @@ def test_a_room_rings_out_after_the_string() -> None:
     assert not dry[-silence:].any()
     assert len(tail) == round(effects.tail_s(48_000) * 48_000) and np.abs(tail[:4_800]).max() > 1e-4
     assert np.abs(tail[-4_800:]).max() < 0.01 * np.abs(wet).max()
-
-
-def test_a_body_that_has_changed_is_reported() -> None:
-    body = GUITAR.body.model_copy(update={"name": "mine", "mix": 0.5})
-    through = Through(instrument=GUITAR.name, gain=0.5, body=body, body_sha256="0" * 64)
-    with pytest.raises(ValueError, match="the body mine is not the one of Classical guitar"):
-        SoundRequest(load_preset(PRESET), Pluck(), 0.3, 1.0, "both", through=through)
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from app.export import recording, wav
-from app.export.files import export_sound
 from app.export.recording import Recording, blocks
 from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
 from engine.pluck import Pluck
 from engine.presets import load_preset
+from tests.app.sounds import export_sound
 
 
 def test_a_recording_is_what_was_appended() -> None:

@@ -13,8 +13,8 @@ import soundfile
 from app.export.wav import (
     LONGEST_TAG_BYTES,
     NORMALISED_PEAK,
-    Level,
     WavSettings,
+    WrittenSound,
     faded_out,
     quantised,
     write_wav,
@@ -34,7 +34,7 @@ class Written:
     """A WAV file in memory."""
 
     data: bytes
-    level: Level
+    level: WrittenSound
 
 
 def written(

@@ -13,7 +13,6 @@ import soundfile
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
-from app.export.files import export_sound
 from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
 from app.patches.instrument import SingleString
@@ -25,6 +24,7 @@ from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, preset_digest
+from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
 

@@ -14,8 +14,8 @@ import torch
 from app.rendering import Take, blow_job
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, Head
 from app.rendering.blow_job import BlowJob
-from app.rendering.loaded import Loaded
 from app.rendering.strobe import FLASH_HZ
+from app.rendering.subject import Loaded
 from app.rendering.worker import RenderWorker
 from engine.presets import SHIPPED, PresetError, load_preset
 from engine.resonators.drum import DrumModes, modes_of
@@ -134,7 +134,7 @@ def test_any_length_of_blocks_gives_the_same(helper: Executor, monkeypatch: pyte
         assert other.modal_m(name, 0.2, 0.01) == pytest.approx(one.modal_m(name, 0.2, 0.01), abs=1e-10)
         first, second = (take.listened.signals[name].read() for take in (one, other))
         assert second == pytest.approx(first, rel=1e-5, abs=1e-6)
-    assert other.errors.rel_mse == pytest.approx(one.errors.rel_mse, rel=1e-3)
+    assert other.error_course.rel_mse == pytest.approx(one.error_course.rel_mse, rel=1e-3)
 
 
 def test_errors_are_those_over_the_surface(helper: Executor) -> None:
@@ -143,11 +143,11 @@ def test_errors_are_those_over_the_surface(helper: Executor) -> None:
     struck = StruckDrum("tom", TOM.drum, resonator, np.zeros(len(TOM)), speeds, TOM.scale**2, 0.1)
     players = {"model": model_player(LOADED.preset.model)}
     expected = motion_errors(struck, players, RATE_HZ, take.frames - 1)[0].rel_mse
-    assert take.errors.rel_mse == pytest.approx(expected["model"], rel=0.01)
-    curve = take.errors.curves["rmse"][: take.errors.ready]
-    assert take.errors.ready == take.errors.windows > 5
+    assert take.error_course.rel_mse == pytest.approx(expected["model"], rel=0.01)
+    curve = take.error_course.curves["rmse"][: take.error_course.ready]
+    assert take.error_course.ready == take.error_course.windows > 5
     assert curve.min() <= np.sqrt(expected["model"]) <= curve.max()
-    assert np.abs(take.errors.curves["level_db"]).max() < 0.01
+    assert np.abs(take.error_course.curves["level_db"]).max() < 0.01
 
 
 def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:

@@ -399,7 +399,7 @@ def test_keys_and_shortcuts_work_while_an_export_runs_and_it_is_cancelled_by_a_q
             progress(0.0)
             time.sleep(0.01)
 
-    monkeypatch.setattr("app.export.sampled.export.export_sampled", export)
+    monkeypatch.setattr("app.export.sampled.job.export_sampled", export)
     dialog = open_sampler(short)
     short.wait(dialog.isActiveWindow)
     for cancelled in ("by Escape", "by closing"):

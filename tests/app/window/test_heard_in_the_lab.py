@@ -19,7 +19,7 @@ from pytestqt.qtbot import QtBot
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
 from app.export.choices import ExportChoices
-from app.export.sound import SoundRequest, render_sound
+from app.export.sound import SoundRequest
 from app.instrument.events import NoteOn
 from app.patches.library import list_patches
 from app.patches.patch import Patch
@@ -35,6 +35,7 @@ from engine.kernels.constants import AHEAD, QUANTUM
 from engine.presets import SHIPPED, load_preset, of_string
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
+from tests.app.sounds import render_sound
 from tests.app.window.driver import find, press
 
 RATE_HZ = 48_000

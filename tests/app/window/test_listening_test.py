@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QLabel, QPushButton, QSpinBox, QWidget
 
 from app.analysis.abx.trials import AbxChoices
 from app.instrument import events
-from app.instrument.events import PluckAt
+from app.instrument.events import PluckAt, TimedEvent
+from app.instrument.offline import render_events
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window import controller
 from app.window.settings import load_settings
@@ -128,7 +129,17 @@ def test_a_key_is_compared_as_the_instrument_plays_it(
         rate_hz = guitar.controller.sound.rate_hz
         found = render(rate_hz).result(60)
         for source in ("model", "truth"):
-            alone = struck.sound(load_preset(entry.path), source, rate_hz, 0.5, None, True, lambda share: None)
+            alone = render_events(
+                struck.patch,
+                load_preset(entry.path),
+                [TimedEvent(0.0, struck.event)],
+                rate_hz,
+                source,
+                0.5,
+                limited=False,
+                varied=False,
+                dry=True,
+            )
             assert (np.concatenate(list(alone)) == found[source]).all()
         assert 0 < np.abs(found["model"] - found["truth"]).max() < np.abs(found["model"]).max()
         dialog.abandon()

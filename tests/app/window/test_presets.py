@@ -13,7 +13,6 @@ import soundfile
 from PySide6.QtCore import QPoint, QRect, Qt
 
 from app.audio.sound import Sound
-from app.export.files import export_sound
 from app.export.sound import SoundRequest
 from app.instrument.bodies import own_bodies
 from app.patches.instrument import SingleString
@@ -26,6 +25,7 @@ from engine.effects import BODIES, Effects
 from engine.pluck import Pluck
 from engine.presets import load_preset, preset_digest, preset_files
 from tests.app.conftest import no_device
+from tests.app.sounds import export_sound
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, Window
 from training.heard_file import Heard, add_heard

@@ -290,7 +290,7 @@ def test_a_preset_that_cannot_be_read_ends_the_work(
     if gone:
         preset.path.unlink()
     else:
-        monkeypatch.setattr("app.export.sampled.export.load_preset", lambda path: {}["absent"])
+        monkeypatch.setattr("app.export.sampled.job.load_preset", lambda path: {}["absent"])
     run(qtbot, dialog, preset.path.name if gone else "failed: 'absent'")
     assert dialog.state.objectName() == "warning"
     assert dialog.save.isEnabled()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.analysis.error_course import ErrorCourse
 from app.rendering import Take
 from engine.compare.relative import ErrorSums
+from engine.pluck import Pluck
+from engine.presets import read_info
+from engine.values.ear import Ear
 from tests.app.takes import append_to
 
 random = np.random.default_rng(3)
@@ -17,14 +19,17 @@ TRUTH = random.standard_normal((1501, 101)).astype(np.float32)
 MODEL = TRUTH + 0.1 * random.standard_normal((1501, 101)).astype(np.float32)
 
 
-def test_windows_are_the_engines_however_the_take_grows(make_take: Callable[..., Take]) -> None:
-    take = make_take(MODEL, TRUTH, 1)
-    course = ErrorCourse(take)
-    assert not course.advance()
-    for stop in (7, 33, 34, 900, 1501):
+@pytest.fixture
+def take(small_preset: Path) -> Take:
+    """At 4 kHz, without a frame."""
+    info = read_info(small_preset)
+    return Take("small", info, Pluck(0.35, 4.0), (len(TRUTH) - 1) / info.rate_hz, Ear((0.5,)))
+
+
+def test_windows_are_the_engines_however_the_take_grows(take: Take) -> None:
+    course = take.error_course
+    for stop in (1, 7, 33, 34, 900, 1501):
         append_to(take, MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
-        while course.advance():
-            pass
     assert course.complete
     edges_s = np.arange(course.windows + 1) * course.window_s
     sums = ErrorSums(1500)
@@ -35,15 +40,15 @@ def test_windows_are_the_engines_however_the_take_grows(make_take: Callable[...,
     assert course.middle_s[-1] < take.seconds
 
 
-def test_a_model_twice_as_loud(make_take: Callable[..., Take]) -> None:
-    course = ErrorCourse(make_take(2 * TRUTH, TRUTH))
-    course.advance()
+def test_a_model_twice_as_loud(take: Take) -> None:
+    append_to(take, 2 * TRUTH, TRUTH)
+    course = take.error_course
     assert course.curves["level_db"][0] == pytest.approx(20 * np.log10(2))
     assert course.curves["rmse"][0] == course.curves["mae"][0] == pytest.approx(1)
 
 
-def test_a_silent_model_has_no_level(make_take: Callable[..., Take]) -> None:
-    course = ErrorCourse(make_take(0 * TRUTH, TRUTH))
-    course.advance()
+def test_a_silent_model_has_no_level(take: Take) -> None:
+    append_to(take, 0 * TRUTH, TRUTH)
+    course = take.error_course
     assert np.isnan(course.curves["level_db"][0])
     assert course.curves["mae"][0] == 1
