@@ -18,7 +18,8 @@ import numpy as np
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
 from app.export.plugin.identity import PREFIX, check_kept, lost_with
-from app.export.plugin.image import MAKER, Image, layout_header
+from app.export.plugin.image import MAKER, Image
+from app.export.plugin.layout import MOST_IMAGES, layout_header
 from app.export.plugin.objects import STUBS, objects_of, reason_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
@@ -27,7 +28,6 @@ from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError, explain
 from engine.whole_file import naming, whole_file, whole_folder, working_folder
 
-MOST_IMAGES = 128  # of the shell
 FULL_BYTES = 2**24  # where less is left, a build that failed has filled the disk
 COMPILING = 0.97  # of the time of a first build, measured
 COMMON = ("instrument.c", "effects.c", "thread.c", "kernels.c")
@@ -93,7 +93,6 @@ def _build_files(
     cache: Path,
     advanced: Callable[[str, float], None],
 ) -> Path:
-    plugin_format = FORMATS[form]
     path.parent.mkdir(parents=True, exist_ok=True)
     with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
         pass
@@ -109,7 +108,7 @@ def _build_files(
         library = folder / "library"
         _link(
             folder,
-            (*COMMON, *plugin_format.sources, "images.c", "stubs.c"),
+            (*COMMON, f"{form}.c", "images.c", "stubs.c"),
             kernels,
             target,
             library,

@@ -19,22 +19,19 @@ class PluginError(ValueError):
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of plug-in.
+    """A kind of plug-in; its source of the shell has its name.
 
     Attributes:
-        sources: of the shell, added to those of every format.
         ending: of the file or the folder.
         folders: by system, where hosts of one user look for it, below the home folder.
     """
 
-    sources: tuple[str, ...]
     ending: str
     folders: Mapping[str, str]
 
 
 FORMATS: Mapping[str, Format] = {
     "clap": Format(
-        ("clap.c",),
         ".clap",
         {
             "linux": ".clap",
@@ -43,7 +40,6 @@ FORMATS: Mapping[str, Format] = {
         },
     ),
     "vst3": Format(
-        ("vst3.c", "clap.c"),
         ".vst3",
         {
             "linux": ".vst3",
@@ -52,7 +48,6 @@ FORMATS: Mapping[str, Format] = {
         },
     ),
     "lv2": Format(
-        ("lv2.c",),
         ".lv2",
         {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
     ),

@@ -4,17 +4,7 @@
 #ifndef LS_CLAP_ABI_H
 #define LS_CLAP_ABI_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#ifdef _WIN32
-#define LS_EXPORT __declspec(dllexport)
-#else
-#define LS_EXPORT __attribute__((visibility("default")))
-#endif
-
-#define AT(type, field, offset) _Static_assert(offsetof(type, field) == (offset), #type "." #field)
+#include "abi.h"
 
 typedef struct { uint32_t major, minor, revision; } clap_version;
 #define CLAP_VERSION_USED ((clap_version){1, 2, 0})

@@ -9,8 +9,8 @@
 #include "instrument.h"
 
 bool effects_begin(instrument *); /* at its rate and its values; allocates; false where there is no memory */
-slot *effects_mixed(const instrument *); /* the latest mix; NULL: none, or it is not complete */
-void effects_reset(instrument *, slot *mixed); /* to a mixer at rest: nothing rings; the mix is kept where it is the wanted one */
+double *effects_mixed(const instrument *); /* the latest mix; NULL: none, or it is not complete */
+void effects_reset(instrument *, double *mixed); /* to a mixer at rest: nothing rings; the mix is kept where it is the wanted one */
 bool effects_follow(instrument *); /* once a quantum; whether keys have other levels now */
 bool effects_wait(const instrument *); /* whether a response is still to come */
 double effects_tail_s(const instrument *);

@@ -10,20 +10,29 @@
 
 enum { PAUSE_MS = 10 };
 
-typedef struct thread thread;
-
 #ifdef _WIN32
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
-struct thread { void (*run)(void *); void *with; HANDLE of; };
+typedef HANDLE handle;
+#define RUNS DWORD WINAPI
+#else
+#include <pthread.h>
+#include <time.h>
 
-static DWORD WINAPI runs(void *with) {
+typedef pthread_t handle;
+#define RUNS void *
+#endif
+
+typedef struct { void (*run)(void *); void *with; handle of; } thread;
+
+static RUNS runs(void *with) {
   thread *own = with;
   own->run(own->with);
   return 0;
 }
 
+#ifdef _WIN32
 static bool started(thread *own) { return (own->of = CreateThread(NULL, 0, runs, own, 0, NULL)); }
 
 static void wait_for(thread *own) {
@@ -33,17 +42,6 @@ static void wait_for(thread *own) {
 
 void thread_pause(void) { Sleep(PAUSE_MS); }
 #else
-#include <pthread.h>
-#include <time.h>
-
-struct thread { void (*run)(void *); void *with; pthread_t of; };
-
-static void *runs(void *with) {
-  thread *own = with;
-  own->run(own->with);
-  return NULL;
-}
-
 static bool started(thread *own) { return !pthread_create(&own->of, NULL, runs, own); }
 
 static void wait_for(thread *own) { pthread_join(own->of, NULL); }

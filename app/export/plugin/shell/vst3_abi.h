@@ -4,10 +4,7 @@
 #ifndef LS_VST3_ABI_H
 #define LS_VST3_ABI_H
 
-#include <stddef.h>
-#include <stdint.h>
-
-#include "clap_abi.h" /* AT, LS_EXPORT */
+#include "abi.h"
 
 typedef uint16_t vst_text[128]; /* UTF-16 */
 typedef uint8_t vst_uid[16];
