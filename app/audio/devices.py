@@ -57,7 +57,7 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
             open, which a new start would end.
 
     Raises:
-        AudioUnavailable: PortAudio is missing or does not start. Where it finds no output, the list is empty.
+        AudioProblem: PortAudio is missing or does not start. Where it finds no output, the list is empty.
     """
     return sorted((device for _, device in _list(rescan)), key=lambda device: not device.is_default)
 
@@ -66,7 +66,7 @@ def default_device(rescan: bool = False) -> AudioDevice:
     """The system's default output, or the first where none is the default.
 
     Raises:
-        AudioUnavailable: there is no output, or PortAudio is missing.
+        AudioProblem: there is no output, or PortAudio is missing.
     """
     devices = output_devices(rescan)
     if not devices:
@@ -78,7 +78,7 @@ def find(name: str, host_api: str, rescan: bool = False) -> AudioDevice:
     """The output of this name and host API.
 
     Raises:
-        AudioUnavailable: it is not connected (any more), or PortAudio is missing.
+        AudioProblem: it is not connected (any more), or PortAudio is missing.
     """
     return _find(name, host_api, rescan)[1]
 
@@ -90,7 +90,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
     or the latency that the device calls low where that is longer.
 
     Raises:
-        AudioUnavailable: it is gone, in use, or refuses the rate.
+        AudioProblem: it is gone, in use, or refuses the rate.
     """
     from engine.kernels.mixer import call  # imported late, because it may have to be compiled first
 

@@ -52,7 +52,7 @@ class DeviceOutput:
     """A device that plays, at its own rate.
 
     Raises:
-        AudioUnavailable: it cannot be opened or started.
+        AudioProblem: it cannot be opened or started.
     """
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:

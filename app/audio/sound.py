@@ -18,7 +18,7 @@ from queue import Empty, SimpleQueue
 
 from app.audio.devices import AudioDevice, default_device, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, internal, stalled, unexpected, vanished
+from app.audio.problems import AudioProblem, ProblemKind, internal, stalled, unexpected, vanished
 from app.shared.log import faultless, log_fault
 from engine.effects import Effects
 from engine.voices.mixer import Gap, Mixer
@@ -261,18 +261,18 @@ class Sound:
                 return
             self._be_silent()  # it might refuse to be opened twice
             self._open_device(device, wish)
-        except AudioUnavailable as error:
+        except AudioProblem as error:
             if before is not None and present is not None:
                 self._reopen(present, before)
             elif error.kind in (ProblemKind.VANISHED, ProblemKind.OTHER):  # it may come yet
                 self._lose(wish)
-            self._report(error.problem)
+            self._report(error)
 
     def _find_device(self, wish: _Wish, rescan: bool) -> AudioDevice:
-        """The device that is wished for. Raises AudioUnavailable: there is none now, or it cannot be looked for."""
+        """The device that is wished for. Raises AudioProblem: there is none now, or it cannot be looked for."""
         try:
             return wish.at_its_rate(self._look_up(wish.device, rescan))
-        except AudioUnavailable:
+        except AudioProblem:
             raise
         except Exception as error:
             raise unexpected(error, wish.device.name if wish.device else "default") from error
@@ -281,7 +281,7 @@ class Sound:
         """Open a device, with the present mixer where rate and channels stay, else with a new one.
 
         Raises:
-            AudioUnavailable: it could not be opened; the clock takes the frames then.
+            AudioProblem: it could not be opened; the clock takes the frames then.
         """
         rate_hz, channels = device.default_rate_hz, min(device.channels, 2)
         mixer = self.mixer
@@ -293,7 +293,7 @@ class Sound:
             self._output = self._open_output(device, wish.buffer_s_at(rate_hz), mixer)
         except Exception as error:
             self._output = ClockOutput(self.mixer)
-            if isinstance(error, AudioUnavailable):
+            if isinstance(error, AudioProblem):
                 raise
             raise unexpected(error, device.name) from error
         self.mixer = mixer
@@ -315,7 +315,7 @@ class Sound:
         """Open the device again as before a change that was refused; if that fails too, it counts as lost."""
         try:
             self._open_device(device, wish)
-        except AudioUnavailable:
+        except AudioProblem:
             self._lose(wish)
 
     def _be_silent(self) -> None:
@@ -332,7 +332,7 @@ class Sound:
             if not self._resume(output.device):
                 self._be_silent()
                 self._lose(replace(self._wish, device=self._wish.device or output.device))
-                self._report(vanished(output.device.name).problem)
+                self._report(vanished(output.device.name))
         elif output.stalled() and not self._stalled and output.device is not None:
             self._stalled = True
             self._report(stalled(output.device.name))
@@ -344,7 +344,7 @@ class Sound:
             try:
                 self._open_device(self._find_device(self._lost, True), self._lost)
                 self._lost = None
-            except AudioUnavailable:
+            except AudioProblem:
                 pass
 
     def _resume(self, device: AudioDevice) -> bool:
@@ -354,7 +354,7 @@ class Sound:
             return False
         try:
             self._open_device(device, self._wish)
-        except AudioUnavailable:
+        except AudioProblem:
             return False
         self._gaps.append(Gap(mixer.seconds, "device", 1000 * (time.monotonic() - began_s)))
         return True

@@ -17,7 +17,7 @@ import pytest
 import app
 from app.audio.devices import AudioDevice, close_device, default_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
-from app.audio.problems import AudioUnavailable, ProblemKind
+from app.audio.problems import AudioProblem, ProblemKind
 from engine.kernels.mixer import call
 from engine.kernels.mixer_records import CAUSE_DEVICE
 from engine.kernels.voice import note_gap
@@ -220,7 +220,7 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
 ) -> None:
     wanted = find("Speakers", "ALSA")
     fault(portaudio)
-    with pytest.raises(AudioUnavailable, match=message) as caught:
+    with pytest.raises(AudioProblem, match=message) as caught:
         DeviceOutput(wanted, 0.05, mixer)
     error = portaudio.open_error or portaudio.start_error
     assert caught.value.kind is kind and caught.value.remedy in str(caught.value)
@@ -233,7 +233,7 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
 def test_no_output_at_all(portaudio: FakeSoundDevice) -> None:
     portaudio.entries[:] = [("Microphone", 0, 0)]
     assert output_devices() == []
-    with pytest.raises(AudioUnavailable, match="No audio output") as caught:
+    with pytest.raises(AudioProblem, match="No audio output") as caught:
         default_device()
     assert caught.value.kind is ProblemKind.NO_DEVICE
 
@@ -247,7 +247,7 @@ def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyP
         return original(name, *arguments, **options)
 
     monkeypatch.setattr("builtins.__import__", refuse)
-    with pytest.raises(AudioUnavailable) as caught:
+    with pytest.raises(AudioProblem) as caught:
         output_devices()
     assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
     assert caught.value.detail == "PortAudio library not found"

@@ -13,7 +13,7 @@ import pytest
 
 from app.audio import sound as sound_module
 from app.audio.devices import AudioDevice
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
+from app.audio.problems import AudioProblem, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
 from engine.effects import Effects
 from engine.values.effects import Room
@@ -55,7 +55,7 @@ class Desk:
     """The computer's devices, and all that was asked of them."""
 
     devices: list[AudioDevice] = field(default_factory=lambda: [HEADPHONES, SPEAKERS])
-    refuses: Callable[[AudioDevice], AudioUnavailable | None] = lambda device: None
+    refuses: Callable[[AudioDevice], AudioProblem | None] = lambda device: None
     while_opening: Callable[[], object] = lambda: None
     outputs: list[FakeOutput] = field(default_factory=list)
     rescans: int = 0
@@ -225,11 +225,11 @@ def test_closing_frees_the_device_and_may_be_repeated(
 # Faults of devices: what happens, which problem is reported, and that sound or time continues
 
 
-def busy(device: AudioDevice) -> AudioUnavailable | None:
+def busy(device: AudioDevice) -> AudioProblem | None:
     return refused(ValueError("busy"), device.name, 44_100) if device == SPEAKERS else None
 
 
-def slow_only(device: AudioDevice) -> AudioUnavailable | None:
+def slow_only(device: AudioDevice) -> AudioProblem | None:
     fast = device.default_rate_hz == 192_000
     return refused(ValueError("Invalid sample rate"), device.name, 192_000) if fast else None
 
