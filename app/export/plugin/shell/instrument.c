@@ -318,34 +318,20 @@ static void apply_due(instrument *own) {
   memmove(own->changes, own->changes + done, (size_t)own->waiting * sizeof(change));
 }
 
-/* Makes denormal numbers zero in this thread; returns the mode before. */
-static uint64_t begin_flushing(void) {
+/* The mode of this thread's arithmetic; with FLUSHING, denormal numbers are zero. */
 #if defined(__x86_64__)
-  unsigned int before = _mm_getcsr();
-  _mm_setcsr(before | 0x8040);
-  return before;
-#elif defined(__aarch64__)
-  uint64_t before;
-  __asm__ volatile("mrs %0, fpcr" : "=r"(before));
-  __asm__ volatile("msr fpcr, %0" ::"r"(before | (1 << 24)));
-  return before;
+enum { FLUSHING = 0x8040 };
+static uint64_t mode(void) { return _mm_getcsr(); }
+static void set_mode(uint64_t mode) { _mm_setcsr((unsigned int)mode); }
 #else
-  return 0;
+enum { FLUSHING = 1 << 24 };
+static uint64_t mode(void) { return __builtin_arm_rsr64("fpcr"); }
+static void set_mode(uint64_t mode) { __builtin_arm_wsr64("fpcr", mode); }
 #endif
-}
-
-static void end_flushing(uint64_t before) {
-#if defined(__x86_64__)
-  _mm_setcsr((unsigned int)before);
-#elif defined(__aarch64__)
-  __asm__ volatile("msr fpcr, %0" ::"r"(before));
-#else
-  (void)before;
-#endif
-}
 
 static void render(instrument *own, uint32_t frames, float *left, float *right) {
-  uint64_t before = begin_flushing();
+  uint64_t before = mode();
+  set_mode(before | FLUSHING);
   own->mixer->peak = 0; /* of what is rendered now */
   for (uint32_t done = 0; done < frames;) {
     int64_t rendered = own->mixer->left, left_over = frames - done;
@@ -364,7 +350,7 @@ static void render(instrument *own, uint32_t frames, float *left, float *right) 
     }
     done += (uint32_t)count;
   }
-  end_flushing(before);
+  set_mode(before);
 }
 
 void instrument_play(instrument *own, uint32_t frames, float **channels, uint32_t count, event_source next, void *context) {

@@ -1,5 +1,5 @@
 /* The part of VST3's binary interface that the shell uses: facts of its public C interface, written from its documentation.
-   https://steinbergmedia.github.io/vst3_dev_portal - every offset that matters is asserted. */
+   https://steinbergmedia.github.io/vst3_dev_portal - of each record the size or its last place is asserted. */
 
 #ifndef LS_VST3_ABI_H
 #define LS_VST3_ABI_H
@@ -47,7 +47,6 @@ AT(vst_factory_info, flags, 448);
 enum { VST_FACTORY_UNICODE = 16 };
 enum { VST_MANY_INSTANCES = 0x7FFFFFFF };
 typedef struct { vst_uid id; int32_t cardinality; char category[32], name[64]; } vst_class;
-AT(vst_class, name, 52);
 _Static_assert(sizeof(vst_class) == 116, "vst_class");
 typedef struct {
   vst_uid id;
@@ -56,7 +55,6 @@ typedef struct {
   uint32_t flags;
   char subcategories[128], vendor[64], version[64], sdk[64];
 } vst_class2;
-AT(vst_class2, flags, 116);
 _Static_assert(sizeof(vst_class2) == 440, "vst_class2");
 typedef struct {
   vst_uid id;
@@ -67,7 +65,6 @@ typedef struct {
   char subcategories[128];
   uint16_t vendor[64], version[64], sdk[64];
 } vst_class3;
-AT(vst_class3, flags, 180);
 _Static_assert(sizeof(vst_class3) == 696, "vst_class3");
 typedef struct {
   UNKNOWN_FIELDS;
@@ -144,9 +141,6 @@ typedef struct {
     void *others;
   };
 } vst_event;
-AT(vst_event, type, 18);
-AT(vst_event, on.channel, 24);
-AT(vst_event, on.velocity, 32);
 AT(vst_event, on.note, 40);
 AT(vst_event, off.note, 32);
 AT(vst_event, expression.value, 32);
@@ -165,7 +159,6 @@ typedef struct {
   vst_events *events, *events_out;
   void *context;
 } vst_process;
-AT(vst_process, outputs, 32);
 AT(vst_process, events, 56);
 typedef struct {
   UNKNOWN_FIELDS;
@@ -188,8 +181,6 @@ typedef struct {
   double standard;
   int32_t unit, flags;
 } vst_parameter;
-AT(vst_parameter, steps, 772);
-AT(vst_parameter, standard, 776);
 AT(vst_parameter, flags, 788);
 enum { VST_CAN_AUTOMATE = 1, VST_LIST = 8, VST_HIDDEN = 16 };
 typedef struct {
@@ -223,7 +214,6 @@ typedef struct {
   uint32_t parameter;
   int32_t flags;
 } vst_expression;
-AT(vst_expression, range, 776);
 AT(vst_expression, flags, 812);
 enum { VST_BIPOLAR = 1, VST_ABSOLUTE = 4 };
 typedef struct {
