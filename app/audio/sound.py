@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from queue import Empty, SimpleQueue
 
-from app.audio.devices import AudioDevice, default_device, find
+from app.audio.devices import AudioDevice, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
 from app.audio.problems import AudioProblem, ProblemKind, internal, stalled, unexpected, vanished
 from app.shared.log import faultless, log_fault
@@ -77,11 +77,6 @@ class _Wish:
         return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
 
 
-def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as PortAudio lists it now; for None the system's default. Errors as `devices.find`."""
-    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
-
-
 class Sound:
     """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
 
@@ -95,7 +90,7 @@ class Sound:
         self,
         on_problem: Callable[[AudioProblem], None] | None = None,
         rate_hz: int = DEFAULT_RATE_HZ,
-        look_up: LookUp = look_up,
+        look_up: LookUp = find,
         open_output: Open = DeviceOutput,
     ) -> None:
         self._on_problem = faultless(on_problem or (lambda problem: None), "while a fault of the sound was reported")
