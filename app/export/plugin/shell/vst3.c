@@ -9,12 +9,11 @@
 
 #include "instrument.h"
 
-enum { FACE_COMPONENT, FACE_PROCESSOR, FACE_CONTROLLER, FACE_MIDI_MAPPING, FACE_EXPRESSIONS, FACE_REQUIREMENTS, FACES };
-enum { MOST_EVENTS = 1024, MOST_CHANGED = 768, MOST_NOTES_KNOWN = 256 };
+enum { FACES = 6, MOST_EVENTS = 1024, MOST_CHANGED = 768, MOST_NOTES_KNOWN = 256 };
 
 /* Controllers that messages of a host reach by hidden parameters, for each channel of MIDI. */
 static const int16_t CONTROLLERS[] = {1, 6, 7, 11, 38, 64, 74, 96, 97, 98, 99, 100, 101, 120, 121, 123, VST_PITCH_BEND};
-enum { CONTROLLER_COUNT = sizeof CONTROLLERS / sizeof *CONTROLLERS, MIDI_CHANNELS = 16 };
+enum { A_CHANNEL = sizeof CONTROLLERS / sizeof *CONTROLLERS, MIDI_CHANNELS = 16, CONTROLLER_COUNT = A_CHANNEL * MIDI_CHANNELS };
 static const uint32_t FIRST_CONTROLLER = 0x7FFF0000;
 
 static double standard_of(int16_t number) {
@@ -30,7 +29,7 @@ struct shell {
   atomic_uint references;
   instrument own;
   double rate_hz;
-  double shown[MOST_PARAMETERS], controllers[MIDI_CHANNELS][CONTROLLER_COUNT]; /* normalised */
+  double shown[MOST_PARAMETERS + CONTROLLER_COUNT]; /* normalised, controllers behind the parameters */
   known_note known[MOST_NOTES_KNOWN];
   uint32_t known_count;
   event events[MOST_EVENTS];
@@ -106,12 +105,10 @@ static void show(shell *own) {
     own->shown[place] = from_plain(&parameters_of(own->own.of)[place], own->own.values[place]);
 }
 
-static double *controller_with_id(shell *own, uint32_t id, int32_t *channel, int32_t *number) {
-  uint32_t place = id - FIRST_CONTROLLER;
-  if (id < FIRST_CONTROLLER || place >= MIDI_CHANNELS * CONTROLLER_COUNT) return NULL;
-  *channel = (int32_t)(place / CONTROLLER_COUNT);
-  *number = (int32_t)(place % CONTROLLER_COUNT);
-  return &own->controllers[*channel][*number];
+/* The place in `shown`; -1: there is none. */
+static int32_t shown_place(const shell *own, uint32_t id) {
+  int32_t place = parameter_with_id(own->own.of, id);
+  return place < 0 && id - FIRST_CONTROLLER < CONTROLLER_COUNT ? (int32_t)(MOST_PARAMETERS + id - FIRST_CONTROLLER) : place;
 }
 
 /* Hosts give changes and notes apart, each in the order of frames. */
@@ -132,24 +129,20 @@ static bool next_event(void *context, event *to) {
 }
 
 static void add_change(shell *own, int32_t frame, uint32_t id, double value) {
-  int32_t channel, number, place = parameter_with_id(own->own.of, id);
-  if (!isfinite(value)) return; /* the last one stays */
-  value = fmin(fmax(value, 0), 1);
-  if (place >= 0) {
+  int32_t place = shown_place(own, id), number = place - MOST_PARAMETERS;
+  if (place < 0 || !isfinite(value)) return; /* the last one stays */
+  value = own->shown[place] = fmin(fmax(value, 0), 1);
+  if (number < 0) {
     double plain = to_plain(&parameters_of(own->own.of)[place], value);
     add_event(own, frame, (event){.kind = PARAMETER, .key = place, .value = plain}, MOST_CHANGED);
-    own->shown[place] = value;
     return;
   }
-  double *kept = controller_with_id(own, id, &channel, &number);
-  if (!kept) return;
-  *kept = value;
-  bool bends = CONTROLLERS[number] == VST_PITCH_BEND;
+  int32_t channel = number / A_CHANNEL, controller = CONTROLLERS[number % A_CHANNEL];
   int32_t wheel = (int32_t)(16383 * value + 0.5), steps = (int32_t)(127 * value + 0.5);
   uint8_t bent[] = {(uint8_t)(0xE0 | channel), (uint8_t)(wheel & 127), (uint8_t)(wheel >> 7)};
-  uint8_t moved[] = {(uint8_t)(0xB0 | channel), (uint8_t)CONTROLLERS[number], (uint8_t)steps};
+  uint8_t moved[] = {(uint8_t)(0xB0 | channel), (uint8_t)controller, (uint8_t)steps};
   event of;
-  if (event_of_midi(bends ? bent : moved, &of)) add_event(own, frame, of, MOST_EVENTS);
+  if (event_of_midi(controller == VST_PITCH_BEND ? bent : moved, &of)) add_event(own, frame, of, MOST_EVENTS);
 }
 
 /* Component */
@@ -340,7 +333,7 @@ static int32_t set_component_state(void *interface, vst_stream *stream) { return
 static int32_t no_state(void *, vst_stream *) { return VST_OK; }
 
 static int32_t parameter_count(void *interface) {
-  return (int32_t)shell_of(interface)->own.of->parameter_count + MIDI_CHANNELS * CONTROLLER_COUNT;
+  return (int32_t)shell_of(interface)->own.of->parameter_count + CONTROLLER_COUNT;
 }
 
 static int32_t parameter_info(void *interface, int32_t index, vst_parameter *info) {
@@ -348,9 +341,9 @@ static int32_t parameter_info(void *interface, int32_t index, vst_parameter *inf
   if (index < 0 || index >= parameter_count(interface)) return VST_BAD_ARGUMENT;
   memset(info, 0, sizeof *info);
   if (index >= of->parameter_count) {
-    int32_t place = index - (int32_t)of->parameter_count, number = CONTROLLERS[place % CONTROLLER_COUNT];
+    int32_t place = index - (int32_t)of->parameter_count, number = CONTROLLERS[place % A_CHANNEL];
     char name[64];
-    snprintf(name, sizeof name, "MIDI channel %02d controller %03d", place / CONTROLLER_COUNT + 1, number);
+    snprintf(name, sizeof name, "MIDI channel %02d controller %03d", place / A_CHANNEL + 1, number);
     info->id = FIRST_CONTROLLER + (uint32_t)place;
     info->standard = standard_of((int16_t)number);
     info->flags = VST_CAN_AUTOMATE | VST_HIDDEN;
@@ -398,22 +391,19 @@ static double normal_of(void *interface, uint32_t id, double plain) {
 }
 
 static double shown(void *interface, uint32_t id) {
-  shell *own = shell_of(interface);
-  int32_t channel, number, place = parameter_with_id(own->own.of, id);
-  if (place >= 0) return own->shown[place];
-  const double *kept = controller_with_id(own, id, &channel, &number);
-  return kept ? *kept : 0;
+  const shell *own = shell_of(interface);
+  int32_t place = shown_place(own, id);
+  return place < 0 ? 0 : own->shown[place];
 }
 
 /* What the host shows. Its processor learns of it by `process`, or here while it is not active. */
 static int32_t set_shown(void *interface, uint32_t id, double value) {
   shell *own = shell_of(interface);
-  int32_t channel, number, place = parameter_with_id(own->own.of, id);
+  int32_t place = shown_place(own, id);
   if (!isfinite(value)) return VST_BAD_ARGUMENT;
-  double *kept = place >= 0 ? &own->shown[place] : controller_with_id(own, id, &channel, &number);
-  if (!kept) return VST_FALSE;
-  *kept = fmin(fmax(value, 0), 1);
-  if (place >= 0 && !own->own.mixer) instrument_set(&own->own, place, to_plain(&parameters_of(own->own.of)[place], *kept));
+  if (place < 0) return VST_FALSE;
+  value = own->shown[place] = fmin(fmax(value, 0), 1);
+  if (place < MOST_PARAMETERS && !own->own.mixer) instrument_set(&own->own, place, to_plain(&parameters_of(own->own.of)[place], value));
   return VST_OK;
 }
 
@@ -427,9 +417,9 @@ static const vst_controller controller = {query, add_reference, release, initial
 
 static int32_t assignment(void *, int32_t bus, int16_t channel, int16_t number, uint32_t *id) {
   if (bus || channel < 0 || channel >= MIDI_CHANNELS) return VST_FALSE;
-  for (int32_t place = 0; place < CONTROLLER_COUNT; place++) {
+  for (int32_t place = 0; place < A_CHANNEL; place++) {
     if (CONTROLLERS[place] != number) continue;
-    *id = FIRST_CONTROLLER + (uint32_t)(channel * CONTROLLER_COUNT + place);
+    *id = FIRST_CONTROLLER + (uint32_t)(channel * A_CHANNEL + place);
     return VST_OK;
   }
   return VST_FALSE;
@@ -467,24 +457,20 @@ static uint32_t requirements(void *) { return 0; } /* neither tempo nor position
 
 static const vst_requirements required = {query, add_reference, release, requirements};
 
+static const struct { const vst_uid *id; const void *table; } INTERFACES[FACES] = {
+    {&UID_COMPONENT, &component},       {&UID_PROCESSOR, &processor},     {&UID_CONTROLLER, &controller},
+    {&UID_MIDI_MAPPING, &midi_mapping}, {&UID_EXPRESSIONS, &expressions}, {&UID_REQUIREMENTS, &required}};
+
 static int32_t query(void *interface, const vst_uid id, void **found) {
-  shell *own = shell_of(interface);
-  static const struct { const vst_uid *id; int32_t face; } all[] = {
-      {&UID_UNKNOWN, FACE_COMPONENT},   {&UID_BASE, FACE_COMPONENT},           {&UID_COMPONENT, FACE_COMPONENT},     {&UID_PROCESSOR, FACE_PROCESSOR},
-      {&UID_CONTROLLER, FACE_CONTROLLER}, {&UID_MIDI_MAPPING, FACE_MIDI_MAPPING}, {&UID_EXPRESSIONS, FACE_EXPRESSIONS}, {&UID_REQUIREMENTS, FACE_REQUIREMENTS}};
-  *found = NULL;
-  for (size_t place = 0; place < sizeof all / sizeof *all; place++) {
-    if (!same(id, *all[place].id)) continue;
-    add_reference(interface);
-    *found = &own->faces[all[place].face];
-    return VST_OK;
-  }
-  return VST_NO_INTERFACE;
+  bool any = same(id, UID_UNKNOWN) || same(id, UID_BASE);
+  int32_t place = 0;
+  while (!any && place < FACES && !same(id, *INTERFACES[place].id)) place++;
+  *found = place < FACES ? &shell_of(interface)->faces[place] : NULL;
+  if (*found) add_reference(interface);
+  return *found ? VST_OK : VST_NO_INTERFACE;
 }
 
 /* Factory */
-
-static const char SUBCATEGORIES[] = "Instrument|Synth", CATEGORY[] = "Audio Module Class", SDK[] = "VST 3.7";
 
 /* The same identifier is written the same on all systems, and lies in memory as each has it. */
 static void class_id(const image *of, vst_uid id) {
@@ -515,22 +501,18 @@ static int32_t class_count(void *) { return image_count; }
 static int32_t class_info2(void *, int32_t index, vst_class2 *info) {
   if (index < 0 || index >= image_count) return VST_BAD_ARGUMENT;
   const image *of = images[index];
-  memset(info, 0, sizeof *info);
-  class_id(of, info->id);
-  info->cardinality = VST_MANY_INSTANCES;
-  memcpy(info->category, CATEGORY, sizeof CATEGORY);
-  memcpy(info->name, of->name, sizeof info->name);
-  memcpy(info->subcategories, SUBCATEGORIES, sizeof SUBCATEGORIES);
+  *info = (vst_class2){.first.cardinality = VST_MANY_INSTANCES, .first.category = "Audio Module Class", .subcategories = "Instrument|Synth",
+                       .version = LS_VERSION, .sdk = "VST 3.7"};
+  class_id(of, info->first.id);
+  memcpy(info->first.name, of->name, sizeof info->first.name);
   memcpy(info->vendor, of->maker, sizeof info->vendor);
-  memcpy(info->version, LS_VERSION, sizeof LS_VERSION);
-  memcpy(info->sdk, SDK, sizeof SDK);
   return VST_OK;
 }
 
 static int32_t class_info(void *interface, int32_t index, vst_class *info) {
   vst_class2 whole;
   int32_t result = class_info2(interface, index, &whole);
-  if (result == VST_OK) memcpy(info, &whole, sizeof *info);
+  if (result == VST_OK) *info = whole.first;
   return result;
 }
 
@@ -539,11 +521,9 @@ static int32_t class_info3(void *interface, int32_t index, vst_class3 *info) {
   int32_t result = class_info2(interface, index, &whole);
   if (result != VST_OK) return result;
   memset(info, 0, sizeof *info);
-  memcpy(info->id, whole.id, sizeof whole.id);
-  info->cardinality = whole.cardinality;
-  memcpy(info->category, whole.category, sizeof whole.category);
+  memcpy(info, &whole, offsetof(vst_class, name));
   memcpy(info->subcategories, whole.subcategories, sizeof whole.subcategories);
-  write_text(info->name, 64, whole.name);
+  write_text(info->name, 64, whole.first.name);
   write_text(info->vendor, 64, whole.vendor);
   write_text(info->version, 64, whole.version);
   write_text(info->sdk, 64, whole.sdk);
@@ -562,10 +542,8 @@ static int32_t create(void *, const char *id, const char *wanted, void **found) 
     instrument_reset_values(&own->own);
     own->rate_hz = 48000;
     own->references = 1;
-    const void *tables[FACES] = {&component, &processor, &controller, &midi_mapping, &expressions, &required};
-    for (int32_t face_number = 0; face_number < FACES; face_number++) own->faces[face_number] = (face){tables[face_number], own};
-    for (int32_t channel = 0; channel < MIDI_CHANNELS; channel++)
-      for (int32_t number = 0; number < CONTROLLER_COUNT; number++) own->controllers[channel][number] = standard_of(CONTROLLERS[number]);
+    for (int32_t place = 0; place < FACES; place++) own->faces[place] = (face){INTERFACES[place].table, own};
+    for (int32_t place = 0; place < CONTROLLER_COUNT; place++) own->shown[MOST_PARAMETERS + place] = standard_of(CONTROLLERS[place % A_CHANNEL]);
     show(own);
     int32_t result = query(own->faces, (const uint8_t *)wanted, found);
     release(own->faces); /* the host's reference keeps it */

@@ -49,9 +49,7 @@ enum { VST_MANY_INSTANCES = 0x7FFFFFFF };
 typedef struct { vst_uid id; int32_t cardinality; char category[32], name[64]; } vst_class;
 _Static_assert(sizeof(vst_class) == 116, "vst_class");
 typedef struct {
-  vst_uid id;
-  int32_t cardinality;
-  char category[32], name[64];
+  vst_class first;
   uint32_t flags;
   char subcategories[128], vendor[64], version[64], sdk[64];
 } vst_class2;
