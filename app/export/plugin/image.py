@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.export.plugin.identity import identifier
-from app.export.plugin.layout import IMAGE, KINDS, MACRO, PARAMETER, SOURCES
+from app.export.plugin.layout import IMAGE, KINDS, MACRO, MOST_PARAMETERS, PARAMETER, SOURCES
 from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
@@ -91,14 +91,12 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     Raises:
         ValueError: its model learned one string only, its tuning is impossible, or no key sounds.
     """
-    drums = isinstance(patch.strings, Drums)
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     table = player.table
     assert table is not None
     if not any(_sounds(player.keys, key) for key in range(of.KEYS)):
         raise ValueError(f"{patch.name}: no key sounds with {preset.path}; choose another pick-up")
     header = np.zeros((), IMAGE)
-    header["magic"], header["version"] = b"LSPLUGIN", 1
     header["modes"] = min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS
     header["most_notes"] = MOST_NOTES
     whole = bytearray(header.tobytes())
@@ -119,6 +117,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     taps = differentiator_taps(1) * (FULL_SCALE_M / FULL_SCALE_M_S)
     header["taps"] = put(taps.tobytes()) // 8
     parameters = dict(_parameters(patch))
+    assert len(parameters) <= MOST_PARAMETERS
     header["parameters"] = put(b"".join(knob.tobytes() for knob in parameters.values()))
     header["parameter_count"] = len(parameters)
     macros, left_out = _macros(patch, tuple(parameters))
@@ -137,9 +136,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header["maker"] = MAKER.encode()
     header["uid"] = np.frombuffer(uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes, np.uint8)
     header["description"] = _bytes(patch.description, 511)
-    header["features"] = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()
     header["category"] = patch.category.encode()
-    header["bytes"] = len(whole)
     whole[: IMAGE.itemsize] = header.tobytes()
     controls = (
         Control(

@@ -44,9 +44,6 @@ TARGET = np.dtype([("parameter", np.int32), ("spare", np.int32), ("low", R), ("h
 MACRO = np.dtype([("count", np.int32), ("spare", np.int32), ("targets", TARGET, MOST_TARGETS)])
 IMAGE = np.dtype(
     [
-        ("magic", "S8"),
-        ("version", W),
-        ("bytes", W),
         *((name, W) for name in ("table", "table_slots", "model", "model_slots", "truth", "truth_slots")),  # in slots
         *((name, W) for name in ("parameters", "parameter_count", "macros", "macro_count")),  # in bytes
         ("taps", W),
@@ -65,7 +62,6 @@ IMAGE = np.dtype(
         ("name", "S64"),
         ("description", "S512"),
         ("maker", "S64"),
-        ("features", "S128"),
         ("category", "S16"),
         ("uid", np.uint8, 16),  # of VST3
     ]

@@ -247,24 +247,21 @@ static const void *shell_extension(const clap_plugin *, const char *id) {
 
 /* The factory */
 
-enum { MOST_FEATURES = 8 };
 static clap_descriptor descriptors[MOST_IMAGES];
-static char feature_words[MOST_IMAGES][128];
-static const char *features[MOST_IMAGES][MOST_FEATURES + 1];
 static char provider_id[160];
 static const clap_preset_descriptor provider_descriptor = {CLAP_VERSION_USED, provider_id, "Instruments", "Learned Strings"};
+
+static const char *const *features_of(const image *of) {
+  static const char *const strings[] = {"instrument", "synthesizer", "stereo", NULL}, *const drums[] = {"instrument", "drum", "stereo", NULL};
+  return of->kit ? drums : strings;
+}
 
 static bool entry_init(const char *) {
   if (image_count == 1) snprintf(provider_id, sizeof provider_id, "%s.presets", images[0]->id);
   else strcpy(provider_id, "org.learned-strings.bank.presets"); /* whole, so that it is not read as an instrument's */
   for (int32_t each = 0; each < image_count; each++) {
     const image *of = images[each];
-    memcpy(feature_words[each], of->features, sizeof of->features);
-    int32_t count = 0;
-    for (char *word = strtok(feature_words[each], " "); word && count < MOST_FEATURES; word = strtok(NULL, " "))
-      features[each][count++] = word;
-    features[each][count] = NULL;
-    descriptors[each] = (clap_descriptor){CLAP_VERSION_USED, of->id, of->name, of->maker, "", "", "", LS_VERSION, of->description, features[each]};
+    descriptors[each] = (clap_descriptor){CLAP_VERSION_USED, of->id, of->name, of->maker, "", "", "", LS_VERSION, of->description, features_of(of)};
   }
   return true;
 }
@@ -310,7 +307,7 @@ static bool provider_metadata(const clap_preset_provider *, uint32_t kind, const
     if (to->set_flags) to->set_flags(to, CLAP_PRESET_IS_FACTORY);
     if (to->add_creator) to->add_creator(to, of->maker);
     if (to->set_description) to->set_description(to, of->description);
-    for (const char **feature = features[each]; to->add_feature && *feature; feature++) to->add_feature(to, *feature);
+    for (const char *const *feature = features_of(of); to->add_feature && *feature; feature++) to->add_feature(to, *feature);
     if (to->add_feature) to->add_feature(to, of->category);
   }
   return true;

@@ -1,11 +1,13 @@
-/* See effects.h. Only effects_begin and the thread allocate. */
+/* Body and room as the convolver hears them, at their mixes, size and time.
 
-#include "effects.h"
+   Mixes are followed by the audio thread, a part a quantum. Another size or time needs another response, which a thread
+   computes beside the sound; while a host renders offline, the sound waits for it, so that it is the same each time.
+   Only effects_begin and the thread allocate. */
+
+#include "instrument.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "thread.h"
 
 extern const int32_t *const noise; /* of rooms (frames, 2) */
 
@@ -108,7 +110,7 @@ static bool adopt(instrument *own) {
 }
 
 static void wait_offline(effects *e) {
-  while (e->offline && e->thread && !e->made && e->answered != e->asked) thread_pause();
+  while (e->offline && e->thread.handle && !e->made && e->answered != e->asked) thread_pause();
 }
 
 bool effects_follow(instrument *own) {
@@ -134,7 +136,7 @@ bool effects_follow(instrument *own) {
 
 bool effects_wait(const instrument *own) {
   const effects *e = &own->effects;
-  return e->thread && (e->made || e->answered != e->asked);
+  return e->thread.handle && (e->made || e->answered != e->asked);
 }
 
 /* Begin and end */
@@ -160,7 +162,7 @@ bool effects_begin(instrument *own) {
   }
   take_curves(own);
   e->ends = false;
-  e->thread = thread_begin(work, own); /* without it, size and time stay as they are */
+  thread_begin(&e->thread, work, own); /* without it, size and time stay as they are */
   return true;
 }
 
@@ -187,8 +189,7 @@ void effects_reset(instrument *own, double *mixed) {
 void effects_end(instrument *own) {
   effects *e = &own->effects;
   e->ends = true;
-  thread_end(e->thread);
-  e->thread = NULL;
+  thread_end(&e->thread);
   e->asked = e->answered = 0;
   free(atomic_exchange(&e->made, NULL));
   free(atomic_exchange(&e->spent, NULL));

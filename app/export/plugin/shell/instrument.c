@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "effects.h"
-
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 #endif

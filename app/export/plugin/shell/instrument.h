@@ -10,6 +10,7 @@
 
 #include "abi.h"
 #include "layout.h"
+#include "thread.h"
 
 enum { MOST_CHANGES = 512, STATE_BYTES = 8 + 12 * MOST_PARAMETERS, MOST_STATE_BYTES = 8 + 12 * 4096 };
 
@@ -35,7 +36,7 @@ typedef struct {
   double *mixes[2], *mixing_to;   /* what is heard, and the next; the one that is mixed */
   int64_t most_frames, most_slots, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
   double mixing[2], weights[4];   /* of the latest mix */
-  void *thread;                   /* it computes a response of `size` and `t60_s` whenever another one is asked for */
+  thread thread;                  /* it computes a response of `size` and `t60_s` whenever another one is asked for */
   _Atomic double size, t60_s;
   atomic_uint asked, answered;
   _Atomic(prepared *) made, spent; /* to the audio thread, and back */
@@ -63,6 +64,19 @@ typedef struct {
   bool moved;         /* a macro has moved other parameters since the host read them */
   atomic_bool loaded; /* a state or preset that the next block takes up */
 } instrument;
+
+/* See effects.c */
+
+bool effects_begin(instrument *); /* at its rate and its values; allocates; false where there is no memory */
+double *effects_mixed(const instrument *); /* the latest mix; NULL: none, or it is not complete */
+void effects_reset(instrument *, double *mixed); /* to a mixer at rest: nothing rings; the mix is kept where it is the wanted one */
+bool effects_follow(instrument *); /* once a quantum; whether keys have other levels now */
+bool effects_wait(const instrument *); /* whether a response is still to come */
+double effects_tail_s(const instrument *);
+void effects_end(instrument *);
+void effects_free(instrument *); /* and what is kept from rate to rate */
+
+/* See instrument.c */
 
 int32_t image_with_id(const char *id); /* its number; -1: there is none */
 const parameter *parameters_of(const image *);
