@@ -198,8 +198,8 @@ static int32_t get_state(void *interface, vst_stream *stream) {
   return VST_OK;
 }
 
-static const vst_component component = {query, add_reference, release, initialize, terminate, controller_class, set_io_mode,
-                                        bus_count, bus_info, routing, activate_bus, set_active, set_state, get_state};
+static const void *const component[] = {query, add_reference, release, initialize, terminate, controller_class, set_io_mode, bus_count, bus_info,
+                                        routing, activate_bus, set_active, set_state, get_state};
 
 /* Processor */
 
@@ -323,8 +323,8 @@ static int32_t process(void *interface, vst_process *data) {
   return VST_OK;
 }
 
-static const vst_processor processor = {query, add_reference, release, set_arrangements, arrangement, can_sample_size,
-                                        latency, setup, set_processing, process, tail};
+static const void *const processor[] = {query, add_reference, release, set_arrangements, arrangement, can_sample_size, latency, setup,
+                                        set_processing, process, tail};
 
 /* Controller */
 
@@ -411,9 +411,9 @@ static int32_t set_handler(void *, void *) { return VST_OK; }
 
 static void *create_view(void *, const char *) { return NULL; }
 
-static const vst_controller controller = {query, add_reference, release, initialize, terminate, set_component_state, no_state, no_state,
-                                          parameter_count, parameter_info, text_of, value_of, plain_of, normal_of, shown, set_shown,
-                                          set_handler, create_view};
+static const void *const controller[] = {query, add_reference, release, initialize, terminate, set_component_state, no_state, no_state,
+                                         parameter_count, parameter_info, text_of, value_of, plain_of, normal_of, shown, set_shown, set_handler,
+                                         create_view};
 
 static int32_t assignment(void *, int32_t bus, int16_t channel, int16_t number, uint32_t *id) {
   if (bus || channel < 0 || channel >= MIDI_CHANNELS) return VST_FALSE;
@@ -425,7 +425,7 @@ static int32_t assignment(void *, int32_t bus, int16_t channel, int16_t number, 
   return VST_FALSE;
 }
 
-static const vst_midi_mapping midi_mapping = {query, add_reference, release, assignment};
+static const void *const midi_mapping[] = {query, add_reference, release, assignment};
 
 static const struct { uint32_t id; const char *title, *units; double standard; int32_t flags; } EXPRESSED[] = {
     {VST_TUNING, "Tuning", "semitones", 0.5, VST_BIPOLAR}, {VST_BRIGHTNESS, "Brightness", "", 0, VST_ABSOLUTE}};
@@ -451,15 +451,15 @@ static int32_t expression_value(void *, int32_t, int16_t, uint32_t, const uint16
   return VST_MISSING;
 }
 
-static const vst_expressions expressions = {query, add_reference, release, expression_count, expression_info, expression_text, expression_value};
+static const void *const expressions[] = {query, add_reference, release, expression_count, expression_info, expression_text, expression_value};
 
 static uint32_t requirements(void *) { return 0; } /* neither tempo nor position */
 
-static const vst_requirements required = {query, add_reference, release, requirements};
+static const void *const required[] = {query, add_reference, release, requirements};
 
 static const struct { const vst_uid *id; const void *table; } INTERFACES[FACES] = {
-    {&UID_COMPONENT, &component},       {&UID_PROCESSOR, &processor},     {&UID_CONTROLLER, &controller},
-    {&UID_MIDI_MAPPING, &midi_mapping}, {&UID_EXPRESSIONS, &expressions}, {&UID_REQUIREMENTS, &required}};
+    {&UID_COMPONENT, component},       {&UID_PROCESSOR, processor},     {&UID_CONTROLLER, controller},
+    {&UID_MIDI_MAPPING, midi_mapping}, {&UID_EXPRESSIONS, expressions}, {&UID_REQUIREMENTS, required}};
 
 static int32_t query(void *interface, const vst_uid id, void **found) {
   bool any = same(id, UID_UNKNOWN) || same(id, UID_BASE);
@@ -554,9 +554,9 @@ static int32_t create(void *, const char *id, const char *wanted, void **found) 
 
 static int32_t set_context(void *, void *) { return VST_OK; }
 
-static const vst_factory factory_table = {factory_query, one_reference, one_reference, factory_info, class_count,
-                                          class_info, create, class_info2, class_info3, set_context};
-static const struct { const vst_factory *table; } factory = {&factory_table};
+static const void *const factory_table[] = {factory_query, one_reference, one_reference, factory_info, class_count, class_info, create, class_info2,
+                                            class_info3, set_context};
+static const void *const *const factory = factory_table;
 
 LS_EXPORT const void *GetPluginFactory(void) { return &factory; }
 
