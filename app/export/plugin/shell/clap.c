@@ -47,8 +47,8 @@ static bool note_get(const clap_plugin *, uint32_t index, bool is_input, clap_no
   return true;
 }
 
-static const clap_audio_ports audio_ports = {audio_count, audio_get};
-static const clap_note_ports note_ports = {note_count, note_get};
+static const void *const audio_ports[] = {audio_count, audio_get};
+static const void *const note_ports[] = {note_count, note_get};
 
 /* Parameters */
 
@@ -187,10 +187,10 @@ static bool preset_load(const clap_plugin *plugin, uint32_t kind, const char *lo
 }
 
 static const clap_state state = {state_save, state_load};
-static const clap_preset_load presets = {preset_load};
-static const clap_latency latency = {latency_get};
-static const clap_tail tail = {tail_get};
-static const clap_render render = {no_requirement, set_mode};
+static const void *const presets[] = {preset_load};
+static const void *const latency[] = {latency_get};
+static const void *const tail[] = {tail_get};
+static const void *const render[] = {no_requirement, set_mode};
 
 /* The plug-in */
 
@@ -236,9 +236,9 @@ static int32_t shell_process(const clap_plugin *plugin, const clap_process *proc
 
 static const void *shell_extension(const clap_plugin *, const char *id) {
   static const struct { const char *id; const void *extension; } all[] = {
-      {"clap.audio-ports", &audio_ports}, {"clap.note-ports", &note_ports}, {"clap.params", &params}, {"clap.state", &state},
-      {"clap.latency", &latency},         {"clap.tail", &tail},             {"clap.render", &render},
-      {"clap.preset-load/2", &presets},
+      {"clap.audio-ports", audio_ports}, {"clap.note-ports", note_ports}, {"clap.params", &params}, {"clap.state", &state},
+      {"clap.latency", latency},         {"clap.tail", tail},             {"clap.render", render},
+      {"clap.preset-load/2", presets},
   };
   for (size_t place = 0; place < sizeof all / sizeof *all; place++)
     if (!strcmp(id, all[place].id)) return all[place].extension;
@@ -315,24 +315,24 @@ static bool provider_metadata(const clap_preset_provider *, uint32_t kind, const
 
 static const void *provider_extension(const clap_preset_provider *, const char *) { return NULL; }
 
-static uint32_t provider_count(const clap_preset_factory *) { return 1; }
+static uint32_t provider_count(const void *) { return 1; }
 
-static const clap_preset_descriptor *provider_at(const clap_preset_factory *, uint32_t index) {
+static const clap_preset_descriptor *provider_at(const void *, uint32_t index) {
   return index ? NULL : &provider_descriptor;
 }
 
-static const clap_preset_provider *provider_create(const clap_preset_factory *, const clap_preset_indexer *indexer, const char *id) {
+static const clap_preset_provider *provider_create(const void *, const clap_preset_indexer *indexer, const char *id) {
   clap_preset_provider *own = indexer && id && !strcmp(id, provider_id) ? malloc(sizeof *own) : NULL;
   if (own)
     *own = (clap_preset_provider){&provider_descriptor, (void *)indexer, provider_init, provider_destroy, provider_metadata, provider_extension};
   return own;
 }
 
-static const clap_preset_factory preset_factory = {provider_count, provider_at, provider_create};
+static const void *const preset_factory[] = {provider_count, provider_at, provider_create};
 
 static const void *get_factory(const char *id) {
   if (!strcmp(id, "clap.plugin-factory")) return &factory;
-  return strcmp(id, "clap.preset-discovery-factory/2") ? NULL : &preset_factory;
+  return strcmp(id, "clap.preset-discovery-factory/2") ? NULL : preset_factory;
 }
 
 LS_EXPORT const clap_entry_t clap_entry = {CLAP_VERSION_USED, entry_init, entry_deinit, get_factory};

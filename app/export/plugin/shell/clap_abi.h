@@ -146,14 +146,8 @@ typedef struct clap_preset_indexer {
   const void *(*get_extension)(const struct clap_preset_indexer *, const char *id);
 } clap_preset_indexer;
 _Static_assert(sizeof(clap_preset_indexer) == 88, "clap_preset_indexer");
-typedef struct clap_preset_factory {
-  uint32_t (*count)(const struct clap_preset_factory *);
-  const clap_preset_descriptor *(*descriptor)(const struct clap_preset_factory *, uint32_t);
-  const clap_preset_provider *(*create)(const struct clap_preset_factory *, const clap_preset_indexer *, const char *id);
-} clap_preset_factory;
-AT(clap_preset_factory, create, 16);
 
-/* Extensions */
+/* Extensions. Their tables are written once, with the functions; those that a host in C calls have types here. */
 typedef struct {
   uint32_t id;
   char name[256];
@@ -163,18 +157,10 @@ typedef struct {
 } clap_audio_port;
 AT(clap_audio_port, type, 272);
 enum { CLAP_PORT_IS_MAIN = 1 };
-typedef struct {
-  uint32_t (*count)(const clap_plugin *, bool is_input);
-  bool (*get)(const clap_plugin *, uint32_t, bool is_input, clap_audio_port *);
-} clap_audio_ports;
 
 typedef struct { uint32_t id, dialects, preferred; char name[256]; } clap_note_port;
 _Static_assert(sizeof(clap_note_port) == 268, "clap_note_port");
 enum { CLAP_DIALECT_CLAP = 1, CLAP_DIALECT_MIDI = 2, CLAP_DIALECT_MPE = 4 };
-typedef struct {
-  uint32_t (*count)(const clap_plugin *, bool is_input);
-  bool (*get)(const clap_plugin *, uint32_t, bool is_input, clap_note_port *);
-} clap_note_ports;
 
 typedef struct {
   uint32_t id, flags;
@@ -206,14 +192,7 @@ typedef struct {
   bool (*load)(const clap_plugin *, const clap_istream *);
 } clap_state;
 
-typedef struct { uint32_t (*get)(const clap_plugin *); } clap_latency, clap_tail;
 enum { CLAP_RENDER_REALTIME, CLAP_RENDER_OFFLINE };
-typedef struct {
-  bool (*has_hard_realtime_requirement)(const clap_plugin *);
-  bool (*set)(const clap_plugin *, int32_t mode);
-} clap_render;
-
-typedef struct { bool (*from_location)(const clap_plugin *, uint32_t kind, const char *location, const char *load_key); } clap_preset_load;
 
 /* Extensions of hosts */
 enum { CLAP_RESCAN_VALUES = 1 };
