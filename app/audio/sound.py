@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 
 from app.audio.devices import AudioDevice, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
@@ -234,11 +234,8 @@ class Sound:
         self._gaps.extend(self.mixer.new_gaps())
 
     def _process_requests(self) -> None:
-        while True:
-            try:
-                wish = self._wishes.get_nowait()
-            except Empty:
-                return
+        while not self._wishes.empty():
+            wish = self._wishes.get()
             try:
                 self._change(wish)
             finally:

@@ -13,6 +13,7 @@ import pytest
 
 from app.audio import sound as sound_module
 from app.audio.devices import AudioDevice
+from app.audio.output import Output
 from app.audio.problems import AudioProblem, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
 from engine.effects import Effects
@@ -24,11 +25,11 @@ HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
 SPEAKERS = AudioDevice("Speakers", "Test API", 44_100)  # of another rate
 
 
-class FakeOutput:
+class FakeOutput(Output):
     """An output that plays only when a test says so."""
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
-        self.device: AudioDevice | None = device
+        self.device = device
         self.rate_hz, self.latency_s, self.mixer = device.default_rate_hz, buffer_s, mixer
         self.is_stalled = self.is_lost = self.closed = self.broken = False
 
