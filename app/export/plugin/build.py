@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
+from app.export.plugin.formats import TARGETS, PluginError, check_compiler
 from app.export.plugin.identity import PREFIX, check_kept, lost_with
 from app.export.plugin.image import MAKER, Image
 from app.export.plugin.layout import MOST_IMAGES, layout_header
@@ -51,7 +51,7 @@ def build_plugin(
     One that is there is replaced as a whole.
 
     Args:
-        form: one of FORMATS.
+        form: one of `formats.FORMATS`.
         path: see `plugin_path`.
         cache: a folder that keeps object files for the next build.
         advanced: is called a few times a second with the name of the step and the done share of the whole, 0 … 1.
@@ -88,8 +88,7 @@ def build_plugin(
 
 def plugin_path(path: Path, form: str) -> Path:
     """The path with the ending of the format."""
-    ending = FORMATS[form].ending
-    return path if path.suffix == ending else path.with_name(path.name + ending)
+    return path if path.suffix == f".{form}" else path.with_name(f"{path.name}.{form}")
 
 
 def _place_library(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> None:
