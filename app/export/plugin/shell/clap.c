@@ -68,28 +68,21 @@ static bool param_info(const clap_plugin *plugin, uint32_t index, clap_param *in
   return true;
 }
 
-/* The parameter of an identifier; NULL: there is none. */
-static const parameter *param_with_id(const clap_plugin *plugin, uint32_t id) {
-  const image *of = instrument_of(plugin)->of;
-  int32_t place = parameter_with_id(of, id);
-  return place < 0 ? NULL : &parameters_of(of)[place];
-}
-
 static bool param_value(const clap_plugin *plugin, uint32_t id, double *value) {
   const instrument *own = instrument_of(plugin);
-  const parameter *of = param_with_id(plugin, id);
+  const parameter *of = parameter_of(own->of, id);
   if (of) *value = own->values[of - parameters_of(own->of)];
   return of;
 }
 
 static bool param_to_text(const clap_plugin *plugin, uint32_t id, double value, char *text, uint32_t room) {
-  const parameter *of = param_with_id(plugin, id);
+  const parameter *of = parameter_of(instrument_of(plugin)->of, id);
   if (of) parameter_text(of, value, text, room);
   return of;
 }
 
 static bool param_from_text(const clap_plugin *plugin, uint32_t id, const char *text, double *value) {
-  const parameter *of = param_with_id(plugin, id);
+  const parameter *of = parameter_of(instrument_of(plugin)->of, id);
   return of && parameter_number(of, text, value);
 }
 
@@ -102,15 +95,14 @@ static bool read_event(const image *of, const clap_event *from, event *to) {
     if (to->key < 0) return false;
   } else if (from->type <= CLAP_NOTE_CHOKE) {
     const clap_event_note *note = (const clap_event_note *)from;
-    int64_t id = note->note_id < 0 ? 0 : (int64_t)note->note_id + 1, channel = note->channel < 0 ? 0 : note->channel;
+    int64_t id = event_id(note->note_id), channel = note->channel < 0 ? 0 : note->channel;
     if (from->type == CLAP_NOTE_ON) *to = (event){.kind = NOTE_ON, .id = id, .channel = channel, .key = note->key, .value = 127 * note->velocity};
     else if (from->type == CLAP_NOTE_CHOKE) *to = (event){.kind = CHOKE, .id = id, .channel = note->channel, .key = note->key};
     else if (note->key >= 0) *to = (event){.kind = NOTE_OFF, .channel = channel, .key = note->key};
     else *to = (event){.kind = CONTROLLER, .channel = channel, .key = 123};
   } else if (from->type == CLAP_NOTE_EXPRESSION) {
     const clap_event_expression *each = (const clap_event_expression *)from;
-    int64_t id = each->note_id < 0 ? 0 : (int64_t)each->note_id + 1;
-    if (each->id == CLAP_EXPRESSION_TUNING) *to = (event){.kind = TUNE, .id = id, .channel = each->channel, .key = each->key, .value = each->value};
+    if (each->id == CLAP_EXPRESSION_TUNING) *to = (event){.kind = TUNE, .id = event_id(each->note_id), .channel = each->channel, .key = each->key, .value = each->value};
     else if (each->id == CLAP_EXPRESSION_BRIGHTNESS) *to = event_of_brightness(each->channel < 0 ? 0 : each->channel, each->value);
     else return false;
   } else if (from->type != CLAP_MIDI || !event_of_midi(((const clap_event_midi *)from)->data, to)) {

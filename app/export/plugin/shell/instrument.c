@@ -40,6 +40,11 @@ int32_t parameter_with_id(const image *of, uint32_t id) {
   return -1;
 }
 
+const parameter *parameter_of(const image *of, uint32_t id) {
+  int32_t place = parameter_with_id(of, id);
+  return place < 0 ? NULL : &parameters_of(of)[place];
+}
+
 /* The word of a step and its length. */
 static const char *word_of(const parameter *of, int32_t step, int *length) {
   const char *word = of->words;
@@ -285,6 +290,8 @@ void instrument_take(instrument *own, uint32_t at, event of) {
   if (of.kind == CONTROLLER && of.key == 121) of.value = 0; /* other values are of the app alone */
   push(own, of);
 }
+
+int64_t event_id(int32_t note) { return note < 0 ? 0 : (int64_t)note + 1; }
 
 bool event_of_midi(const uint8_t *bytes, event *to) {
   int64_t channel = bytes[0] & 15, one = bytes[1] & 127, two = bytes[2] & 127, wheel = one + 128 * two - 8192;

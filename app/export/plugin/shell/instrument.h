@@ -80,7 +80,8 @@ void effects_free(instrument *); /* and what is kept from rate to rate */
 
 int32_t image_with_id(const char *id); /* its number; -1: there is none */
 const parameter *parameters_of(const image *);
-int32_t parameter_with_id(const image *, uint32_t id);
+int32_t parameter_with_id(const image *, uint32_t id); /* its place; -1: there is none */
+const parameter *parameter_of(const image *, uint32_t id); /* NULL: there is none */
 void parameter_text(const parameter *, double value, char *text, uint32_t room);
 bool parameter_number(const parameter *, const char *text, double *value); /* false: the text has none */
 
@@ -97,6 +98,7 @@ void instrument_reset(instrument *); /* as instrument_begin leaves it, with the 
    Of TUNE and CHOKE, id, channel and key choose the notes that are meant, as far as they are given: not 0, not below 0. */
 void instrument_take(instrument *, uint32_t at, event); /* at: frame of what is rendered next */
 void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
+int64_t event_id(int32_t note);                         /* of a host's number of a note, below 0 where it has none */
 bool event_of_midi(const uint8_t *bytes, event *);      /* false: the message means nothing here */
 event event_of_brightness(int64_t channel, double value);
 

@@ -94,12 +94,6 @@ static double from_plain(const parameter *of, double plain) {
   return of->curve == 1 ? part : log1p(part * (of->curve - 1)) / log(of->curve);
 }
 
-/* The parameter of an identifier; NULL: there is none, or it is a controller of MIDI. */
-static const parameter *parameter_of(const shell *own, uint32_t id) {
-  int32_t place = parameter_with_id(own->own.of, id);
-  return place < 0 ? NULL : &parameters_of(own->own.of)[place];
-}
-
 static void show(shell *own) {
   for (int32_t place = 0; place < own->own.of->parameter_count; place++)
     own->shown[place] = from_plain(&parameters_of(own->own.of)[place], own->own.values[place]);
@@ -248,8 +242,7 @@ static const known_note *note_with_id(const shell *own, int32_t note) {
 }
 
 static event event_of_tuning(const known_note *note, double semitones) {
-  int64_t id = note->note < 0 ? 0 : (int64_t)note->note + 1;
-  return (event){.kind = TUNE, .id = id, .channel = note->channel, .key = note->key, .value = semitones};
+  return (event){.kind = TUNE, .id = event_id(note->note), .channel = note->channel, .key = note->key, .value = semitones};
 }
 
 static void take_event(shell *own, const vst_event *of) {
@@ -263,7 +256,7 @@ static void take_event(shell *own, const vst_event *of) {
     }
     double velocity = 127.0 * of->on.velocity; /* in single precision: what is a step of MIDI stays one */
     if (fabs(velocity - rint(velocity)) < 1e-4) velocity = rint(velocity);
-    event struck = {.kind = NOTE_ON, .id = event_of_tuning(&note, 0).id, .channel = note.channel, .key = note.key, .value = velocity};
+    event struck = {.kind = NOTE_ON, .id = event_id(note.note), .channel = note.channel, .key = note.key, .value = velocity};
     add_event(own, of->frame, struck, MOST_EVENTS);
     own->known[own->known_count++ % MOST_NOTES_KNOWN] = note;
     if (of->on.cents != 0) add_event(own, of->frame, event_of_tuning(&note, of->on.cents / 100), MOST_EVENTS);
@@ -328,8 +321,6 @@ static const void *const processor[] = {query, add_reference, release, set_arran
 
 /* Controller */
 
-static int32_t set_component_state(void *interface, vst_stream *stream) { return set_state(interface, stream); }
-
 static int32_t no_state(void *, vst_stream *) { return VST_OK; }
 
 static int32_t parameter_count(void *interface) {
@@ -362,7 +353,7 @@ static int32_t parameter_info(void *interface, int32_t index, vst_parameter *inf
 }
 
 static int32_t text_of(void *interface, uint32_t id, double value, vst_text text) {
-  const parameter *of = parameter_of(shell_of(interface), id);
+  const parameter *of = parameter_of(shell_of(interface)->own.of, id);
   char found[128];
   if (!of) return VST_FALSE;
   parameter_text(of, to_plain(of, value), found, sizeof found);
@@ -371,7 +362,7 @@ static int32_t text_of(void *interface, uint32_t id, double value, vst_text text
 }
 
 static int32_t value_of(void *interface, uint32_t id, uint16_t *text, double *value) {
-  const parameter *of = parameter_of(shell_of(interface), id);
+  const parameter *of = parameter_of(shell_of(interface)->own.of, id);
   char given[128];
   if (!of) return VST_FALSE;
   read_text(given, sizeof given, text);
@@ -381,12 +372,12 @@ static int32_t value_of(void *interface, uint32_t id, uint16_t *text, double *va
 }
 
 static double plain_of(void *interface, uint32_t id, double value) {
-  const parameter *of = parameter_of(shell_of(interface), id);
+  const parameter *of = parameter_of(shell_of(interface)->own.of, id);
   return of ? to_plain(of, value) : value;
 }
 
 static double normal_of(void *interface, uint32_t id, double plain) {
-  const parameter *of = parameter_of(shell_of(interface), id);
+  const parameter *of = parameter_of(shell_of(interface)->own.of, id);
   return of ? from_plain(of, plain) : plain;
 }
 
@@ -411,7 +402,7 @@ static int32_t set_handler(void *, void *) { return VST_OK; }
 
 static void *create_view(void *, const char *) { return NULL; }
 
-static const void *const controller[] = {query, add_reference, release, initialize, terminate, set_component_state, no_state, no_state,
+static const void *const controller[] = {query, add_reference, release, initialize, terminate, set_state, no_state, no_state,
                                          parameter_count, parameter_info, text_of, value_of, plain_of, normal_of, shown, set_shown, set_handler,
                                          create_view};
 
