@@ -102,7 +102,8 @@ static bool read_event(const image *of, const clap_event *from, event *to) {
     else *to = (event){.kind = CONTROLLER, .channel = channel, .key = 123};
   } else if (from->type == CLAP_NOTE_EXPRESSION) {
     const clap_event_expression *each = (const clap_event_expression *)from;
-    if (each->id == CLAP_EXPRESSION_TUNING) *to = (event){.kind = TUNE, .id = event_id(each->note_id), .channel = each->channel, .key = each->key, .value = each->value};
+    if (each->id == CLAP_EXPRESSION_TUNING)
+      *to = (event){.kind = TUNE, .id = event_id(each->note_id), .channel = each->channel, .key = each->key, .value = each->value};
     else if (each->id == CLAP_EXPRESSION_BRIGHTNESS) *to = event_of_brightness(each->channel < 0 ? 0 : each->channel, each->value);
     else return false;
   } else if (from->type != CLAP_MIDI || !event_of_midi(((const clap_event_midi *)from)->data, to)) {

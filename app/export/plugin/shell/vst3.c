@@ -174,9 +174,10 @@ static int32_t set_active(void *interface, uint8_t state) {
 static int32_t set_state(void *interface, vst_stream *stream) {
   shell *own = shell_of(interface);
   uint8_t bytes[MOST_STATE_BYTES];
-  int32_t size = 0, count = 0;
+  int32_t size = 0;
   if (!stream) return VST_BAD_ARGUMENT;
-  while (size < (int32_t)sizeof bytes && stream->table->read(stream, bytes + size, (int32_t)sizeof bytes - size, &count) == VST_OK && count > 0) size += count;
+  for (int32_t count = 0; size < MOST_STATE_BYTES; size += count)
+    if (stream->table->read(stream, bytes + size, MOST_STATE_BYTES - size, &count) != VST_OK || count <= 0) break;
   if (!instrument_load(&own->own, bytes, size)) return VST_FALSE;
   show(own);
   return VST_OK;
