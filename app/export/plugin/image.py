@@ -138,18 +138,13 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header["description"] = _bytes(patch.description, 511)
     header["category"] = patch.category.encode()
     whole[: IMAGE.itemsize] = header.tobytes()
-    controls = (
-        Control(
-            name,
-            knob["name"].decode(),
-            knob["low"],
-            knob["high"],
-            knob["standard"],
-            tuple(knob["words"].decode().split()),
-        )
-        for name, knob in parameters.items()
-    )
-    return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
+    controls = tuple(_control(name, knob) for name, knob in parameters.items())
+    return Image(id, patch.name, bytes(whole), controls, left_out)
+
+
+def _control(id: str, knob: np.void) -> Control:
+    low, high, standard = knob[["low", "high", "standard"]].item()
+    return Control(id, knob["name"].decode(), low, high, standard, tuple(knob["words"].decode().split()))
 
 
 def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
