@@ -57,30 +57,18 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
             open, which a new start would end.
 
     Raises:
-        AudioUnavailable: PortAudio is missing or does not start. Where it finds no output, the list is empty.
+        AudioProblem: PortAudio is missing or does not start. Where it finds no output, the list is empty.
     """
-    return sorted((device for _, device in _list(rescan)), key=lambda device: not device.is_default)
+    return [device for _, device in _list(rescan)]
 
 
-def default_device(rescan: bool = False) -> AudioDevice:
-    """The system's default output, or the first where none is the default.
+def find(device: AudioDevice | None, rescan: bool = False) -> AudioDevice:
+    """The output as PortAudio lists it now, by name and host API; for None the system's default, else the first.
 
     Raises:
-        AudioUnavailable: there is no output, or PortAudio is missing.
+        AudioProblem: it is not connected (any more), there is none, or PortAudio is missing.
     """
-    devices = output_devices(rescan)
-    if not devices:
-        raise no_device()
-    return devices[0]
-
-
-def find(name: str, host_api: str, rescan: bool = False) -> AudioDevice:
-    """The output of this name and host API.
-
-    Raises:
-        AudioUnavailable: it is not connected (any more), or PortAudio is missing.
-    """
-    return _find(name, host_api, rescan)[1]
+    return _find(device, rescan)[1]
 
 
 def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
@@ -90,13 +78,13 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
     or the latency that the device calls low where that is longer.
 
     Raises:
-        AudioUnavailable: it is gone, in use, or refuses the rate.
+        AudioProblem: it is gone, in use, or refuses the rate.
     """
     from engine.kernels.mixer import call  # imported late, because it may have to be compiled first
 
     sounddevice = _sounddevice()
     with _lock:
-        index, _ = _find(device.name, device.host_api)
+        index, _ = _find(device)
         ffi, channels = sounddevice._ffi, min(device.channels, 2)
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
@@ -132,14 +120,15 @@ _lock = threading.RLock()  # PortAudio does not allow listing and opening from t
 _streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started again
 
 
-def _find(name: str, host_api: str, rescan: bool = False) -> tuple[int, AudioDevice]:
-    for index, device in _list(rescan):
-        if (device.name, device.host_api) == (name, host_api):
-            return index, device
-    raise vanished(name, f"{host_api} lists no output of this name.")
+def _find(device: AudioDevice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
+    for index, found in _list(rescan):
+        if device is None or (found.name, found.host_api) == (device.name, device.host_api):
+            return index, found
+    raise vanished(device.name, f"{device.host_api} lists no output of this name.") if device else no_device()
 
 
-def _list(rescan: bool = False) -> list[tuple[int, AudioDevice]]:
+def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
+    """All outputs with PortAudio's indices, the system's default first."""
     sounddevice = _sounddevice()
     with _lock:
         try:
@@ -151,7 +140,7 @@ def _list(rescan: bool = False) -> list[tuple[int, AudioDevice]]:
             default = sounddevice.default.device["output"]  # -1 if there is none
         except sounddevice.PortAudioError as error:
             raise no_device(str(error)) from error
-    return [
+    listed = [
         (
             index,
             AudioDevice(
@@ -165,6 +154,7 @@ def _list(rescan: bool = False) -> list[tuple[int, AudioDevice]]:
         for index, entry in enumerate(entries)
         if entry["max_output_channels"] > 0
     ]
+    return sorted(listed, key=lambda numbered: not numbered[1].is_default)
 
 
 def _sounddevice() -> ModuleType:

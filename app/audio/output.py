@@ -6,7 +6,6 @@ import contextlib
 import math
 import threading
 import time
-from typing import Protocol
 
 from app.audio.devices import AudioDevice, close_device, open_device
 from app.audio.problems import refused
@@ -20,7 +19,7 @@ CLOCK_FRAMES = 512  # taken at a time
 LONGEST_LAG_S = 0.1  # further behind than this, the clock skips what it has missed
 
 
-class Output(Protocol):
+class Output:
     """An output that takes the mixer's frames.
 
     Attributes:
@@ -29,34 +28,39 @@ class Output(Protocol):
         latency_s: the length of the output's buffer, as reported when it was opened; as asked for, if that cannot be.
     """
 
-    device: AudioDevice | None
+    device: AudioDevice | None = None
     rate_hz: int
-    latency_s: float
+    latency_s = 0.0
 
     def now_s(self) -> float:
         """The output's time in seconds, on the clock of the times at which voices began; 0: not known."""
+        return 0.0
 
     def load(self) -> float:
         """The share of the output's time that the mixer takes, 0 … 1."""
+        return 0.0
 
     def stalled(self) -> bool:
         """Return True if it has taken no frames for a while, and may recover."""
+        return False
 
     def lost(self) -> bool:
         """Return True if it has gone and must be opened again."""
+        return False
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Take no more frames."""
 
 
-class DeviceOutput:
+class DeviceOutput(Output):
     """A device that plays, at its own rate.
 
     Raises:
-        AudioUnavailable: it cannot be opened or started.
+        AudioProblem: it cannot be opened or started.
     """
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
-        self.device: AudioDevice | None = device
+        self.device = device
         self.rate_hz = device.default_rate_hz
         self._mixer = mixer
         self._closing = threading.Lock()
@@ -106,11 +110,8 @@ class DeviceOutput:
         return now_s - self._called_s
 
 
-class ClockOutput:
+class ClockOutput(Output):
     """An output that drops its frames in real time, so that pictures move without a device."""
-
-    device: AudioDevice | None = None
-    latency_s = 0.0
 
     def __init__(self, mixer: Mixer) -> None:
         self.rate_hz = mixer.rate_hz
@@ -121,15 +122,6 @@ class ClockOutput:
 
     def now_s(self) -> float:
         return self._mixer.seconds
-
-    def load(self) -> float:
-        return 0.0
-
-    def stalled(self) -> bool:
-        return False
-
-    def lost(self) -> bool:
-        return False
 
     def close(self) -> None:
         self._closing.set()

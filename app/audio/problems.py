@@ -18,9 +18,12 @@ class ProblemKind(StrEnum):
     INTERNAL = "internal"
 
 
-@dataclass(frozen=True)
-class AudioProblem:
-    """A fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
+@dataclass(eq=False)
+class AudioProblem(Exception):
+    """A fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none).
+
+    It is raised where no sound output can be used at present; pictures and export continue.
+    """
 
     kind: ProblemKind
     message: str
@@ -31,60 +34,30 @@ class AudioProblem:
         return f"{self.message} {self.remedy}"
 
 
-class AudioUnavailable(Exception):
-    """The error that no sound output can be used at present; pictures and export continue."""
-
-    def __init__(self, problem: AudioProblem) -> None:
-        super().__init__(str(problem))
-        self.problem = problem
-
-    @property
-    def kind(self) -> ProblemKind:
-        return self.problem.kind
-
-    @property
-    def message(self) -> str:
-        return self.problem.message
-
-    @property
-    def remedy(self) -> str:
-        return self.problem.remedy
-
-    @property
-    def detail(self) -> str:
-        return self.problem.detail
-
-
-def portaudio_missing(detail: str) -> AudioUnavailable:
-    return AudioUnavailable(
-        AudioProblem(
-            ProblemKind.PORTAUDIO_MISSING,
-            "No sound: the PortAudio library was not found.",
-            "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
-            detail,
-        )
+def portaudio_missing(detail: str) -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.PORTAUDIO_MISSING,
+        "No sound: the PortAudio library was not found.",
+        "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
+        detail,
     )
 
 
-def not_started(detail: str) -> AudioUnavailable:
-    return AudioUnavailable(
-        AudioProblem(
-            ProblemKind.OTHER,
-            "The computer's sound system could not be started.",
-            "Check the system's sound settings and start the app again.",
-            detail,
-        )
+def not_started(detail: str) -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.OTHER,
+        "The computer's sound system could not be started.",
+        "Check the system's sound settings and start the app again.",
+        detail,
     )
 
 
-def no_device(detail: str = "") -> AudioUnavailable:
-    return AudioUnavailable(
-        AudioProblem(
-            ProblemKind.NO_DEVICE,
-            "No audio output was found.",
-            "Connect loudspeakers or headphones and choose them in the audio settings.",
-            detail,
-        )
+def no_device(detail: str = "") -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.NO_DEVICE,
+        "No audio output was found.",
+        "Connect loudspeakers or headphones and choose them in the audio settings.",
+        detail,
     )
 
 
@@ -105,59 +78,40 @@ def internal(detail: str) -> AudioProblem:
     )
 
 
-def unexpected(error: Exception, device_name: str) -> AudioUnavailable:
+def unexpected(error: Exception, device_name: str) -> AudioProblem:
     """Return the problem of a device that was looked for or opened, where that is no known fault."""
-    return AudioUnavailable(
-        AudioProblem(
-            ProblemKind.OTHER,
-            f"The sound output “{device_name}” could not be opened because of an internal error.",
-            "The app keeps trying. Choose another output in the audio settings, and please report the details.",
-            "".join(traceback.format_exception(error)),
-        )
+    return AudioProblem(
+        ProblemKind.OTHER,
+        f"The sound output “{device_name}” could not be opened because of an internal error.",
+        "The app keeps trying. Choose another output in the audio settings, and please report the details.",
+        "".join(traceback.format_exception(error)),
     )
 
 
-def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
-    return AudioUnavailable(
-        AudioProblem(
-            ProblemKind.VANISHED,
-            f"The sound output “{device_name}” was not found: it is disconnected, or the computer is too busy.",
-            "The app keeps trying. Connect it again, or choose another one in the audio settings.",
-            detail,
-        )
+def vanished(device_name: str, detail: str = "") -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.VANISHED,
+        f"The sound output “{device_name}” was not found: it is disconnected, or the computer is too busy.",
+        "The app keeps trying. Connect it again, or choose another one in the audio settings.",
+        detail,
     )
 
 
-def refused(error: Exception, device_name: str, rate_hz: int) -> AudioUnavailable:
+def refused(error: Exception, device_name: str, rate_hz: int) -> AudioProblem:
     """Return why a device did not open or start, from PortAudio's error code and text."""
-    detail = str(error)
-    text = detail.lower()
+    output, detail, text = f"The sound output “{device_name}”", str(error), str(error).lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)
     # PortAudio reports many errors of drivers as "unanticipated host error", hence the search in the text.
     if code == _PA_INVALID_SAMPLE_RATE or "sample rate" in text:
-        problem = AudioProblem(
-            ProblemKind.RATE_REFUSED,
-            f"The sound output “{device_name}” refuses {rate_hz} Hz.",
-            "Set another sample rate for it in the system's sound settings, or choose another output.",
-            detail,
-        )
-    elif code == _PA_INVALID_DEVICE or any(word in text for word in _VANISHED_WORDS):
+        remedy = "Set another sample rate for it in the system's sound settings, or choose another output."
+        return AudioProblem(ProblemKind.RATE_REFUSED, f"{output} refuses {rate_hz} Hz.", remedy, detail)
+    if code == _PA_INVALID_DEVICE or any(word in text for word in _VANISHED_WORDS):
         return vanished(device_name, detail)
-    elif code == _PA_DEVICE_UNAVAILABLE or any(word in text for word in _BUSY_WORDS):
-        problem = AudioProblem(
-            ProblemKind.BUSY,
-            f"The sound output “{device_name}” is in use by another program.",
-            "Close that program and try again, or choose another output.",
-            detail,
-        )
-    else:
-        problem = AudioProblem(
-            ProblemKind.OTHER,
-            f"The sound output “{device_name}” could not be opened.",
-            "Try again, or choose another output in the audio settings.",
-            detail,
-        )
-    return AudioUnavailable(problem)
+    if code == _PA_DEVICE_UNAVAILABLE or any(word in text for word in _BUSY_WORDS):
+        remedy = "Close that program and try again, or choose another output."
+        return AudioProblem(ProblemKind.BUSY, f"{output} is in use by another program.", remedy, detail)
+    remedy = "Try again, or choose another output in the audio settings."
+    return AudioProblem(ProblemKind.OTHER, f"{output} could not be opened.", remedy, detail)
 
 
 _PA_INVALID_SAMPLE_RATE = -9997

@@ -14,11 +14,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 
-from app.audio.devices import AudioDevice, default_device, find
+from app.audio.devices import AudioDevice, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, internal, stalled, unexpected, vanished
+from app.audio.problems import AudioProblem, ProblemKind, internal, stalled, unexpected, vanished
 from app.shared.log import faultless, log_fault
 from engine.effects import Effects
 from engine.voices.mixer import Gap, Mixer
@@ -77,11 +77,6 @@ class _Wish:
         return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
 
 
-def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as PortAudio lists it now; for None the system's default. Errors as `devices.find`."""
-    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
-
-
 class Sound:
     """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
 
@@ -95,7 +90,7 @@ class Sound:
         self,
         on_problem: Callable[[AudioProblem], None] | None = None,
         rate_hz: int = DEFAULT_RATE_HZ,
-        look_up: LookUp = look_up,
+        look_up: LookUp = find,
         open_output: Open = DeviceOutput,
     ) -> None:
         self._on_problem = faultless(on_problem or (lambda problem: None), "while a fault of the sound was reported")
@@ -239,11 +234,8 @@ class Sound:
         self._gaps.extend(self.mixer.new_gaps())
 
     def _process_requests(self) -> None:
-        while True:
-            try:
-                wish = self._wishes.get_nowait()
-            except Empty:
-                return
+        while not self._wishes.empty():
+            wish = self._wishes.get()
             try:
                 self._change(wish)
             finally:
@@ -261,18 +253,18 @@ class Sound:
                 return
             self._be_silent()  # it might refuse to be opened twice
             self._open_device(device, wish)
-        except AudioUnavailable as error:
+        except AudioProblem as error:
             if before is not None and present is not None:
                 self._reopen(present, before)
             elif error.kind in (ProblemKind.VANISHED, ProblemKind.OTHER):  # it may come yet
                 self._lose(wish)
-            self._report(error.problem)
+            self._report(error)
 
     def _find_device(self, wish: _Wish, rescan: bool) -> AudioDevice:
-        """The device that is wished for. Raises AudioUnavailable: there is none now, or it cannot be looked for."""
+        """The device that is wished for. Raises AudioProblem: there is none now, or it cannot be looked for."""
         try:
             return wish.at_its_rate(self._look_up(wish.device, rescan))
-        except AudioUnavailable:
+        except AudioProblem:
             raise
         except Exception as error:
             raise unexpected(error, wish.device.name if wish.device else "default") from error
@@ -281,7 +273,7 @@ class Sound:
         """Open a device, with the present mixer where rate and channels stay, else with a new one.
 
         Raises:
-            AudioUnavailable: it could not be opened; the clock takes the frames then.
+            AudioProblem: it could not be opened; the clock takes the frames then.
         """
         rate_hz, channels = device.default_rate_hz, min(device.channels, 2)
         mixer = self.mixer
@@ -293,7 +285,7 @@ class Sound:
             self._output = self._open_output(device, wish.buffer_s_at(rate_hz), mixer)
         except Exception as error:
             self._output = ClockOutput(self.mixer)
-            if isinstance(error, AudioUnavailable):
+            if isinstance(error, AudioProblem):
                 raise
             raise unexpected(error, device.name) from error
         self.mixer = mixer
@@ -315,7 +307,7 @@ class Sound:
         """Open the device again as before a change that was refused; if that fails too, it counts as lost."""
         try:
             self._open_device(device, wish)
-        except AudioUnavailable:
+        except AudioProblem:
             self._lose(wish)
 
     def _be_silent(self) -> None:
@@ -332,7 +324,7 @@ class Sound:
             if not self._resume(output.device):
                 self._be_silent()
                 self._lose(replace(self._wish, device=self._wish.device or output.device))
-                self._report(vanished(output.device.name).problem)
+                self._report(vanished(output.device.name))
         elif output.stalled() and not self._stalled and output.device is not None:
             self._stalled = True
             self._report(stalled(output.device.name))
@@ -344,7 +336,7 @@ class Sound:
             try:
                 self._open_device(self._find_device(self._lost, True), self._lost)
                 self._lost = None
-            except AudioUnavailable:
+            except AudioProblem:
                 pass
 
     def _resume(self, device: AudioDevice) -> bool:
@@ -354,7 +346,7 @@ class Sound:
             return False
         try:
             self._open_device(device, self._wish)
-        except AudioUnavailable:
+        except AudioProblem:
             return False
         self._gaps.append(Gap(mixer.seconds, "device", 1000 * (time.monotonic() - began_s)))
         return True

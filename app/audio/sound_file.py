@@ -14,12 +14,9 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import soundfile
-
-if TYPE_CHECKING:
-    from _typeshed import WriteableBuffer
 
 KINDS = "WAV, FLAC, AIFF or Ogg"
 _PCM = 1
@@ -67,20 +64,14 @@ def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfi
         raise UnreadableSound(error.strerror or str(error)) from error
 
 
-class _Spliced(io.RawIOBase):
-    """A file: bytes of our own, then a part of another file."""
+class _Spliced:
+    """A file for libsndfile: bytes of our own, then a part of another file."""
 
     def __init__(self, head: bytes, file: BinaryIO, start: int, length: int) -> None:
         self._head = head
         self._file = file
         self._start = start
         self._length, self._at = len(head) + length, 0
-
-    def seekable(self) -> bool:
-        return True
-
-    def readable(self) -> bool:
-        return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length}[whence]
@@ -90,16 +81,12 @@ class _Spliced(io.RawIOBase):
     def tell(self) -> int:
         return self._at
 
-    def readinto(self, buffer: WriteableBuffer) -> int:
-        view = memoryview(buffer).cast("B")
-        count = min(len(view), max(0, self._length - self._at))
+    def read(self, count: int) -> bytes:
         head_part = self._head[self._at : self._at + count]
-        view[: len(head_part)] = head_part
-        self._file.seek(self._start + max(0, self._at - len(self._head)))
-        rest = self._file.read(count - len(head_part))
-        view[len(head_part) : len(head_part) + len(rest)] = rest
-        self._at += len(head_part) + len(rest)
-        return len(head_part) + len(rest)
+        left = min(count, self._length - self._at) - len(head_part)
+        data = head_part + _bytes_at(self._file, self._start + max(0, self._at - len(self._head)), max(0, left))
+        self._at += len(data)
+        return data
 
 
 def _splice(file: BinaryIO, end: int) -> _Spliced:

@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, Signal
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice, output_devices
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
+from app.audio.problems import AudioProblem, ProblemKind
 from app.audio.sound import Sound, SoundStatus
 from app.presets.words import rate_word
 from app.views.controls.plain import plain_tip
@@ -145,7 +145,7 @@ class AudioControl(QObject):
         first = self._listed is None
         try:
             devices = output_devices(rescan=first and self.output.status().device is None)
-        except AudioUnavailable:
+        except AudioProblem:
             devices, choices = [], None
         else:
             choices = [DeviceChoice(name=device.name, host_api=device.host_api) for device in devices]

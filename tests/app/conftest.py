@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
+from app.audio.problems import AudioProblem, ProblemKind
 from app.audio.sound import Sound
 from app.rendering import Take
 from app.rendering.take import Listened, Signal
@@ -99,7 +99,7 @@ def no_button_is_held() -> Iterator[None]:
 
 
 def no_device(*_: object) -> AudioDevice:
-    raise AudioUnavailable(AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one."))
+    raise AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one.")
 
 
 def make_sound(on_problem: Callable[[AudioProblem], None] | None = None) -> Sound:

@@ -2,7 +2,8 @@
 
 formats   kinds of plug-ins, systems, and where hosts look for them
 identity  an instrument's identifier, and those in a built plug-in
-image     an instrument as one block of bytes that the shell reads, and the header of offsets
+layout    records of that block and of the kernels' memory, and the C header that has them
+image     an instrument as one block of bytes that the shell reads
 parts     what macros change: body, room, levels of keys
 objects   the compiled kernels for each system
 build     files of a plug-in: written, linked, installed

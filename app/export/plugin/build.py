@@ -16,9 +16,10 @@ from urllib.parse import quote
 
 import numpy as np
 
-from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
+from app.export.plugin.formats import TARGETS, PluginError, check_compiler
 from app.export.plugin.identity import PREFIX, check_kept, lost_with
-from app.export.plugin.image import MAKER, Image, layout_header
+from app.export.plugin.image import MAKER, Image
+from app.export.plugin.layout import MOST_IMAGES, layout_header
 from app.export.plugin.objects import STUBS, objects_of, reason_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
@@ -27,7 +28,6 @@ from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError, explain
 from engine.whole_file import naming, whole_file, whole_folder, working_folder
 
-MOST_IMAGES = 128  # of the shell
 FULL_BYTES = 2**24  # where less is left, a build that failed has filled the disk
 COMPILING = 0.97  # of the time of a first build, measured
 COMMON = ("instrument.c", "effects.c", "thread.c", "kernels.c")
@@ -51,7 +51,7 @@ def build_plugin(
     One that is there is replaced as a whole.
 
     Args:
-        form: one of FORMATS.
+        form: one of `formats.FORMATS`.
         path: see `plugin_path`.
         cache: a folder that keeps object files for the next build.
         advanced: is called a few times a second with the name of the step and the done share of the whole, 0 … 1.
@@ -74,51 +74,24 @@ def build_plugin(
     path = plugin_path(path, form)
     (lost_with if replace else check_kept)(path, {image.id for image in images})
     try:
-        return _build_files(images, form, target, path, cache, advanced)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
+            pass
+        kernels = objects_of(target, cache, lambda share: advanced("compiling the kernels", COMPILING * share))
+        with working_folder(Path(tempfile.gettempdir()), "learned-strings-plugin") as folder:
+            library = _linked(folder, images, form, target, kernels, lambda: advanced("linking", COMPILING))
+            _place_library(library, images, form, target, path)
     except OSError as error:
         raise WriteError(explain(Path(os.fsdecode(error.filename or path)), error)) from error
+    return path
 
 
 def plugin_path(path: Path, form: str) -> Path:
     """The path with the ending of the format."""
-    ending = FORMATS[form].ending
-    return path if path.suffix == ending else path.with_name(path.name + ending)
+    return path if path.suffix == f".{form}" else path.with_name(f"{path.name}.{form}")
 
 
-def _build_files(
-    images: Sequence[Image],
-    form: str,
-    target: str,
-    path: Path,
-    cache: Path,
-    advanced: Callable[[str, float], None],
-) -> Path:
-    plugin_format = FORMATS[form]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
-        pass
-    kernels = objects_of(target, cache, lambda share: advanced("compiling the kernels", COMPILING * share))
-    advanced("linking", COMPILING)
-    with working_folder(Path(tempfile.gettempdir()), "learned-strings-plugin") as folder:
-        with naming(folder.parent):
-            for source in files("app.export.plugin").joinpath("shell").iterdir():
-                (folder / source.name).write_bytes(source.read_bytes())
-            (folder / "layout.h").write_text(layout_header(program_version()), encoding="utf-8")
-            (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
-            (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
-        library = folder / "library"
-        _link(
-            folder,
-            (*COMMON, *plugin_format.sources, "images.c", "stubs.c"),
-            kernels,
-            target,
-            library,
-            lambda: advanced("linking", COMPILING),
-        )
-        return _place_library(library, images, form, target, path)
-
-
-def _place_library(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
+def _place_library(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> None:
     """Put the linked library where hosts look for it within what is built."""
     system = target.partition("-")[0]
     inside: dict[str, Path | str] = {}
@@ -143,7 +116,7 @@ def _place_library(library: Path, images: Sequence[Image], form: str, target: st
     if not inside:
         with whole_file(path) as part:
             shutil.copyfile(library, part)
-        return path
+        return
     with whole_folder(path) as bundle:
         for name, content in inside.items():
             place = bundle / name
@@ -152,7 +125,6 @@ def _place_library(library: Path, images: Sequence[Image], form: str, target: st
                 shutil.copyfile(content, place)
             else:
                 place.write_text(content, encoding="utf-8")
-    return path
 
 
 def _images(images: Sequence[Image], folder: Path) -> str:
@@ -180,19 +152,27 @@ def _stubs() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _link(
+def _linked(
     folder: Path,
-    sources: Sequence[str],
-    kernels: Sequence[Path],
+    images: Sequence[Image],
+    form: str,
     target: str,
-    library: Path,
+    kernels: Sequence[Path],
     waiting: Callable[[], None],
-) -> None:
+) -> Path:
+    """The library, linked in a working folder."""
+    waiting()
+    with naming(folder.parent):
+        for source in files("app.export.plugin").joinpath("shell").iterdir():
+            (folder / source.name).write_bytes(source.read_bytes())
+        (folder / "layout.h").write_text(layout_header(program_version()), encoding="utf-8")
+        (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
+        (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
+    library = folder / "library"
     command = python_command("-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23")
     command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
-    command += [*(str(folder / name) for name in sources), *map(str, kernels), "-lm"]
-    if target.startswith("linux"):
-        command.append("-lpthread")
+    command += [str(folder / name) for name in (*COMMON, f"{form}.c", "images.c", "stubs.c")]
+    command += [*map(str, kernels), "-lm", *(["-lpthread"] if target.startswith("linux") else [])]
     code, output = run_waiting([command], python_environment(), lambda _: waiting())
     full = code and shutil.disk_usage(folder).free < FULL_BYTES  # then even words of the compiler may be lost
     if full or "NoSpaceLeft" in output or os.strerror(errno.ENOSPC) in output:
@@ -200,6 +180,7 @@ def _link(
     if code:
         remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in output else ""
         raise PluginError(f"linking for {target} failed: {reason_of(code, output)}{remedy}")
+    return library
 
 
 def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:

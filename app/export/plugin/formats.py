@@ -17,45 +17,19 @@ class PluginError(ValueError):
     """A plug-in cannot be built; the message names what is missing and the remedy."""
 
 
-@dataclass(frozen=True)
-class Format:
-    """A kind of plug-in.
-
-    Attributes:
-        sources: of the shell, added to those of every format.
-        ending: of the file or the folder.
-        folders: by system, where hosts of one user look for it, below the home folder.
-    """
-
-    sources: tuple[str, ...]
-    ending: str
-    folders: Mapping[str, str]
-
-
-FORMATS: Mapping[str, Format] = {
-    "clap": Format(
-        ("clap.c",),
-        ".clap",
-        {
-            "linux": ".clap",
-            "windows": "AppData/Local/Programs/Common/CLAP",
-            "macos": "Library/Audio/Plug-Ins/CLAP",
-        },
-    ),
-    "vst3": Format(
-        ("vst3.c", "clap.c"),
-        ".vst3",
-        {
-            "linux": ".vst3",
-            "windows": "AppData/Local/Programs/Common/VST3",
-            "macos": "Library/Audio/Plug-Ins/VST3",
-        },
-    ),
-    "lv2": Format(
-        ("lv2.c",),
-        ".lv2",
-        {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
-    ),
+# By format and system, where hosts of one user look for it, below the home folder
+FORMATS: Mapping[str, Mapping[str, str]] = {
+    "clap": {
+        "linux": ".clap",
+        "windows": "AppData/Local/Programs/Common/CLAP",
+        "macos": "Library/Audio/Plug-Ins/CLAP",
+    },
+    "vst3": {
+        "linux": ".vst3",
+        "windows": "AppData/Local/Programs/Common/VST3",
+        "macos": "Library/Audio/Plug-Ins/VST3",
+    },
+    "lv2": {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
 }
 
 
@@ -94,7 +68,7 @@ def this_target() -> str:
 
 def install_folder(form: str, target: str) -> Path:
     """The folder where the hosts of this user look for plug-ins of a format."""
-    return Path.home() / FORMATS[form].folders[target.partition("-")[0]]
+    return Path.home() / FORMATS[form][target.partition("-")[0]]
 
 
 def check_compiler() -> None:

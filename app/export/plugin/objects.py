@@ -72,41 +72,23 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
     """
     if target not in TARGETS:
         raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
+    kernels = f"kernels-{digest()}"
+    text_files = {part: folder / f"{kernels}-{part}.ll" for part in texts.PARTS}
     object_files = {
-        folder / f"kernels-{digest()}-{target}-{cpu}-{part}.o": (part, number)
+        folder / f"{kernels}-{target}-{cpu}-{part}.o": [str(text), target, str(number)]
         for number, cpu in enumerate(TARGETS[target].cpus)
-        for part in texts.PARTS
+        for part, text in text_files.items()
     }
-    missing = [(*part_and_cpu, path) for path, part_and_cpu in object_files.items() if not path.exists()]
-    if missing:
+    if not all(path.exists() for path in object_files):
         folder.mkdir(parents=True, exist_ok=True)
-        text_files = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
-        with contextlib.ExitStack() as parts:
-            _run(
-                __name__,
-                [
-                    [str(text_files[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
-                    for part, number, path in missing
-                ],
-                STEPS,
-                lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
-            )
+        calls = {path: [part] for part, path in text_files.items()}
+        _make(texts.__name__, calls, FUNCTIONS, lambda share: advanced(TEXT_SHARE * share))
+        _make(__name__, object_files, STEPS, lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share))
     return tuple(object_files)
 
 
-def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
-    """LLVM code of each part."""
-    text_files = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
-    missing = [(part, path) for part, path in text_files.items() if not path.exists()]
-    if missing:
-        with contextlib.ExitStack() as parts:
-            calls = [[part, str(parts.enter_context(whole_file(path)))] for part, path in missing]
-            _run(texts.__name__, calls, FUNCTIONS, advanced)
-    return text_files
-
-
-def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
-    """Run a module with each of these arguments, all at once, in processes of their own.
+def _make(module: str, calls: Mapping[Path, Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
+    """Make files that are missing: a module writes each, with its arguments, all at once in processes of their own.
 
     Numba's settings hold for a whole process, and a process can be ended.
 
@@ -116,13 +98,20 @@ def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Call
     Raises:
         ObjectError: one failed.
     """
-    code, output = run_waiting(
-        [python_command("-m", module, *arguments) for arguments in calls],
-        _environment(),
-        lambda dots: advanced(min(dots / (steps * len(calls)), 1.0)),
-    )
-    if code:
-        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, output)}")
+    missing = {path: arguments for path, arguments in calls.items() if not path.exists()}
+    if not missing:
+        return
+    with contextlib.ExitStack() as files:
+        code, output = run_waiting(
+            [
+                python_command("-m", module, *arguments, str(files.enter_context(whole_file(path))))
+                for path, arguments in missing.items()
+            ],
+            _environment(),
+            lambda dots: advanced(min(dots / (steps * len(missing)), 1.0)),
+        )
+        if code:
+            raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, output)}")
 
 
 def reason_of(code: int, output: str) -> str:

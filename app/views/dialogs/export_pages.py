@@ -23,7 +23,7 @@ from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
 from app.export.note import ExportedPluck, HeardNote, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
-from app.export.plugin.formats import FORMATS, PluginError, check_compiler, install_folder, this_target
+from app.export.plugin.formats import PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
 from app.export.recipe import source_words
 from app.export.sampled.choices import SampledChoices
@@ -463,7 +463,7 @@ class PluginPage(ExportPage):
 
     def _suggest_name(self) -> None:
         form, system = self.form.currentData(), self.system.currentData()
-        self.file.suffix = FORMATS[form].ending
+        self.file.suffix = f".{form}"
         if self._subject is not None:
             folder = install_folder(form, system) if system == _this_system() else Path.home()
             self.file.suggest(str(folder / (self._subject.patch.name + self.file.suffix)))

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 import app
-from app.audio.devices import AudioDevice, close_device, default_device, find, open_device, output_devices
+from app.audio.devices import AudioDevice, close_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
-from app.audio.problems import AudioUnavailable, ProblemKind
+from app.audio.problems import AudioProblem, ProblemKind
 from engine.kernels.mixer import call
 from engine.kernels.mixer_records import CAUSE_DEVICE
 from engine.kernels.voice import note_gap
@@ -107,9 +107,9 @@ def test_outputs_are_listed_with_the_default_first(portaudio: FakeSoundDevice) -
         AudioDevice("HDMI", "ALSA", 48_000, 8),
         AudioDevice("Speakers", "JACK", 48_000, 1),
     ]
-    assert default_device().name == "Speakers"
+    assert find(None).name == "Speakers"
     portaudio.default.device["output"] = -1
-    assert default_device().name == "HDMI"
+    assert find(None).name == "HDMI"
 
 
 @pytest.mark.parametrize(("buffer_s", "latency_s", "block"), [(0.05, 0.05, 600), (0.005, 0.01, 64), (0.0, 0.01, 64)])
@@ -117,7 +117,7 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
     portaudio: FakeSoundDevice, mixer: Mixer, buffer_s: float, latency_s: float, block: int
 ) -> None:
     """In blocks of a quarter of its buffer, of two of its channels."""
-    wanted = find("HDMI", "ALSA")
+    wanted = find(AudioDevice("HDMI", "ALSA"))
     portaudio.entries.insert(0, ("Webcam", 0, 2))  # its index moves
     close_device(open_device(wanted, buffer_s, mixer))
     assert portaudio.opened == [
@@ -130,12 +130,12 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
 
 
 def test_nothing_is_looked_for_again_while_a_stream_is_open(portaudio: FakeSoundDevice, mixer: Mixer) -> None:
-    stream = open_device(find("Speakers", "ALSA"), 0.05, mixer)
+    stream = open_device(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
     output_devices(rescan=True)
     assert portaudio.restarts == 0
     close_device(stream)
     assert portaudio.streams[0].asked == ["abort", "close"]  # though it could not stop
-    assert find("Headset", "ALSA", rescan=True).channels == 2, "it was plugged in"
+    assert find(AudioDevice("Headset", "ALSA"), rescan=True).channels == 2, "it was plugged in"
     assert portaudio.restarts == 1
 
 
@@ -145,7 +145,7 @@ def test_times_of_a_device_that_cannot_be_are_not_shown(
 ) -> None:
     for name in ("latency", "time", "cpu_load"):
         monkeypatch.setattr(FakeStream, name, value)
-    output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
+    output = DeviceOutput(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
     assert output.latency_s == 0.05, "as it was asked for"
     assert math.isfinite(output.now_s()) and 0 <= output.load() < math.inf
     mixer.record["dac_s"] = value
@@ -160,7 +160,7 @@ def test_an_output_plays_stalls_and_is_lost(
 ) -> None:
     clock = SimpleNamespace(now_s=100.0)
     monkeypatch.setattr("app.audio.output.time.monotonic", lambda: clock.now_s)
-    output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
+    output = DeviceOutput(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
     (stream,) = portaudio.streams
     assert (output.latency_s, output.now_s(), output.load()) == (0.02, 3.0, 0.1)
     found = []
@@ -218,9 +218,9 @@ def opening(error: Exception) -> Callable[[FakeSoundDevice], None]:
 def test_a_device_that_cannot_be_opened_is_explained_and_freed(
     portaudio: FakeSoundDevice, mixer: Mixer, fault: Callable[[Any], object], kind: ProblemKind, message: str
 ) -> None:
-    wanted = find("Speakers", "ALSA")
+    wanted = find(AudioDevice("Speakers", "ALSA"))
     fault(portaudio)
-    with pytest.raises(AudioUnavailable, match=message) as caught:
+    with pytest.raises(AudioProblem, match=message) as caught:
         DeviceOutput(wanted, 0.05, mixer)
     error = portaudio.open_error or portaudio.start_error
     assert caught.value.kind is kind and caught.value.remedy in str(caught.value)
@@ -233,8 +233,8 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
 def test_no_output_at_all(portaudio: FakeSoundDevice) -> None:
     portaudio.entries[:] = [("Microphone", 0, 0)]
     assert output_devices() == []
-    with pytest.raises(AudioUnavailable, match="No audio output") as caught:
-        default_device()
+    with pytest.raises(AudioProblem, match="No audio output") as caught:
+        find(None)
     assert caught.value.kind is ProblemKind.NO_DEVICE
 
 
@@ -247,7 +247,7 @@ def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyP
         return original(name, *arguments, **options)
 
     monkeypatch.setattr("builtins.__import__", refuse)
-    with pytest.raises(AudioUnavailable) as caught:
+    with pytest.raises(AudioProblem) as caught:
         output_devices()
     assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
     assert caught.value.detail == "PortAudio library not found"

@@ -21,7 +21,7 @@ import pytest
 
 import app
 from app.audio.devices import output_devices
-from app.audio.problems import AudioUnavailable
+from app.audio.problems import AudioProblem
 from engine.kernels.constants import QUANTUM
 from tests.app.audio import play_through_device as script
 
@@ -139,6 +139,6 @@ def test_a_sound_server_that_dies_is_reported_once_and_time_goes_on(sound_server
 def test_the_devices_of_this_computer_can_be_listed() -> None:
     try:
         devices = output_devices()
-    except AudioUnavailable as error:
+    except AudioProblem as error:
         pytest.skip(str(error))
     assert all(device.name and device.default_rate_hz > 0 and device.channels > 0 for device in devices)

@@ -13,7 +13,8 @@ import pytest
 
 from app.audio import sound as sound_module
 from app.audio.devices import AudioDevice
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
+from app.audio.output import Output
+from app.audio.problems import AudioProblem, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
 from engine.effects import Effects
 from engine.values.effects import Room
@@ -24,11 +25,11 @@ HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
 SPEAKERS = AudioDevice("Speakers", "Test API", 44_100)  # of another rate
 
 
-class FakeOutput:
+class FakeOutput(Output):
     """An output that plays only when a test says so."""
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
-        self.device: AudioDevice | None = device
+        self.device = device
         self.rate_hz, self.latency_s, self.mixer = device.default_rate_hz, buffer_s, mixer
         self.is_stalled = self.is_lost = self.closed = self.broken = False
 
@@ -55,7 +56,7 @@ class Desk:
     """The computer's devices, and all that was asked of them."""
 
     devices: list[AudioDevice] = field(default_factory=lambda: [HEADPHONES, SPEAKERS])
-    refuses: Callable[[AudioDevice], AudioUnavailable | None] = lambda device: None
+    refuses: Callable[[AudioDevice], AudioProblem | None] = lambda device: None
     while_opening: Callable[[], object] = lambda: None
     outputs: list[FakeOutput] = field(default_factory=list)
     rescans: int = 0
@@ -225,11 +226,11 @@ def test_closing_frees_the_device_and_may_be_repeated(
 # Faults of devices: what happens, which problem is reported, and that sound or time continues
 
 
-def busy(device: AudioDevice) -> AudioUnavailable | None:
+def busy(device: AudioDevice) -> AudioProblem | None:
     return refused(ValueError("busy"), device.name, 44_100) if device == SPEAKERS else None
 
 
-def slow_only(device: AudioDevice) -> AudioUnavailable | None:
+def slow_only(device: AudioDevice) -> AudioProblem | None:
     fast = device.default_rate_hz == 192_000
     return refused(ValueError("Invalid sample rate"), device.name, 192_000) if fast else None
 

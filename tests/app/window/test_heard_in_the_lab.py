@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
+from app.audio.output import Output
 from app.audio.sound import Sound
 from app.export.choices import ExportChoices
 from app.export.sound import SoundRequest
@@ -60,28 +61,16 @@ SYMPATHETIC = [name for name, patch in PLAYED.items() if patch.sympathy_s_kg > 0
 Samples = NDArray[np.float64]
 
 
-class HeldOutput:
+class HeldOutput(Output):
     """A device whose frames the test takes."""
 
-    device, latency_s = AudioDevice("Held", "Test API", RATE_HZ), 0.0
+    device = AudioDevice("Held", "Test API", RATE_HZ)
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
         self.rate_hz, self._mixer = mixer.rate_hz, mixer
 
     def now_s(self) -> float:
         return self._mixer.seconds
-
-    def load(self) -> float:
-        return 0.0
-
-    def stalled(self) -> bool:
-        return False
-
-    def lost(self) -> bool:
-        return False
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture

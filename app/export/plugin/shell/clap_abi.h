@@ -1,20 +1,10 @@
 /* The part of CLAP's binary interface that the shell uses, written from its public documentation.
-   https://cleveraudio.org - version 1.2.0 of the interface. Every offset that matters is asserted. */
+   https://cleveraudio.org - version 1.2.0 of the interface. Of each record the size or its last place is asserted. */
 
 #ifndef LS_CLAP_ABI_H
 #define LS_CLAP_ABI_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#ifdef _WIN32
-#define LS_EXPORT __declspec(dllexport)
-#else
-#define LS_EXPORT __attribute__((visibility("default")))
-#endif
-
-#define AT(type, field, offset) _Static_assert(offsetof(type, field) == (offset), #type "." #field)
+#include "abi.h"
 
 typedef struct { uint32_t major, minor, revision; } clap_version;
 #define CLAP_VERSION_USED ((clap_version){1, 2, 0})
@@ -32,7 +22,6 @@ typedef struct {
   const char *id, *name, *vendor, *url, *manual_url, *support_url, *plugin_version, *description;
   const char *const *features;
 } clap_descriptor;
-AT(clap_descriptor, id, 16);
 AT(clap_descriptor, features, 80);
 
 typedef struct clap_host {
@@ -64,7 +53,6 @@ typedef struct {
   int16_t port, channel, key;
   double value;
 } clap_event_param;
-AT(clap_event_param, cookie, 24);
 AT(clap_event_param, value, 48);
 typedef struct { clap_event header; uint16_t port; uint8_t data[3]; } clap_event_midi;
 AT(clap_event_midi, data, 18);
@@ -91,7 +79,6 @@ typedef struct {
   const clap_in_events *in_events;
   const clap_out_events *out_events;
 } clap_process;
-AT(clap_process, outputs, 32);
 AT(clap_process, in_events, 48);
 enum { CLAP_ERROR, CLAP_CONTINUE, CLAP_CONTINUE_IF_NOT_QUIET, CLAP_TAIL, CLAP_SLEEP };
 
@@ -135,22 +122,10 @@ typedef struct clap_preset_receiver {
   void (*add_feature)(const struct clap_preset_receiver *, const char *);
   void (*add_extra_info)(const struct clap_preset_receiver *, const char *key, const char *value);
 } clap_preset_receiver;
-AT(clap_preset_receiver, on_error, 8);
-AT(clap_preset_receiver, begin_preset, 16);
-AT(clap_preset_receiver, add_plugin_id, 24);
-AT(clap_preset_receiver, set_flags, 40);
-AT(clap_preset_receiver, add_creator, 48);
-AT(clap_preset_receiver, set_description, 56);
-AT(clap_preset_receiver, add_feature, 72);
 _Static_assert(sizeof(clap_preset_receiver) == 88, "clap_preset_receiver");
 typedef struct { uint32_t flags; const char *name; uint32_t kind; const char *location; } clap_preset_location;
-AT(clap_preset_location, name, 8);
-AT(clap_preset_location, kind, 16);
-AT(clap_preset_location, location, 24);
 _Static_assert(sizeof(clap_preset_location) == 32, "clap_preset_location");
 typedef struct { clap_version version; const char *id, *name, *vendor; } clap_preset_descriptor;
-AT(clap_preset_descriptor, id, 16);
-AT(clap_preset_descriptor, vendor, 32);
 _Static_assert(sizeof(clap_preset_descriptor) == 40, "clap_preset_descriptor");
 typedef struct clap_preset_provider {
   const clap_preset_descriptor *descriptor;
@@ -160,10 +135,6 @@ typedef struct clap_preset_provider {
   bool (*get_metadata)(const struct clap_preset_provider *, uint32_t kind, const char *location, const clap_preset_receiver *);
   const void *(*get_extension)(const struct clap_preset_provider *, const char *id);
 } clap_preset_provider;
-AT(clap_preset_provider, init, 16);
-AT(clap_preset_provider, destroy, 24);
-AT(clap_preset_provider, get_metadata, 32);
-AT(clap_preset_provider, get_extension, 40);
 _Static_assert(sizeof(clap_preset_provider) == 48, "clap_preset_provider");
 typedef struct clap_preset_indexer {
   clap_version version;
@@ -174,19 +145,9 @@ typedef struct clap_preset_indexer {
   bool (*declare_soundpack)(const struct clap_preset_indexer *, const void *);
   const void *(*get_extension)(const struct clap_preset_indexer *, const char *id);
 } clap_preset_indexer;
-AT(clap_preset_indexer, data, 48);
-AT(clap_preset_indexer, declare_location, 64);
-AT(clap_preset_indexer, get_extension, 80);
 _Static_assert(sizeof(clap_preset_indexer) == 88, "clap_preset_indexer");
-typedef struct clap_preset_factory {
-  uint32_t (*count)(const struct clap_preset_factory *);
-  const clap_preset_descriptor *(*descriptor)(const struct clap_preset_factory *, uint32_t);
-  const clap_preset_provider *(*create)(const struct clap_preset_factory *, const clap_preset_indexer *, const char *id);
-} clap_preset_factory;
-AT(clap_preset_factory, descriptor, 8);
-AT(clap_preset_factory, create, 16);
 
-/* Extensions */
+/* Extensions. Their tables are written once, with the functions; those that a host in C calls have types here. */
 typedef struct {
   uint32_t id;
   char name[256];
@@ -194,21 +155,12 @@ typedef struct {
   const char *type;
   uint32_t in_place;
 } clap_audio_port;
-AT(clap_audio_port, flags, 260);
 AT(clap_audio_port, type, 272);
 enum { CLAP_PORT_IS_MAIN = 1 };
-typedef struct {
-  uint32_t (*count)(const clap_plugin *, bool is_input);
-  bool (*get)(const clap_plugin *, uint32_t, bool is_input, clap_audio_port *);
-} clap_audio_ports;
 
 typedef struct { uint32_t id, dialects, preferred; char name[256]; } clap_note_port;
 _Static_assert(sizeof(clap_note_port) == 268, "clap_note_port");
 enum { CLAP_DIALECT_CLAP = 1, CLAP_DIALECT_MIDI = 2, CLAP_DIALECT_MPE = 4 };
-typedef struct {
-  uint32_t (*count)(const clap_plugin *, bool is_input);
-  bool (*get)(const clap_plugin *, uint32_t, bool is_input, clap_note_port *);
-} clap_note_ports;
 
 typedef struct {
   uint32_t id, flags;
@@ -216,7 +168,6 @@ typedef struct {
   char name[256], module[1024];
   double low, high, standard;
 } clap_param;
-AT(clap_param, name, 16);
 AT(clap_param, low, 1296);
 enum { CLAP_PARAM_STEPPED = 1, CLAP_PARAM_AUTOMATABLE = 1 << 5, CLAP_PARAM_ENUM = 1 << 16 };
 typedef struct {
@@ -241,14 +192,7 @@ typedef struct {
   bool (*load)(const clap_plugin *, const clap_istream *);
 } clap_state;
 
-typedef struct { uint32_t (*get)(const clap_plugin *); } clap_latency, clap_tail;
 enum { CLAP_RENDER_REALTIME, CLAP_RENDER_OFFLINE };
-typedef struct {
-  bool (*has_hard_realtime_requirement)(const clap_plugin *);
-  bool (*set)(const clap_plugin *, int32_t mode);
-} clap_render;
-
-typedef struct { bool (*from_location)(const clap_plugin *, uint32_t kind, const char *location, const char *load_key); } clap_preset_load;
 
 /* Extensions of hosts */
 enum { CLAP_RESCAN_VALUES = 1 };
@@ -257,7 +201,6 @@ typedef struct {
   void (*on_error)(const clap_host *, uint32_t kind, const char *location, const char *load_key, int32_t os_error, const char *message);
   void (*loaded)(const clap_host *, uint32_t kind, const char *location, const char *load_key);
 } clap_host_preset_load;
-AT(clap_host_preset_load, loaded, 8);
 _Static_assert(sizeof(clap_host_preset_load) == 16, "clap_host_preset_load");
 
 #endif

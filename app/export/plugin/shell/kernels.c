@@ -1,22 +1,10 @@
-/* See kernels.h. */
+/* The compiled kernels of the processors for which they were built, and the choice between them. */
 
-#include "kernels.h"
+#include "instrument.h"
 
-#define KERNELS(number)                                                                                                 \
-  int32_t ls##number##_render(void *, void **, int64_t, int64_t, int64_t);                                              \
-  int32_t ls##number##_begin(void *, void **, int64_t);                                                                 \
-  int32_t ls##number##_kit_begin(void *, void **, int64_t, int64_t);                                                    \
-  int32_t ls##number##_kit_follow(void *, void **, int64_t, int64_t, double);                                           \
-  int32_t ls##number##_kit_prepare(void *, void **, int64_t, int64_t, int64_t);                                         \
-  int32_t ls##number##_drive(void *, void **, int64_t, double, double, double);                                         \
-  int32_t ls##number##_begin_convolver(void *, void **, int64_t, double, int64_t);                                      \
-  int32_t ls##number##_measure(void *, void **, int64_t, double, double, double, int64_t);                              \
-  int32_t ls##number##_prepare(void *, void **, int64_t, int64_t, double, double, double, int64_t, int64_t);            \
-  int32_t ls##number##_weigh(void *, void **, int64_t, double, double, int64_t);                                        \
-  int32_t ls##number##_mix(void *, void **, int64_t, int64_t, int64_t, int64_t, int64_t);                               \
-  static const kernels kernels##number = {ls##number##_render, ls##number##_begin, ls##number##_kit_begin,              \
-    ls##number##_kit_follow, ls##number##_kit_prepare, ls##number##_drive, ls##number##_begin_convolver,                \
-    ls##number##_measure, ls##number##_prepare, ls##number##_weigh, ls##number##_mix};
+#define DECLARED(number, name, ...) int32_t ls##number##_##name(void *, void **, __VA_ARGS__);
+#define ENTRY(number, name, ...) .name = ls##number##_##name,
+#define KERNELS(number) ENTRIES(DECLARED, number) static const kernels kernels##number = {ENTRIES(ENTRY, number)};
 
 KERNELS(0)
 

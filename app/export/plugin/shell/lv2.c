@@ -10,16 +10,6 @@
 #include <string.h>
 
 #include "instrument.h"
-#include "layout.h"
-
-#ifdef _WIN32
-#define LS_EXPORT __declspec(dllexport)
-#else
-#define LS_EXPORT __attribute__((visibility("default")))
-#endif
-
-extern const image *const images[];
-extern const int32_t image_count;
 
 typedef struct { const char *uri; void *data; } lv2_feature;
 typedef struct { void *handle; uint32_t (*map)(void *handle, const char *uri); } lv2_map;
@@ -53,14 +43,16 @@ enum { STATE_IS_POD = 1, STATE_IS_PORTABLE = 2 };
 typedef struct {
   instrument own;
   double rate_hz;
-  uint32_t midi, chunk, values_key, ports_key;
+  uint32_t midi, chunk, keys[2]; /* keys: of the values and of the ports in a state */
   const lv2_sequence *events;
   float *left, *right, *latency;
   const float *ports[MOST_PARAMETERS];
   double seen[MOST_PARAMETERS];     /* of ports: the values that the parameters have followed */
   double restored[MOST_PARAMETERS]; /* of ports, with a state; NaN: the port has been there, or elsewhere, since */
-  bool begun, loaded;               /* begun: nothing is rendered yet; loaded: a state that the next block takes up */
+  bool begun;                       /* nothing is rendered yet */
 } shell;
+
+static const char URN[] = "urn:";
 
 /* Single precision, as ports have it. */
 static double port_standard(const shell *own, int32_t place) { return (float)parameters_of(own->own.of)[place].standard; }
@@ -69,25 +61,19 @@ static void *instantiate(const lv2_descriptor_t *descriptor, double rate_hz, con
   const lv2_map *map = NULL;
   for (; features && *features; features++)
     if (!strcmp((*features)->uri, "http://lv2plug.in/ns/ext/urid#map")) map = (*features)->data;
-  if (!rate_is_possible(rate_hz)) return NULL;
-  for (int32_t each = 0; map && each < image_count; each++) {
-    char uri[160];
-    snprintf(uri, sizeof uri, "urn:%s", images[each]->id);
-    if (strcmp(uri, descriptor->uri)) continue;
-    shell *own = calloc(1, sizeof *own);
-    if (!own) return NULL;
-    own->rate_hz = rate_hz;
-    own->midi = map->map(map->handle, "http://lv2plug.in/ns/ext/midi#MidiEvent");
-    own->chunk = map->map(map->handle, "http://lv2plug.in/ns/ext/atom#Chunk");
-    own->values_key = map->map(map->handle, "urn:org.learned-strings:state#values");
-    own->ports_key = map->map(map->handle, "urn:org.learned-strings:state#ports");
-    own->own.of = images[each];
-    instrument_reset_values(&own->own);
-    for (int32_t place = 0; place < images[each]->parameter_count; place++)
-      own->seen[place] = port_standard(own, place), own->restored[place] = NAN;
-    return own;
-  }
-  return NULL;
+  int32_t number = image_with_id(descriptor->uri + sizeof URN - 1);
+  shell *own = number >= 0 && map && rate_is_possible(rate_hz) ? calloc(1, sizeof *own) : NULL;
+  if (!own) return NULL;
+  own->rate_hz = rate_hz;
+  own->midi = map->map(map->handle, "http://lv2plug.in/ns/ext/midi#MidiEvent");
+  own->chunk = map->map(map->handle, "http://lv2plug.in/ns/ext/atom#Chunk");
+  own->keys[0] = map->map(map->handle, "urn:org.learned-strings:state#values");
+  own->keys[1] = map->map(map->handle, "urn:org.learned-strings:state#ports");
+  own->own.of = images[number];
+  instrument_reset_values(&own->own);
+  for (int32_t place = 0; place < own->own.of->parameter_count; place++)
+    own->seen[place] = port_standard(own, place), own->restored[place] = NAN;
+  return own;
 }
 
 static void connect_port(void *handle, uint32_t port, void *data) {
@@ -102,7 +88,6 @@ static void connect_port(void *handle, uint32_t port, void *data) {
 static void activate(void *handle) {
   shell *own = handle;
   own->begun = instrument_begin(&own->own, own->rate_hz);
-  own->loaded = false; /* all values are taken up */
 }
 
 /* A port counts when it moves: a macro may have moved its parameter since. */
@@ -119,13 +104,26 @@ static void follow_ports(shell *own) {
     if (back || !other) continue;
     if (value == port_standard(own, place)) value = each->standard;
     if (own->begun) instrument_set(&own->own, place, value);
-    else instrument_change(&own->own, 0, place, value);
+    else instrument_take(&own->own, 0, (event){.kind = PARAMETER, .key = place, .value = value});
     moved = true;
   }
-  if (own->begun && (moved || own->loaded)) instrument_reset(&own->own); /* nothing sounds: no knob glides */
-  else if (own->loaded)
-    for (int32_t place = 0; place < own->own.of->parameter_count; place++) instrument_follow(&own->own, place);
-  own->loaded = false;
+  if (own->begun && (moved || own->own.loaded)) instrument_reset(&own->own); /* nothing sounds: no knob glides */
+}
+
+typedef struct { const char *next, *end; uint32_t midi; } given;
+
+static bool next_event(void *context, event *to) {
+  given *from = context;
+  while (from->next && from->next + sizeof(lv2_event) <= from->end) {
+    const lv2_event *each = (const lv2_event *)from->next;
+    const char *bytes = from->next + sizeof(lv2_event);
+    from->next = bytes + ((each->body.size + 7u) & ~7u);
+    if (each->body.type != from->midi || each->body.size != 3 || bytes + 3 > from->end) continue;
+    if (!event_of_midi((const uint8_t *)bytes, to)) continue;
+    to->frame = each->frames;
+    return true;
+  }
+  return false;
 }
 
 static void run(void *handle, uint32_t frames) {
@@ -139,24 +137,12 @@ static void run(void *handle, uint32_t frames) {
   }
   follow_ports(own);
   if (frames) own->begun = false;
-  const char *next = NULL, *end = NULL;
+  given from = {NULL, NULL, own->midi};
   if (own->events && own->events->atom.size >= 8) {
-    next = (const char *)own->events + sizeof(lv2_sequence);
-    end = (const char *)own->events + sizeof(lv2_atom) + own->events->atom.size;
+    from.next = (const char *)own->events + sizeof(lv2_sequence);
+    from.end = (const char *)own->events + sizeof(lv2_atom) + own->events->atom.size;
   }
-  for (uint32_t done = 0; done < frames;) {
-    uint32_t until = done + QUANTUM < frames ? done + QUANTUM : frames;
-    while (next && next + sizeof(lv2_event) <= end) {
-      const lv2_event *event = (const lv2_event *)next;
-      if (event->frames >= until) break;
-      uint32_t at = event->frames < done ? 0 : (uint32_t)event->frames - done;
-      if (event->body.type == own->midi && event->body.size == 3 && next + sizeof(lv2_event) + 3 <= end)
-        instrument_midi(&own->own, at, (const uint8_t *)next + sizeof(lv2_event));
-      next += sizeof(lv2_event) + ((event->body.size + 7u) & ~7u);
-    }
-    instrument_render(&own->own, until - done, own->left + done, own->right + done);
-    done = until;
-  }
+  instrument_play(&own->own, frames, (float *[]){own->left, own->right}, 2, next_event, &from);
 }
 
 static void deactivate(void *handle) { instrument_end(&((shell *)handle)->own); }
@@ -168,11 +154,11 @@ static void cleanup(void *handle) {
 
 static int32_t save(void *handle, lv2_store store, void *with, uint32_t, const lv2_feature *const *) {
   shell *own = handle;
-  uint8_t bytes[8 + 12 * MOST_PARAMETERS];
-  const struct { uint32_t key; const double *values; } parts[] = {{own->values_key, own->own.values}, {own->ports_key, own->seen}};
+  uint8_t bytes[STATE_BYTES];
+  const double *parts[] = {own->own.values, own->seen};
   for (int32_t each = 0; each < 2; each++) {
-    int32_t size = state_write(own->own.of, parts[each].values, bytes, sizeof bytes);
-    int32_t result = store(with, parts[each].key, bytes, (size_t)size, own->chunk, STATE_IS_POD | STATE_IS_PORTABLE);
+    size_t size = (size_t)state_write(own->own.of, parts[each], bytes);
+    int32_t result = store(with, own->keys[each], bytes, size, own->chunk, STATE_IS_POD | STATE_IS_PORTABLE);
     if (result != STATE_SUCCESS) return result;
   }
   return STATE_SUCCESS;
@@ -181,26 +167,19 @@ static int32_t save(void *handle, lv2_store store, void *with, uint32_t, const l
 /* Both parts are read before either counts. */
 static int32_t restore(void *handle, lv2_retrieve retrieve, void *with, uint32_t, const lv2_feature *const *) {
   shell *own = handle;
-  const image *of = own->own.of;
-  double values[MOST_PARAMETERS], ports[MOST_PARAMETERS];
-  const struct { uint32_t key; double *values; } parts[] = {{own->values_key, values}, {own->ports_key, ports}};
-  for (int32_t place = 0; place < of->parameter_count; place++) {
-    values[place] = parameters_of(of)[place].standard;
-    ports[place] = port_standard(own, place);
-  }
+  const uint8_t *parts[2];
+  size_t sizes[2] = {0};
   for (int32_t each = 0; each < 2; each++) {
-    size_t size = 0;
     uint32_t type = 0, flags = 0;
-    const uint8_t *bytes = retrieve(with, parts[each].key, &size, &type, &flags);
-    if (!bytes) return STATE_NO_PROPERTY;
+    parts[each] = retrieve(with, own->keys[each], &sizes[each], &type, &flags);
+    if (!parts[each]) return STATE_NO_PROPERTY;
     if (type != own->chunk) return STATE_BAD_TYPE;
-    if (size > MOST_STATE_BYTES || !state_read(of, bytes, (int64_t)size, parts[each].values)) return STATE_UNKNOWN;
+    if (sizes[each] > MOST_STATE_BYTES) return STATE_UNKNOWN;
   }
-  for (int32_t place = 0; place < of->parameter_count; place++) {
-    own->own.values[place] = values[place];
-    own->restored[place] = (float)ports[place];
-  }
-  own->loaded = true;
+  double ports[MOST_PARAMETERS];
+  if (!state_read(own->own.of, parts[1], (int64_t)sizes[1], ports)) return STATE_UNKNOWN;
+  if (!instrument_load(&own->own, parts[0], (int64_t)sizes[0])) return STATE_UNKNOWN;
+  for (int32_t place = 0; place < own->own.of->parameter_count; place++) own->restored[place] = (float)ports[place];
   return STATE_SUCCESS;
 }
 
@@ -210,11 +189,10 @@ static const void *extension_data(const char *uri) {
 }
 
 LS_EXPORT const lv2_descriptor_t *lv2_descriptor(uint32_t index) {
-  enum { MOST_IMAGES = 128 };
   static char uris[MOST_IMAGES][160];
   static lv2_descriptor_t descriptors[MOST_IMAGES];
-  if (index >= (uint32_t)image_count || index >= MOST_IMAGES) return NULL;
-  snprintf(uris[index], sizeof uris[index], "urn:%s", images[index]->id);
+  if (index >= (uint32_t)image_count) return NULL;
+  snprintf(uris[index], sizeof uris[index], "%s%s", URN, images[index]->id);
   descriptors[index] = (lv2_descriptor_t){uris[index], instantiate, connect_port, activate, run, deactivate, cleanup, extension_data};
   return &descriptors[index];
 }

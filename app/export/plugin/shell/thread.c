@@ -1,66 +1,54 @@
 /* See thread.h. */
 
-#ifndef _WIN32
+#ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+#else
 #define _POSIX_C_SOURCE 200809L /* nanosleep, which the C standard has not */
+#include <pthread.h>
+#include <time.h>
 #endif
 
 #include "thread.h"
 
-#include <stdlib.h>
-
 enum { PAUSE_MS = 10 };
 
-typedef struct thread thread;
-
 #ifdef _WIN32
-#define WIN32_LEAN_AND_MEAN
-#include <windows.h>
-
-struct thread { void (*run)(void *); void *with; HANDLE of; };
-
 static DWORD WINAPI runs(void *with) {
-  thread *own = with;
-  own->run(own->with);
+  ((thread *)with)->run(((thread *)with)->with);
   return 0;
 }
 
-static bool started(thread *own) { return (own->of = CreateThread(NULL, 0, runs, own, 0, NULL)); }
+static uintptr_t started(thread *own) { return (uintptr_t)CreateThread(NULL, 0, runs, own, 0, NULL); }
 
-static void wait_for(thread *own) {
-  WaitForSingleObject(own->of, INFINITE);
-  CloseHandle(own->of);
+static void wait_for(uintptr_t handle) {
+  WaitForSingleObject((HANDLE)handle, INFINITE);
+  CloseHandle((HANDLE)handle);
 }
 
 void thread_pause(void) { Sleep(PAUSE_MS); }
 #else
-#include <pthread.h>
-#include <time.h>
-
-struct thread { void (*run)(void *); void *with; pthread_t of; };
-
 static void *runs(void *with) {
-  thread *own = with;
-  own->run(own->with);
+  ((thread *)with)->run(((thread *)with)->with);
   return NULL;
 }
 
-static bool started(thread *own) { return !pthread_create(&own->of, NULL, runs, own); }
+static uintptr_t started(thread *own) {
+  pthread_t handle;
+  return pthread_create(&handle, NULL, runs, own) ? 0 : (uintptr_t)handle;
+}
 
-static void wait_for(thread *own) { pthread_join(own->of, NULL); }
+static void wait_for(uintptr_t handle) { pthread_join((pthread_t)handle, NULL); }
 
 void thread_pause(void) { nanosleep(&(struct timespec){0, PAUSE_MS * 1000000}, NULL); }
 #endif
 
-void *thread_begin(void (*run)(void *), void *with) {
-  thread *own = calloc(1, sizeof *own);
-  if (!own) return NULL;
+void thread_begin(thread *own, void (*run)(void *), void *with) {
   own->run = run, own->with = with;
-  if (started(own)) return own;
-  free(own);
-  return NULL;
+  own->handle = started(own);
 }
 
-void thread_end(void *which) {
-  if (which) wait_for(which);
-  free(which);
+void thread_end(thread *own) {
+  if (own->handle) wait_for(own->handle);
+  own->handle = 0;
 }

@@ -3,8 +3,12 @@
 #ifndef LS_THREAD_H
 #define LS_THREAD_H
 
-void *thread_begin(void (*run)(void *), void *with); /* NULL: the system gives none */
-void thread_end(void *);                             /* waits until it has ended; NULL: nothing */
-void thread_pause(void);                             /* a few milliseconds */
+#include <stdint.h>
+
+typedef struct { void (*run)(void *); void *with; uintptr_t handle; } thread; /* handle 0: it does not run */
+
+void thread_begin(thread *, void (*run)(void *), void *with); /* it stays where it is */
+void thread_end(thread *);                                    /* waits until it has ended, if it runs */
+void thread_pause(void);                                      /* a few milliseconds */
 
 #endif

@@ -1,13 +1,10 @@
 /* The part of VST3's binary interface that the shell uses: facts of its public C interface, written from its documentation.
-   https://steinbergmedia.github.io/vst3_dev_portal - every offset that matters is asserted. */
+   https://steinbergmedia.github.io/vst3_dev_portal - of each record the size or its last place is asserted. */
 
 #ifndef LS_VST3_ABI_H
 #define LS_VST3_ABI_H
 
-#include <stddef.h>
-#include <stdint.h>
-
-#include "clap_abi.h" /* AT, LS_EXPORT */
+#include "abi.h"
 
 typedef uint16_t vst_text[128]; /* UTF-16 */
 typedef uint8_t vst_uid[16];
@@ -34,15 +31,8 @@ static const vst_uid UID_MIDI_MAPPING = UID(0xDF0FF9F7, 0x49B74669, 0xB63AB732, 
 static const vst_uid UID_EXPRESSIONS = UID(0xB7F8F859, 0x41234872, 0x91169581, 0x4F3721A3);
 static const vst_uid UID_REQUIREMENTS = UID(0x2A654303, 0xEF764E3D, 0x95B5FE83, 0x730EF6D0);
 
-/* Every interface begins with these. */
-#define UNKNOWN_FIELDS \
-  int32_t (*query)(void *, const vst_uid, void **); \
-  uint32_t (*add_reference)(void *); \
-  uint32_t (*release)(void *)
-#define BASE_FIELDS \
-  UNKNOWN_FIELDS; \
-  int32_t (*initialize)(void *, void *context); \
-  int32_t (*terminate)(void *)
+/* An interface is a pointer to a table of functions, of which the first three are those of FUnknown. Tables of hosts have
+   types here; those of the plug-in are written once, with the functions, in the order of the documentation. */
 
 /* Factory */
 typedef struct { char vendor[64], url[256], email[128]; int32_t flags; } vst_factory_info;
@@ -50,16 +40,12 @@ AT(vst_factory_info, flags, 448);
 enum { VST_FACTORY_UNICODE = 16 };
 enum { VST_MANY_INSTANCES = 0x7FFFFFFF };
 typedef struct { vst_uid id; int32_t cardinality; char category[32], name[64]; } vst_class;
-AT(vst_class, name, 52);
 _Static_assert(sizeof(vst_class) == 116, "vst_class");
 typedef struct {
-  vst_uid id;
-  int32_t cardinality;
-  char category[32], name[64];
+  vst_class first;
   uint32_t flags;
   char subcategories[128], vendor[64], version[64], sdk[64];
 } vst_class2;
-AT(vst_class2, flags, 116);
 _Static_assert(sizeof(vst_class2) == 440, "vst_class2");
 typedef struct {
   vst_uid id;
@@ -70,19 +56,7 @@ typedef struct {
   char subcategories[128];
   uint16_t vendor[64], version[64], sdk[64];
 } vst_class3;
-AT(vst_class3, flags, 180);
 _Static_assert(sizeof(vst_class3) == 696, "vst_class3");
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*factory_info)(void *, vst_factory_info *);
-  int32_t (*count)(void *);
-  int32_t (*class_info)(void *, int32_t, vst_class *);
-  int32_t (*create)(void *, const char *id, const char *interface, void **);
-  int32_t (*class_info2)(void *, int32_t, vst_class2 *);
-  int32_t (*class_info3)(void *, int32_t, vst_class3 *);
-  int32_t (*set_context)(void *, void *);
-} vst_factory;
-AT(vst_factory, create, 48);
 
 /* Component */
 enum { VST_AUDIO, VST_EVENTS };
@@ -90,26 +64,13 @@ enum { VST_INPUT, VST_OUTPUT };
 enum { VST_MAIN = 0, VST_DEFAULT_ACTIVE = 1 };
 typedef struct { int32_t media, direction, channels; vst_text name; int32_t type; uint32_t flags; } vst_bus;
 AT(vst_bus, type, 268);
-typedef struct vst_stream vst_stream;
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*read)(vst_stream *, void *, int32_t, int32_t *done);
-  int32_t (*write)(vst_stream *, void *, int32_t, int32_t *done);
-} vst_stream_table; /* seek and tell follow */
-struct vst_stream { const vst_stream_table *table; };
-typedef struct {
-  BASE_FIELDS;
-  int32_t (*controller_class)(void *, vst_uid);
-  int32_t (*set_io_mode)(void *, int32_t);
-  int32_t (*bus_count)(void *, int32_t media, int32_t direction);
-  int32_t (*bus_info)(void *, int32_t media, int32_t direction, int32_t, vst_bus *);
-  int32_t (*routing)(void *, void *, void *);
-  int32_t (*activate_bus)(void *, int32_t media, int32_t direction, int32_t, uint8_t);
-  int32_t (*set_active)(void *, uint8_t);
-  int32_t (*set_state)(void *, vst_stream *);
-  int32_t (*get_state)(void *, vst_stream *);
-} vst_component;
-AT(vst_component, get_state, 104);
+typedef struct vst_stream {
+  const struct {
+    const void *unknown[3];
+    int32_t (*read)(struct vst_stream *, void *, int32_t, int32_t *done);
+    int32_t (*write)(struct vst_stream *, void *, int32_t, int32_t *done);
+  } *table; /* seek and tell follow */
+} vst_stream;
 
 /* Processor */
 enum { VST_REALTIME, VST_PREFETCH, VST_OFFLINE };
@@ -117,23 +78,23 @@ typedef struct { int32_t mode, sample_size, most_frames; double rate_hz; } vst_s
 AT(vst_setup, rate_hz, 16);
 typedef struct { int32_t channels; uint64_t silence; float **data; } vst_buffers;
 AT(vst_buffers, data, 16);
-typedef struct vst_queue vst_queue;
-typedef struct {
-  UNKNOWN_FIELDS;
-  uint32_t (*id)(vst_queue *);
-  int32_t (*count)(vst_queue *);
-  int32_t (*point)(vst_queue *, int32_t, int32_t *frame, double *value);
-  int32_t (*add)(vst_queue *, int32_t frame, double value, int32_t *);
-} vst_queue_table;
-struct vst_queue { const vst_queue_table *table; };
-typedef struct vst_changes vst_changes;
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*count)(vst_changes *);
-  vst_queue *(*queue)(vst_changes *, int32_t);
-  vst_queue *(*add)(vst_changes *, const uint32_t *id, int32_t *);
-} vst_changes_table;
-struct vst_changes { const vst_changes_table *table; };
+typedef struct vst_queue {
+  const struct {
+    const void *unknown[3];
+    uint32_t (*id)(struct vst_queue *);
+    int32_t (*count)(struct vst_queue *);
+    int32_t (*point)(struct vst_queue *, int32_t, int32_t *frame, double *value);
+    int32_t (*add)(struct vst_queue *, int32_t frame, double value, int32_t *);
+  } *table;
+} vst_queue;
+typedef struct vst_changes {
+  const struct {
+    const void *unknown[3];
+    int32_t (*count)(struct vst_changes *);
+    vst_queue *(*queue)(struct vst_changes *, int32_t);
+    vst_queue *(*add)(struct vst_changes *, const uint32_t *id, int32_t *);
+  } *table;
+} vst_changes;
 enum { VST_NOTE_ON = 0, VST_NOTE_OFF = 1, VST_POLY_PRESSURE = 3, VST_NOTE_EXPRESSION = 4 };
 enum { VST_TUNING = 2, VST_BRIGHTNESS = 5 };
 typedef struct {
@@ -147,20 +108,17 @@ typedef struct {
     void *others;
   };
 } vst_event;
-AT(vst_event, type, 18);
-AT(vst_event, on.channel, 24);
-AT(vst_event, on.velocity, 32);
 AT(vst_event, on.note, 40);
 AT(vst_event, off.note, 32);
 AT(vst_event, expression.value, 32);
 _Static_assert(sizeof(vst_event) == 48, "vst_event");
-typedef struct vst_events vst_events;
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*count)(vst_events *);
-  int32_t (*event)(vst_events *, int32_t, vst_event *);
-} vst_events_table;
-struct vst_events { const vst_events_table *table; };
+typedef struct vst_events {
+  const struct {
+    const void *unknown[3];
+    int32_t (*count)(struct vst_events *);
+    int32_t (*event)(struct vst_events *, int32_t, vst_event *);
+  } *table;
+} vst_events;
 typedef struct {
   int32_t mode, sample_size, frames, inputs_count, outputs_count;
   vst_buffers *inputs, *outputs;
@@ -168,20 +126,7 @@ typedef struct {
   vst_events *events, *events_out;
   void *context;
 } vst_process;
-AT(vst_process, outputs, 32);
 AT(vst_process, events, 56);
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*set_arrangements)(void *, uint64_t *inputs, int32_t, uint64_t *outputs, int32_t);
-  int32_t (*arrangement)(void *, int32_t direction, int32_t, uint64_t *);
-  int32_t (*can_sample_size)(void *, int32_t);
-  uint32_t (*latency)(void *);
-  int32_t (*setup)(void *, vst_setup *);
-  int32_t (*set_processing)(void *, uint8_t);
-  int32_t (*process)(void *, vst_process *);
-  uint32_t (*tail)(void *);
-} vst_processor;
-AT(vst_processor, process, 72);
 
 /* Controller */
 typedef struct {
@@ -191,32 +136,9 @@ typedef struct {
   double standard;
   int32_t unit, flags;
 } vst_parameter;
-AT(vst_parameter, steps, 772);
-AT(vst_parameter, standard, 776);
 AT(vst_parameter, flags, 788);
 enum { VST_CAN_AUTOMATE = 1, VST_LIST = 8, VST_HIDDEN = 16 };
-typedef struct {
-  BASE_FIELDS;
-  int32_t (*set_component_state)(void *, vst_stream *);
-  int32_t (*set_state)(void *, vst_stream *);
-  int32_t (*get_state)(void *, vst_stream *);
-  int32_t (*count)(void *);
-  int32_t (*info)(void *, int32_t, vst_parameter *);
-  int32_t (*to_text)(void *, uint32_t, double, vst_text);
-  int32_t (*from_text)(void *, uint32_t, uint16_t *, double *);
-  double (*to_plain)(void *, uint32_t, double);
-  double (*from_plain)(void *, uint32_t, double);
-  double (*value)(void *, uint32_t);
-  int32_t (*set_value)(void *, uint32_t, double);
-  int32_t (*set_handler)(void *, void *);
-  void *(*create_view)(void *, const char *);
-} vst_controller;
-AT(vst_controller, create_view, 136);
 enum { VST_PITCH_BEND = 129 };
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*assignment)(void *, int32_t bus, int16_t channel, int16_t number, uint32_t *id);
-} vst_midi_mapping;
 typedef struct { double standard, low, high; int32_t steps; } vst_range;
 typedef struct {
   uint32_t id;
@@ -226,16 +148,7 @@ typedef struct {
   uint32_t parameter;
   int32_t flags;
 } vst_expression;
-AT(vst_expression, range, 776);
 AT(vst_expression, flags, 812);
 enum { VST_BIPOLAR = 1, VST_ABSOLUTE = 4 };
-typedef struct {
-  UNKNOWN_FIELDS;
-  int32_t (*count)(void *, int32_t bus, int16_t channel);
-  int32_t (*info)(void *, int32_t bus, int16_t channel, int32_t, vst_expression *);
-  int32_t (*to_text)(void *, int32_t bus, int16_t channel, uint32_t, double, vst_text);
-  int32_t (*from_text)(void *, int32_t bus, int16_t channel, uint32_t, const uint16_t *, double *);
-} vst_expressions;
-typedef struct { UNKNOWN_FIELDS; uint32_t (*requirements)(void *); } vst_requirements;
 
 #endif
