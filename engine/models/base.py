@@ -47,12 +47,24 @@ class Physics:
         """log λ = (-σ + iω_d) / rate at rest, complex128 (modes,)."""
         return torch.from_numpy(self.resonator.eigenvalues() / self.rate_hz)
 
+    @property
+    def analysis(self) -> Tensor:
+        """(modes, grid_points): analysis @ displacement = amplitudes."""
+        return torch.from_numpy(self.resonator.inverse).T
+
+    @property
+    def shapes(self) -> Tensor:
+        """(grid_points, modes): shapes @ amplitudes = displacement."""
+        return torch.from_numpy(self.resonator.shapes).T
+
 
 class StringModel(nn.Module, ABC, Generic[State]):
-    """A learned map from an initial displacement to the motion that follows."""
+    """A learned map from an initial displacement to the motion that follows.
 
-    grid_points: int
-    configuration: Any  # the frozen dataclass that it was built from
+    Args:
+        configuration: a frozen dataclass of sizes, `grid_points` among them.
+    """
+
     # by name what a start receives of the resonator, in words; empty: nothing. The first is the source's own.
     initialisations: ClassVar[Mapping[str, str]]
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
@@ -60,18 +72,29 @@ class StringModel(nn.Module, ABC, Generic[State]):
     coupling_parameters: ClassVar[frozenset[str]] = frozenset()
     mapped: ClassVar[bool] = True  # whether `torch.func.vmap` can map copies of it in training
 
+    def __init__(self, configuration: Any) -> None:
+        super().__init__()
+        self.configuration = configuration
+        self.grid_points: int = configuration.grid_points
+
     @classmethod
     def own_initialisation(cls) -> str:
         """The one of the model's source."""
         return next(iter(cls.initialisations))
 
-    @abstractmethod
+    @torch.no_grad()
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """Set every weight in place; `how` is one of `initialisations` and is recorded in the preset.
 
         Raises:
             ValueError: an unknown `how`, or one that these sizes do not allow.
         """
+        bounds.check_choice("initialisation", how, self.initialisations)
+        self.set_weights(how, physics, generator)
+
+    @abstractmethod
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """Set every weight as a start of the model does: `initialise`, which has checked `how`, without gradients."""
 
     @abstractmethod
     def encode(self, displacement: Tensor) -> State:
@@ -132,11 +155,6 @@ class KoopmanModel(Protocol):
     def encode(self, displacement: Tensor) -> Any: ...
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
     def decode(self, latents: Tensor) -> Tensor: ...
-
-
-def check_initialisation(model: StringModel[State], how: str) -> None:
-    """Raise ValueError, naming what there is, where a model does not know `how`."""
-    bounds.check_choice("initialisation", how, model.initialisations)
 
 
 def count_parameters(model: nn.Module) -> int:

@@ -26,7 +26,7 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import channel_matrices, fgru_rollout, frnn_rollout, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.base import Physics, StringModel
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 
 if TYPE_CHECKING:
@@ -75,11 +75,10 @@ class _FourierRecurrent(StringModel[FieldState]):
     mapped: ClassVar = False  # its training calls compiled code
     kept_fields: int  # of a step, for its gradient
 
-    def __init__(self, grid_points: int, width: int) -> None:
-        super().__init__()
-        self.grid_points = grid_points
-        self.in_mapping = nn.Linear(1, width)
-        self.out_mapping = nn.Linear(width, 1)
+    def __init__(self, configuration: FGRUConfiguration | FRNNConfiguration) -> None:
+        super().__init__(configuration)
+        self.in_mapping = nn.Linear(1, configuration.width)
+        self.out_mapping = nn.Linear(configuration.width, 1)
 
     @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
@@ -105,7 +104,7 @@ class _FourierRecurrent(StringModel[FieldState]):
     def _advance_plain(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
-        step_bytes = self.kept_fields * fields.numel() * fields.element_size()
+        step_bytes = max(1, self.kept_fields * fields.numel() * fields.element_size())
         length = min(steps, max(1, _kept_bytes(hidden.device) // step_bytes))
         for first in range(0, steps, length):
             count = min(length, steps - first)
@@ -123,21 +122,19 @@ class _FourierRecurrent(StringModel[FieldState]):
         self._render(fields.numpy(), frames.numpy())
         return frames, fields
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
         paper: Fourier weights and biases uniform and positive (`FourierConvolution.initialise`); the other maps
             uniform within ±1/√inputs.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for module in self.modules():
-                if isinstance(module, FourierConvolution):
-                    module.initialise(generator)
-                elif isinstance(module, nn.Linear):
-                    bound = module.in_features**-0.5
-                    nn.init.uniform_(module.weight, -bound, bound, generator=generator)
-                    nn.init.uniform_(module.bias, -bound, bound, generator=generator)
+        for module in self.modules():
+            if isinstance(module, FourierConvolution):
+                module.initialise(generator)
+            elif isinstance(module, nn.Linear):
+                bound = module.in_features**-0.5
+                nn.init.uniform_(module.weight, -bound, bound, generator=generator)
+                nn.init.uniform_(module.bias, -bound, bound, generator=generator)
 
 
 class FGRU(_FourierRecurrent):
@@ -146,8 +143,7 @@ class FGRU(_FourierRecurrent):
     kept_fields = 20
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width)
-        self.configuration = configuration
+        super().__init__(configuration)
         sizes = configuration.grid_points, configuration.width
         self.z_layer = FourierConvolution(*sizes)
         self.r_layer = FourierConvolution(*sizes)
@@ -173,8 +169,7 @@ class FRNN(_FourierRecurrent):
     """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
 
     def __init__(self, configuration: FRNNConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width)
-        self.configuration = configuration
+        super().__init__(configuration)
         self.kept_fields = 10 * configuration.depth
         sizes = configuration.grid_points, configuration.width
         self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))

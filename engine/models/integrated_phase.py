@@ -62,15 +62,14 @@ from engine.models._averaging import (
 from engine.models._cubics import hermite, integrate_parabolas
 from engine.models._diagonal import (
     dense_layers,
-    initialise_orthogonal,
+    draw_normal,
+    draw_orthogonal,
     linear_string_eigenvalues,
     read_layer,
-    store_eigenvalues,
-    store_ring,
 )
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.eigenvalues import pack
+from engine.models.eigenvalues import StoredEigenvalues, pack
 from engine.models.string_modes import StringModes
 
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
@@ -130,7 +129,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
+class IntegratedPhase(StoredEigenvalues, AnyFrameModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -142,10 +141,8 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     coupling_parameters: ClassVar = frozenset({"K"})
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
-        super().__init__()
-        self.configuration = c = configuration
-        self.grid_points = c.grid_points
-        n = c.state_size
+        super().__init__(configuration)
+        c, n = configuration, configuration.state_size
         self.encoder = nn.Linear(c.grid_points, 2 * n)
         self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)
         # float64: of frequencies rounded to 1e-7 the phase has within seconds a larger error than all else
@@ -243,7 +240,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         angle = torch.where(start == 0, 1, start).angle()  # at zero it has no gradient
         level = motion.gain - rates.sigma * times[:, None] + start.abs().clamp(min=1e-300).log()
         # a string's high modes are over long before it is, and numbers too small for float32 are slow
-        alive = (level.detach().amax((0, 1)) > SILENCE).nonzero()[:, 0]
+        alive = (level.detach() > SILENCE).flatten(0, 1).any(0).nonzero()[:, 0]
         left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
         right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
         held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)
@@ -354,9 +351,9 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         """The log eigenvalues of a quiet string: they change with the energy."""
-        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
+        return [self.eigenvalue_logs()]
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
 
         random: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder, K = 0: no physics.
@@ -370,22 +367,20 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
         The last two are prior knowledge that the paper's models do not have: say so in a table.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for network in (self.encoder_residual, self.g):
-                if network is not None:
-                    _initialise_mlp(network, generator)
-            for linear in (self.encoder, self.decoder):
-                initialise_orthogonal(linear, generator)
-            for matrix in (self.K, self.M_in, self.M_out, self.A_in, self.A_out):
-                if matrix is not None:
-                    nn.init.zeros_(matrix)
-            if how == "random":
-                store_ring(self.nu_log, self.theta_log, generator)
-            else:
-                self._initialise_linear_string(physics, generator)
-            if how == "averaging" and physics.resonator.tension_modulated:
-                self._initialise_averaging(physics)
+        for network in (self.encoder_residual, self.g):
+            if network is not None:
+                draw_normal(dense_layers(network), generator)
+                nn.init.zeros_(dense_layers(network)[-1].weight)
+        draw_orthogonal((self.encoder, self.decoder), generator)
+        for matrix in (self.K, self.M_in, self.M_out, self.A_in, self.A_out):
+            if matrix is not None:
+                nn.init.zeros_(matrix)
+        if how == "random":
+            self.draw_eigenvalues(generator)
+            return
+        self._set_linear_string(physics, generator)
+        if how == "averaging" and physics.resonator.tension_modulated:
+            self._set_averaging(physics)
 
     @torch.no_grad()
     def store_modes(self, modes: StringModes) -> None:
@@ -402,7 +397,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         analysis = modes.analysis
         starts = modes.starts
         omega = modes.log_eigenvalues.imag
-        self.nu_log[:count], self.theta_log[:count] = eigenvalues.stored(modes.log_eigenvalues)
+        self.store_eigenvalues(modes.log_eigenvalues)
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)
         self.encoder.weight[:count] = (starts.real[:, None] * analysis).to(self.K.dtype)
@@ -414,7 +409,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         coupling = coupling / self.energy_units[:count] / self._rate_units[:count, None]
         self.K[n : n + count, :count] = coupling.to(self.K.dtype)
 
-    def _initialise_averaging(self, physics: Physics) -> None:
+    def _set_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
         mode = torch.arange(n) % modes
         averaged = torch.zeros(2 * n, n, dtype=torch.float64)
@@ -429,19 +424,19 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
             self.A_in[:, :modes] = averaged_amplitude(physics)[mode] / self._modulation_units[:modes]
             self.A_out.copy_(-self.A_in)
 
-    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+    def _set_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
-        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        self.store_eigenvalues(log_eigenvalues)
         mode = torch.arange(n) % modes
         unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
         self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
         self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
-        analysis = torch.from_numpy(physics.resonator.inverse).T[mode]
+        analysis = physics.analysis[mode]
         imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
         self.encoder.weight.copy_(torch.cat([analysis, imaginary]))
         self.decoder.weight.zero_()
-        self.decoder.weight[:, :modes] = torch.from_numpy(physics.resonator.shapes).T.to(self.decoder.weight)
+        self.decoder.weight[:, :modes] = physics.shapes.to(self.decoder.weight)
 
 
 def _integrated_nodes(time: int, spacing: int) -> int:
@@ -470,13 +465,3 @@ def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = T
     for wide_in, wide_out in pairwise((values, *widths)):
         layers += [nn.Linear(wide_in, wide_out), nn.SiLU()]
     return nn.Sequential(*layers, nn.Linear(widths[-1], outputs, bias=last_bias))
-
-
-def _initialise_mlp(network: nn.Sequential, generator: torch.Generator) -> None:
-    layers = dense_layers(network)
-    for layer in layers:
-        std = layer.in_features**-0.5
-        nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
-        if layer.bias is not None:
-            nn.init.zeros_(layer.bias)
-    nn.init.zeros_(layers[-1].weight)
