@@ -125,7 +125,9 @@ class ModelSource(StringSource):
     def start(self, displacement_m: Array) -> SourceState:
         _check_grid(displacement_m, self.grid_points)
         inner = self._model.encode((displacement_m / self._scale_m).astype(np.float32))
-        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(np.abs(displacement_m).max()), LEAST_PEAK_M))
+        return SourceState(
+            inner, 0, RUNAWAY_FACTOR * max(float(np.abs(displacement_m).max(initial=0.0)), LEAST_PEAK_M)
+        )
 
     def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
         frames, inner = self._model.advance(state.inner, steps, readout)

@@ -48,7 +48,7 @@ def _analyse(field: Tensor, matrix: Tensor) -> Tensor:
     # the first point and a middle one stand alone
     mirrored = functional.pad(field[half:].flip(0), (0, 0, 0, 0, 1, 2 * half - 1 - points))
     folded = torch.stack([field[:half] + mirrored, field[:half] - mirrored])
-    parts = torch.bmm(matrix, folded.view(2, half, batch * width)).view(2, -1, batch, width)
+    parts = torch.bmm(matrix, folded.view(2, half, batch * width)).view(2, points, batch, width)
     return torch.cat([parts[0], parts[1]], dim=2)
 
 

@@ -142,9 +142,10 @@ class TensionLaw:
         """Strings with the same number of nodes go together."""
         nodes = self._nodes(state) if state.nodes is None else state.nodes
         state, ran = replace(state, nodes=nodes), []
-        groups = [np.flatnonzero(nodes == count) for count in np.unique(nodes)]
-        for rows in groups:
-            part, step = state.rows(rows), self.step(int(nodes[rows[0]]))
+        counts = np.unique(nodes).tolist() or [1]  # of no string, any
+        groups = [np.flatnonzero(nodes == count) for count in counts]
+        for count, rows in zip(counts, groups, strict=True):
+            part, step = state.rows(rows), self.step(count)
             ran.append(run(part if state.begun else self._set_out(part, step), step))
         if len(ran) == 1:
             return ran[0]

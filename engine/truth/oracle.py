@@ -58,4 +58,4 @@ def solve_dop853(
         if not solution.success:
             raise RuntimeError(f"DOP853 failed: {solution.message}")
         trajectories.append(solution.y[:modes].T)
-    return library_of(state.amplitude).asarray(np.stack(trajectories))
+    return library_of(state.amplitude).asarray(np.reshape(trajectories, (len(starts), steps + 1, modes)))

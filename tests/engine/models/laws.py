@@ -155,6 +155,17 @@ class ModelLaws:
             assert relative(motion.model(released[None], 50), motion.whole[row : row + 1, :50]) < self.near
 
     @torch.no_grad()
+    def test_no_string_moves_nowhere(self, motion: Motion) -> None:
+        """A batch of none: empty arrays, by every way."""
+        model, none = motion.model, motion.released[:0]
+        _, state = model.advance(model.encode(none), 40)
+        assert model.advance(state, 70, listening_weights([0.37, 0.123], POINTS))[0].shape == (0, 70, 2)
+        if isinstance(model, AnyFrameModel):
+            assert model.sample(state, torch.tensor([2, 9]), 30)[0].shape == (0, 2, POINTS)
+        with torch.enable_grad():
+            assert model(none, 40).shape == (0, 40, POINTS)
+
+    @torch.no_grad()
     def test_a_state_can_be_gone_on_from_twice(self, motion: Motion) -> None:
         _, state = motion.model.advance(motion.model.encode(motion.released), 50)
         assert torch.equal(motion.model.advance(state, 30)[0], motion.model.advance(state, 30)[0])
