@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.effects import Body, Effects, Impulse
-from engine.effects.curves import curves_of
+from engine.effects.body import curves_of
 from engine.kernels import cache
 from engine.kernels.constants import QUANTUM
 from engine.models._tension_arrays import CURVES

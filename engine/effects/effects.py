@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects.amp import amplified
 from engine.effects.body import Body
 from engine.effects.room import room_response
-from engine.kernels.mixer_records import LARGEST, SMALLEST
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import LARGEST, MIXER, SMALLEST
 from engine.values.effects import Amp, Room
 
 
@@ -105,3 +105,21 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
         return stereo
     wet: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
     return wet
+
+
+def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int, level_db: float = 0.0) -> NDArray[np.float64]:
+    """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
+    from engine.kernels.amplifier import amplify, drive  # Numba only when it is needed
+
+    mixer = np.zeros(1, MIXER)[0]
+    mix = mixer["mix"]
+    mixer["rate_hz"] = rate_hz
+    drive(mixer, float(amp.drive_db), float(amp.tone_db), float(level_db))
+    blocks = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
+    blocks[: len(sound)] = sound
+    for first in range(0, len(blocks), QUANTUM):
+        mix[:] = blocks[first : first + QUANTUM]
+        amplify(mixer)
+        blocks[first : first + QUANTUM] = mix
+        mixer["frames"] += QUANTUM
+    return blocks[: len(sound)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.effects import Effects
-from engine.effects.partitions import convolver, partitioned
+from engine.effects.responses import convolver_memory, partitioned
 from engine.kernels.amplifier import drive
 from engine.kernels.constants import AHEAD
 from engine.kernels.fields import record_of, slot, slots
@@ -159,7 +159,7 @@ class Mixer:
             drive(self.record, float(amp.drive_db), float(amp.tone_db), float(effects.level_db))
             if effects.rings:
                 if self._convolver is None:
-                    self._convolver = convolver(self.rate_hz)
+                    self._convolver = convolver_memory(self.rate_hz)
                 memory = partitioned(effects.impulse(self.rate_hz))
                 address = int(memory.ctypes.data)
                 self._impulses[address] = memory

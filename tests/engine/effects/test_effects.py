@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects import Body, Effects, apply
-from engine.effects.impulse import Impulse
+from engine.effects import Body, Effects, Impulse, apply
 from engine.kernels.constants import LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
 from engine.values.effects import Amp, Room
 from engine.voices import Mixer

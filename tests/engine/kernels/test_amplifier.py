@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.effects.amp import amplified
+from engine.effects.effects import amplified
 from engine.kernels import amplifier
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import MIXER
