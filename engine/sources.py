@@ -8,6 +8,7 @@ model that needs it: strings of `koopman_tension` and the truth do not.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -84,27 +85,25 @@ class _TorchModel:
     """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
 
     def __init__(self, model: StringModel[Any]) -> None:
-        self._model: Any = model
+        self._model = model
 
     def encode(self, displacement: NDArray[np.float32]) -> Any:
-        import torch
-
-        with torch.inference_mode():
-            return self._model.encode(torch.from_numpy(displacement))
+        return self._call(self._model.encode, displacement)
 
     def advance(self, state: Any, steps: int, readout: Array | None = None) -> tuple[Floats, Any]:
-        import torch
-
-        with torch.inference_mode():
-            frames, after = self._model.advance(state, steps, None if readout is None else torch.from_numpy(readout))
+        frames, after = self._call(self._model.advance, state, steps, readout)
         return frames.numpy(), after
 
     def sample(self, state: Any, frames: NDArray[np.int64], steps: int) -> tuple[Floats, Any]:
+        motion, after = self._call(self._model.sample, state, frames, steps)
+        return motion.numpy(), after
+
+    @staticmethod
+    def _call(method: Callable[..., Any], *values: Any) -> Any:
         import torch
 
         with torch.inference_mode():
-            motion, after = self._model.sample(state, torch.from_numpy(frames), steps)
-        return motion.numpy(), after
+            return method(*(torch.from_numpy(value) if isinstance(value, np.ndarray) else value for value in values))
 
 
 class ModelSource(StringSource):
@@ -115,9 +114,7 @@ class ModelSource(StringSource):
         if preset.info.of_many_strings:
             self._model, self.any_frame = TensionArrays(preset.configuration, preset.weights), True
         else:
-            from engine.models.base import AnyFrameModel
-
-            self._model, self.any_frame = _TorchModel(preset.model), isinstance(preset.model, AnyFrameModel)
+            self._model, self.any_frame = _TorchModel(preset.model), preset.model.any_frame
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points

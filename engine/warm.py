@@ -19,7 +19,7 @@ from engine.effects import Body, Effects, Impulse
 from engine.effects.body import curves_of
 from engine.kernels import cache
 from engine.kernels.constants import QUANTUM
-from engine.models._tension_arrays import CURVES
+from engine.models._tension_law import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
 from engine.python_process import python_command, python_environment

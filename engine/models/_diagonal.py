@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._dense import Dense, linear
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
+from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.eigenvalues import StoredEigenvalues
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
@@ -32,8 +32,10 @@ class KoopmanState:
     step: int
 
 
-class DiagonalModel(AnyFrameModel[KoopmanState]):
+class DiagonalModel(StringModel[KoopmanState]):
     """Advances by powers of the eigenvalues; a subclass encodes, decodes and says what its eigenvalues are."""
+
+    any_frame: ClassVar = True
 
     @abstractmethod
     def powers(self, frames: Tensor) -> Tensor:

@@ -70,6 +70,8 @@ class StringModel(nn.Module, ABC, Generic[State]):
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
     eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
     coupling_parameters: ClassVar[frozenset[str]] = frozenset()
+    # whether `sample` takes much less time than `advance`; `koopman_tension` steps, but leaves most shapes out
+    any_frame: ClassVar[bool] = False
     mapped: ClassVar[bool] = True  # whether `torch.func.vmap` can map copies of it in training
 
     def __init__(self, configuration: Any) -> None:
@@ -116,6 +118,18 @@ class StringModel(nn.Module, ABC, Generic[State]):
             and the last state.
         """
 
+    def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
+        """Sample the motion on the grid, as `advance`, keeping some frames: `any_frame` models compute no others.
+
+        Args:
+            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
+
+        Returns:
+            displacement (batch, frames, grid_points), and the state after all `steps`.
+        """
+        motion, after = self.advance(state, steps)
+        return motion[:, frames - 1], after
+
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         """The learned frequencies and decays: log λ a sample, complex128, a tensor each layer.
@@ -127,25 +141,6 @@ class StringModel(nn.Module, ABC, Generic[State]):
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""
         return self.advance(self.encode(displacement), steps, readout)[0]
-
-
-class AnyFrameModel(StringModel[State]):
-    """A model that computes some frames of a motion in much less time than all of them.
-
-    Most compute any frame by itself. `koopman_tension` steps through all frames and computes the wanted shapes alone;
-    they are the larger part of its cost.
-    """
-
-    @abstractmethod
-    def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
-        """Sample the motion on the grid, as `advance`, computing only some frames.
-
-        Args:
-            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
-
-        Returns:
-            displacement (batch, frames, grid_points), and the state after all `steps`.
-        """
 
 
 @runtime_checkable

@@ -67,7 +67,7 @@ from engine.models._diagonal import (
     linear_string_eigenvalues,
     read_layer,
 )
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
+from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.eigenvalues import StoredEigenvalues, pack
 from engine.models.string_modes import StringModes
@@ -129,9 +129,10 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class IntegratedPhase(StoredEigenvalues, AnyFrameModel[IntegratedPhaseState]):
+class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     """See the module."""
 
+    any_frame: ClassVar = True
     initialisations: ClassVar = {
         "random": "",
         "physics": LINEAR_STRING,

@@ -48,17 +48,23 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models._tension_arrays import CURVES, resonator_arrays, shapes_of_arrays
-from engine.models._tension_law import KoopmanTensionState, TensionLaw
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
+from engine.models._tension_law import (
+    CURVES,
+    KoopmanTensionState,
+    TensionLaw,
+    resonator_arrays,
+    shapes_of_arrays,
+)
+from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.configurations import KoopmanTensionConfiguration
 
 SERIES = 1 / 12  # r and p of small hω
 
 
-class KoopmanTension(TensionLaw, AnyFrameModel[KoopmanTensionState]):
+class KoopmanTension(TensionLaw, StringModel[KoopmanTensionState]):
     """See the module. The resonator is a buffer: `for_resonator` gives the same model of another."""
 
+    any_frame: ClassVar = True
     initialisations: ClassVar = {
         "kicks": f"{LINEAR_STRING}, and how tension couples them",
         "series": f"{LINEAR_STRING}, how tension couples them, and the error of kicks for small steps",

@@ -25,7 +25,7 @@ from safetensors import SafetensorError, safe_open
 
 from engine import bounds
 from engine.models import build_model, read_model_configuration
-from engine.models._tension_arrays import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
+from engine.models._tension_law import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
 from engine.plain_text import name_text, one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
