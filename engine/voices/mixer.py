@@ -19,7 +19,7 @@ from engine.kernels.memory import publish
 from engine.kernels.mixer_records import CAUSE_DEVICE, CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, MIXER, RING
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.values.effects import Amp
-from engine.voices.derivative import differentiator_taps
+from engine.voices.ear import differentiator_taps
 from engine.voices.voice import Voice, possible_s
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from engine.kernels.records import EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABL
 from engine.kernels.voice_records import TENSION_PROGRAM, TRUTH_PROGRAM, voice_bytes
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
-from engine.voices.derivative import differentiator_taps
+from engine.voices.ear import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
 
 PREPARED_HZ = 48_000
