@@ -53,8 +53,7 @@ INFO = PresetInfo(
 )
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
 LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
-MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
-BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
+BANKS: tuple[dict[str, Any], ...] = ({}, {"adiabatic": True})
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
 FRAMES = 4 * QUANTUM
 
@@ -119,7 +118,10 @@ def responses() -> None:
 
 
 def _each() -> Iterator[Voice]:
-    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+    from engine.voices.banks import bank_program
+
+    banks = [bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ) for sizes in BANKS]
+    for program in (*filter(None, banks), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             yield _struck(program, ear)
 
@@ -132,12 +134,8 @@ def models() -> None:
 
     readout = torch.from_numpy(listening_weights(np.array([0.3]), INFO.grid_points)).float()
     with torch.inference_mode():
-        for name, sizes in (
-            ("koopman_tension", INFO.model_configuration),
-            ("s5", {"grid_points": INFO.grid_points}),
-            ("fgru", {"grid_points": INFO.grid_points}),
-            ("frnn", {"grid_points": INFO.grid_points}),
-        ):
+        grid = {"grid_points": INFO.grid_points}
+        for name, sizes in ((INFO.model, INFO.model_configuration), ("s5", grid), ("fgru", grid), ("frnn", grid)):
             model = _model(name, sizes)
             _, state = model.advance(model.encode(torch.from_numpy(_initial_m()[None] / INFO.scale_m).float()), 2)
             model.advance(state, 2, readout)
@@ -170,14 +168,6 @@ def _loudness() -> None:
     loudness.gain(sound, 1, 1, no_body, 0.0)
     loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
     loudness.looked_at(0, 1, 0)
-
-
-def _bank(sizes: dict[str, Any]) -> Program:
-    from engine.voices.banks import bank_program
-
-    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
-    assert program is not None
-    return program
 
 
 def _struck(program: Program, ear: Ear) -> Voice:

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -78,7 +78,7 @@ class LearnedEigenvalues(StoredEigenvalues, DiagonalModel):
 
     initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
-    encoder: nn.Linear | nn.Sequential
+    encoder: Any  # a dense layer or a perceptron
 
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(complex_outputs(self.encoder, displacement), 0)

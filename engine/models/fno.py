@@ -17,6 +17,7 @@ recurrence needs the whole field.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -85,8 +86,8 @@ class _FourierRecurrent(StringModel[FieldState]):
         """(grid_points, batch, width) to the fields after each step (steps, …)."""
 
     @abstractmethod
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
-        """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
+        """The kernel, and its weights and biases between the transforms and the map out."""
 
     def encode(self, displacement: Tensor) -> FieldState:
         return FieldState(self.in_mapping(displacement[..., None]))
@@ -119,7 +120,10 @@ class _FourierRecurrent(StringModel[FieldState]):
     def _advance_compiled(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields = hidden.detach().clone(memory_format=torch.contiguous_format)
         frames = fields.new_empty(len(fields), steps, self.grid_points)
-        self._render(fields.numpy(), frames.numpy())
+        advance, weights = self.compiled()
+        transforms, out = transform_matrices(self.grid_points), _dense_arrays([self.out_mapping])
+        for field, trajectory in zip(fields.numpy(), frames.numpy(), strict=True):
+            advance(field, trajectory, transforms, *weights, out)
         return frames, fields
 
     def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
@@ -155,14 +159,10 @@ class FGRU(_FourierRecurrent):
         weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
         return fgru_rollout(hidden, *weights, steps)
 
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = transform_matrices(self.grid_points)
-        convolutions = _convolution_arrays(self.z_layer, self.r_layer, self.h_layer)
-        out = _dense_arrays(self.out_mapping)
-        for field, trajectory in zip(hidden, frames, strict=True):
-            kernel.advance_fgru(field, trajectory, transforms, convolutions, out)
+        return kernel.advance_fgru, (_convolution_arrays([self.z_layer, self.r_layer, self.h_layer]),)
 
 
 class FRNN(_FourierRecurrent):
@@ -192,15 +192,10 @@ class FRNN(_FourierRecurrent):
     def _pointwise(self) -> list[nn.Linear]:
         return [layer for layer in self.pointwise_layers if isinstance(layer, nn.Linear)]
 
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = transform_matrices(self.grid_points)
-        convolutions = _convolution_arrays(*self.fourier_layers)
-        pointwise = _dense_arrays(*self.pointwise_layers)
-        out = _dense_arrays(self.out_mapping)
-        for field, trajectory in zip(hidden, frames, strict=True):
-            kernel.advance_frnn(field, trajectory, transforms, convolutions, pointwise, out)
+        return kernel.advance_frnn, (_convolution_arrays(self._convolutions), _dense_arrays(self._pointwise))
 
 
 def _kept_bytes(device: torch.device) -> int:
@@ -210,16 +205,14 @@ def _kept_bytes(device: torch.device) -> int:
 
 
 @torch.no_grad()
-def _convolution_arrays(*layers: nn.Module) -> kernel.Pair:
+def _convolution_arrays(layers: Sequence[FourierConvolution]) -> kernel.Pair:
     """Weights (layers, frequency, in, real/imaginary, out), and biases in space (layers, grid_points, width)."""
-    convolutions = [layer for layer in layers if isinstance(layer, FourierConvolution)]
-    weights = torch.stack([layer.weight.detach() for layer in convolutions])
-    return weights.numpy(), torch.stack([layer.bias_field() for layer in convolutions]).numpy()
+    weights = torch.stack([layer.weight.detach() for layer in layers])
+    return weights.numpy(), torch.stack([layer.bias_field() for layer in layers]).numpy()
 
 
 @torch.no_grad()
-def _dense_arrays(*layers: nn.Module) -> kernel.Pair:
+def _dense_arrays(layers: Sequence[nn.Linear]) -> kernel.Pair:
     """Weights (layers, in, out) and biases (layers, out)."""
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    weights = torch.stack([layer.weight.T.contiguous() for layer in linear])
-    return weights.numpy(), torch.stack([layer.bias.detach() for layer in linear]).numpy()
+    weights = torch.stack([layer.weight.T.contiguous() for layer in layers])
+    return weights.numpy(), torch.stack([layer.bias.detach() for layer in layers]).numpy()

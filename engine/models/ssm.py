@@ -340,8 +340,9 @@ class SSMString(StringModel[SSMState], ABC):
             states are not yet heard, and the blocks, which correct it, start at zero. Prior knowledge that the
             paper's models do not have: say so in a table.
         """
-        for ssm_or_block in (self.first_layer, *self._blocks()):
-            ssm_or_block.initialise(how, generator)
+        self.first_layer.initialise(how, generator)
+        for block in self._blocks():
+            block.initialise(how, generator)
         if how == "physics":
             self._set_linear_string(physics)
 
