@@ -11,10 +11,26 @@ LEAST_PHASE = 0.02  # of `koopman_tension` between nodes: a voice of more would 
 
 
 class _Sizes:
-    """Raises ValueError, naming the field, where a size is out of its bounds."""
+    """Sizes within `bounds`: every whole number of a model's configuration, and each of its tuples.
+
+    Raises:
+        ValueError: one is out of its bounds; the message names the field.
+    """
 
     def __post_init__(self) -> None:
-        bounds.check_sizes(self)
+        for name, value in vars(self).items():
+            if isinstance(value, bool):
+                continue
+            if isinstance(value, int):
+                bounds.check(name, value, bounds.SIZES.get(name, bounds.OTHER_SIZES))
+            elif isinstance(value, float):
+                bounds.check(name, value, (-1e12, 1e12))
+            elif len(value) > bounds.MOST_LAYERS_OF_WIDTHS:
+                most = bounds.MOST_LAYERS_OF_WIDTHS
+                raise ValueError(f"{name} has {len(value)} entries, at most {most} may be given")
+            else:
+                for width in value:
+                    bounds.check(name, width, (1, bounds.LARGEST_WIDTH))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import math
 import threading
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +147,10 @@ class Channel:
     fine_tuning: int
 
 
+SWITCHES = ("legato", "slides", "harmonics", "tremolo", "strums")  # in the order of the kernels
+CHANNEL_VALUES = tuple(field.name for field in fields(Channel) if field.name not in SWITCHES)
+
+
 class CompiledPlayer:
     """Plays the instrument of its latest table in the mixer that it is given to.
 
@@ -218,7 +222,14 @@ class CompiledPlayer:
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at, mm, width, shape = (0, 0, 0, 0) if by_hand is None else _drawn(by_hand)
+            at = mm = width = shape = 0.0
+            if by_hand is not None:
+                at, mm, width, shape = (
+                    by_hand.position,
+                    by_hand.amplitude_mm,
+                    by_hand.width,
+                    SHAPES.index(by_hand.shape),
+                )
             head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
             self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
         return number
@@ -403,25 +414,12 @@ class CompiledPlayer:
     def channel(self, number: int) -> Channel:
         """The positions of a channel's wheels and pedals."""
         state = self.record["channels"][number].copy()
-        slide, wide = int(state["slide"]), float(state["range_semitones"])
-        legato, slides, harmonics, tremolo, strums = map(bool, state["switches"])
-        return Channel(
-            float(state["bend"]),
-            bool(state["pedal"]),
-            slide if slide >= 0 else None,
-            wide if wide >= 0 else None,
-            round(127 * float(state["mute"])),
-            legato,
-            slides,
-            int(state["slide_time"]),
-            harmonics,
-            tremolo,
-            strums,
-            int(state["volume"]),
-            int(state["expression"]),
-            int(state["coarse_tuning"]),
-            int(state["fine_tuning"]),
-        )
+        values = {name: state[name].item() for name in CHANNEL_VALUES}
+        values |= zip(SWITCHES, map(bool, state["switches"]), strict=True)
+        values |= {"pedal": bool(values["pedal"]), "mute": round(127 * values["mute"])}
+        for name in ("slide", "range_semitones"):
+            values[name] = values[name] if values[name] >= 0 else None
+        return Channel(**values)
 
 
 def _string(row: NDArray[np.float64]) -> StringParameters | None:
@@ -430,7 +428,3 @@ def _string(row: NDArray[np.float64]) -> StringParameters | None:
         return StringParameters(*row.tolist())
     except ValueError:
         return None
-
-
-def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:
-    return pluck.position, pluck.amplitude_mm, pluck.width, SHAPES.index(pluck.shape)
