@@ -222,14 +222,10 @@ class CompiledPlayer:
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at = mm = width = shape = 0.0
+            at, mm, width, shape = 0.0, 0.0, 0.0, 0
             if by_hand is not None:
-                at, mm, width, shape = (
-                    by_hand.position,
-                    by_hand.amplitude_mm,
-                    by_hand.width,
-                    SHAPES.index(by_hand.shape),
-                )
+                at, mm, width = by_hand.position, by_hand.amplitude_mm, by_hand.width
+                shape = SHAPES.index(by_hand.shape)
             head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
             self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
         return number
