@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
-from engine.kernels import bodies, constants, convolver, fourier, responses, rooms
+from engine.kernels import bodies, constants, convolver, fourier, responses
 from engine.kernels.fields import record_of
 from engine.kernels.mixer_records import CONVOLVER, IMPULSE, WINDOW
 
@@ -71,16 +71,6 @@ def of_given(samples: NDArray[np.float64], own_hz: float, size: float, rate_hz: 
     response = np.empty((frames, 2))
     work = work_space(max(responses.work_size(len(samples), own_hz / size, rate_hz), int(rate_hz)))
     bodies.respond_as(work, stereo(samples), own_hz, size, rate_hz, response)
-    return response
-
-
-def of_room(noise: Response, t60_s: float, rate_hz: float) -> Response:
-    """The response of a room from noise of power 1."""
-    t60_s, rate_hz = float(t60_s), float(rate_hz)
-    made = np.array(noise[: rooms.room_frames(t60_s)])
-    response = np.empty((responses.resampled_frames(len(made), constants.ROOM_HZ, rate_hz), 2))
-    work = work_space(max(responses.work_size(len(made), constants.ROOM_HZ, rate_hz), int(rate_hz)))
-    rooms.respond(work, t60_s, made, rate_hz, response)
     return response
 
 

@@ -57,8 +57,3 @@ def slope_at_rest(log_eigenvalues: Tensor) -> Tensor:
     0 = Re[(1 + ib) log λ], so that b = -σ/ω.
     """
     return log_eigenvalues.real / log_eigenvalues.imag
-
-
-def pack(pair: Tensor) -> Tensor:
-    """(..., 2n) with the real parts first to complex (..., n)."""
-    return torch.complex(*pair.chunk(2, dim=-1))

@@ -69,7 +69,7 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.eigenvalues import StoredEigenvalues, pack
+from engine.models.eigenvalues import StoredEigenvalues
 from engine.models.string_modes import StringModes
 
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
@@ -115,20 +115,6 @@ class _Motion(NamedTuple):
     phase_rate: Tensor
 
 
-class _Segments(NamedTuple):
-    """Cubics of log |z| and of its phase, one a segment.
-
-    Attributes:
-        ends: left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases.
-        alive: the latents that are loud enough to count.
-        begin: the wanted frames' place in the first segment.
-    """
-
-    ends: Tensor
-    alive: Tensor
-    begin: int
-
-
 class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     """See the module."""
 
@@ -166,8 +152,7 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(displacement)
         real, imag = z.chunk(2, dim=-1)
-        z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
-        return _at_rest(pack(z))
+        return _at_rest(torch.complex(*self._modulate(self.M_in, self.A_in, real, imag, slice(None))))
 
     def advance(
         self, state: IntegratedPhaseState, steps: int, readout: Tensor | None = None
@@ -214,23 +199,27 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         costs a sine, a cosine and an exponential a latent.
         """
         length = min(SEGMENT, self.configuration.node_spacing)
-        segments, later = self._segments(state, rates, count, length)
-        ends = segments.ends[..., segments.alive].to(self.decoder.weight.dtype)
+        ends, alive, later = self._segments(state, rates, count, length)
+        ends = ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
         radius = torch.exp(log_radius)
-        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, segments.alive)
-        frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
-        return frames[:, segments.begin : segments.begin + count], later
+        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
+        begin = (state.time + 1) % length
+        return frames.permute(1, 2, 0, 3).flatten(1, 2)[:, begin : begin + count], later
 
     def _segments(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, length: int
-    ) -> tuple[_Segments, IntegratedPhaseState]:
-        """The segments of `length` frames that hold the next `count` frames, and the state after those.
+    ) -> tuple[Tensor, Tensor, IntegratedPhaseState]:
+        """Cubics of log |z| and of its phase in the segments of `length` frames that hold the next `count` frames.
 
         Segments lie at fixed frames, so a frame is the same in whichever block it is rendered. A gain that would
         change by more than b in a segment, which no string does, has its slope held there: so within a segment no
         gain exceeds b by more than 8/27 of it.
+
+        Returns:
+            left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases; the
+            latents that are loud enough to count; and the state after those frames.
         """
         first, last = (state.time + 1) // length, (state.time + count) // length
         times = torch.arange(first, last + 2, device=state.origin.device).double() * length
@@ -247,8 +236,7 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)
         slopes = torch.stack([held - rates.sigma * length, motion.phase_rate * length])
         ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])
-        segments = _Segments(ends, alive, state.time + 1 - first * length)
-        return segments, IntegratedPhaseState(state.origin, end, integral)
+        return ends, alive, IntegratedPhaseState(state.origin, end, integral)
 
     def _move(self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: int) -> tuple[_Motion, Tensor]:
         """Gain and phase at `times` (times,) since frame 0, and the `integral` of a state at the time `end`.

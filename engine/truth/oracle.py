@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine.array_library import Values, as_array, library_of
 from engine.resonators.base import Resonator
-from engine.truth.state import ModalState
+from engine.truth.splitting import ModalState
 
 REPORT_EVERY = 0.01  # of a trajectory
 

@@ -272,9 +272,8 @@ class Voice:
         n = self.program.modes
         weights, bias = self.program.weights(ear)
         rows = self.memory[slots(VOICE) : slots(VOICE) + WEIGHT_ROWS * n].reshape(2, 2, 2 * n)
-        for point in range(len(ear.points)):
-            rows[which, point] = weights[point]
-            self.record["bias"][which, point] = bias[point]
+        rows[which, : len(weights)] = weights
+        self.record["bias"][which, : len(bias)] = bias
 
 
 def resonator_rows(resonator: Resonator) -> NDArray[np.float64]:
