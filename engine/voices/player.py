@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import constants as of
-from engine.kernels.fields import record_of, slot, slots
-from engine.kernels.memory import publish
+from engine.kernels.fields import record_of, slots
 from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots
 from engine.kernels.voice_records import OMEGA_SQUARED, SOUNDING, VOICE, WAITING, WEIGHT_ROWS, voice_bytes
 from engine.pluck import SHAPES, Pluck
 from engine.values.string import StringParameters
+from engine.voices.memory import KernelMemory
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
@@ -29,11 +29,10 @@ PAGE_SLOTS = 512  # of 4 kB
 LOG_DB = 20 / math.log(10)
 
 REPORTED = tuple(name for name in REPORT.names or () if name != "own")
-PUSHED = slot(PLAYER, "pushed")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(KernelMemory):
     """An instrument as the kernels read it, with the memory that it points to.
 
     Attributes:
@@ -43,10 +42,6 @@ class Table:
 
     memory: NDArray[np.float64]
     programs: tuple[NDArray[np.float64], ...] = ()
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
     @property
     def record(self) -> np.void:
@@ -151,7 +146,7 @@ SWITCHES = ("legato", "slides", "harmonics", "tremolo", "strums")  # in the orde
 CHANNEL_VALUES = tuple(field.name for field in fields(Channel) if field.name not in SWITCHES)
 
 
-class CompiledPlayer:
+class CompiledPlayer(KernelMemory):
     """Plays the instrument of its latest table in the mixer that it is given to.
 
     Args:
@@ -162,6 +157,8 @@ class CompiledPlayer:
         missed: whether reports came faster than they were asked for, since `missing` was asked.
     """
 
+    layout = PLAYER
+
     def __init__(self, rate_hz: int, modes: int = of.MOST_MODES, most_notes: int = 40) -> None:
         from engine.kernels.playing.events import begin  # Numba only when it is needed
 
@@ -170,7 +167,6 @@ class CompiledPlayer:
         self._voice_slots = voice_bytes(modes + of.MOST_PAIRS) // 8
         at_hand = slots(PLAYER) + AT_HAND * of.MOST_SOURCES * self._voice_slots
         memory[slots(PLAYER) : at_hand : PAGE_SLOTS] = 0.0  # else the audio thread would wait for pages of memory
-        self._counts = memory.view(np.int64)
         self.record = record = record_of(memory, PLAYER)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
@@ -184,10 +180,6 @@ class CompiledPlayer:
         record["most"] = most_notes
         record["source_gains"] = 1.0
         begin(self.address)
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
     # Events
 
@@ -248,7 +240,7 @@ class CompiledPlayer:
         room = of.EVENTS - (pushed - int(self.record["taken"]))
         for number in range(min(room, len(self._backlog))):
             self.record["events"][(pushed + number) % of.EVENTS] = self._backlog.popleft()
-            publish(self._counts, PUSHED, pushed + number + 1)
+            self.publish("pushed", pushed + number + 1)
 
     @property
     def waiting(self) -> int:
