@@ -67,10 +67,9 @@ from engine.models._diagonal import (
     linear_string_eigenvalues,
     read_layer,
 )
-from engine.models.base import LINEAR_STRING, Physics, StringModel
+from engine.models.base import LINEAR_STRING, Physics, StringModel, StringModes
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.eigenvalues import StoredEigenvalues
-from engine.models.string_modes import StringModes
 
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
