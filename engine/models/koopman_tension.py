@@ -98,10 +98,6 @@ class KoopmanTension(TensionLaw, StringModel[KoopmanTensionState]):
         other._take(physics)
         return other.train(self.training)
 
-    @torch.no_grad()
-    def advance_modes(self, state: KoopmanTensionState, steps: int) -> tuple[Tensor, KoopmanTensionState]:
-        return super().advance_modes(state, steps)
-
     def _take(self, physics: Physics) -> None:
         arrays = resonator_arrays(self.configuration, physics.resonator, physics.rate_hz, physics.scale_m)
         for name, array in arrays.items():
