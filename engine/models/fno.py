@@ -106,7 +106,10 @@ class _FourierRecurrent(StringModel[FieldState]):
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
         step_bytes = max(1, self.kept_fields * fields.numel() * fields.element_size())
-        length = min(steps, max(1, _kept_bytes(hidden.device) // step_bytes))
+        kept_bytes = KEPT_BYTES
+        if hidden.device.type == "cuda":
+            kept_bytes = int(KEPT_SHARE * torch.cuda.get_device_properties(hidden.device).total_memory)
+        length = min(steps, max(1, kept_bytes // step_bytes))
         for first in range(0, steps, length):
             count = min(length, steps - first)
             if length == steps:
@@ -196,12 +199,6 @@ class FRNN(_FourierRecurrent):
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
         return kernel.advance_frnn, (_convolution_arrays(self._convolutions), _dense_arrays(self._pointwise))
-
-
-def _kept_bytes(device: torch.device) -> int:
-    if device.type != "cuda":
-        return KEPT_BYTES
-    return int(KEPT_SHARE * torch.cuda.get_device_properties(device).total_memory)
 
 
 @torch.no_grad()
