@@ -76,7 +76,7 @@ def _rows(lines: io.StringIO, apart: bool) -> Iterator[list[str] | SchemaError]:
     def values_of(line: str) -> list[str]:
         return next(csv.reader([line]), [])
 
-    reader = map(values_of, lines) if apart else csv.reader(lines)  # a map goes on after an error
+    reader = map(values_of, lines) if apart else csv.reader(lines)  # a map continues after an error
     while True:
         try:
             yield next(reader)
