@@ -173,7 +173,7 @@ def api() -> str:
     for name in engine.__all__:
         value = getattr(importlib.import_module("engine"), name)
         parts.append(f"::: {value.__module__}.{value.__qualname__}")
-    parts += ["::: engine.models.base.StringModel", "::: engine.models.base.AnyFrameModel"]
+    parts += ["::: engine.models.base.StringModel"]
     return "\n\n".join(parts)
 
 

@@ -11,14 +11,24 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from engine.compare.relative import relative_error
-    from engine.pluck import Pluck
-    from engine.presets import find_preset, load_preset
-    from engine.resonators import Resonator
-    from engine.sources import ModelSource, TruthSource
-    from engine.values.ear import Ear
-    from engine.values.string import StringParameters
-    from engine.voices import model_program, render_voice, truth_program
+    from engine.compare.relative import relative_error as relative_error
+    from engine.pluck import Pluck as Pluck
+    from engine.presets import find_preset as find_preset
+    from engine.presets import load_preset as load_preset
+    from engine.resonators import Resonator as Resonator
+    from engine.sources import ModelSource as ModelSource
+    from engine.sources import TruthSource as TruthSource
+    from engine.values.ear import Ear as Ear
+    from engine.values.string import StringParameters as StringParameters
+    from engine.voices import (
+        model_program as model_program,
+    )
+    from engine.voices import (
+        render_voice as render_voice,
+    )
+    from engine.voices import (
+        truth_program as truth_program,
+    )
 
 _HOMES = {
     "Ear": "engine.values.ear",
@@ -35,20 +45,7 @@ _HOMES = {
     "truth_program": "engine.voices",
 }
 
-__all__ = [
-    "Ear",
-    "ModelSource",
-    "Pluck",
-    "Resonator",
-    "StringParameters",
-    "TruthSource",
-    "find_preset",
-    "load_preset",
-    "model_program",
-    "relative_error",
-    "render_voice",
-    "truth_program",
-]
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

@@ -148,30 +148,6 @@ def check_choice(name: str, value: object, known: Collection[str]) -> None:
         raise ValueError(f"{name} {brief(value)} is not one of {', '.join(known)}")
 
 
-def check_sizes(configuration: object) -> None:
-    """Check every whole number of a model's configuration, and each of its tuples.
-
-    Raises:
-        ValueError: one is out of its bounds; the message names the field.
-    """
-    for field in dataclasses.fields(configuration):  # type: ignore[arg-type]
-        value = getattr(configuration, field.name)
-        if isinstance(value, bool):
-            continue
-        if isinstance(value, int):
-            check(field.name, value, SIZES.get(field.name, OTHER_SIZES))
-        elif isinstance(value, float):
-            check(field.name, value, (-1e12, 1e12))
-        elif isinstance(value, tuple):
-            if len(value) > MOST_LAYERS_OF_WIDTHS:
-                raise ValueError(
-                    f"{field.name} has {len(value)} entries, at most {MOST_LAYERS_OF_WIDTHS} may be given"
-                )
-            for entry in value:
-                if isinstance(entry, int | float):
-                    check(field.name, entry, (1, LARGEST_WIDTH))
-
-
 def brief(value: object) -> str:
     """A value in a message: never longer than a few words."""
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:

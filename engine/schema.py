@@ -12,7 +12,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -27,6 +27,9 @@ T = TypeVar("T")
 _LONG_KEY = re.compile(
     rf"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{bounds.MOST_DOTS + 1}}}"""
 )
+
+
+_adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
 
 
 class SchemaError(ValueError):
@@ -121,19 +124,12 @@ def read(kind: type[T], data: object, where: str) -> T:
         raise SchemaError(f"{where}: must be a table of fields, found {_describe(data)}")
     _check_bounds(data, where)
     try:  # as JSON: in Python's own data a strict reader takes no list for a tuple
-        checked: T = _adapter(kind).validate_json(  # type: ignore[arg-type]
-            _text_of(data), strict=True, extra="forbid"
-        )
+        checked: T = _adapter(kind).validate_json(_text_of(data), strict=True, extra="forbid")
         return checked
     except ValidationError as error:
         raise SchemaError(explained(error, where, kind)) from error
     except (TypeError, OverflowError) as error:
         raise SchemaError(f"{where}: {error}") from error
-
-
-@functools.cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 def explained(error: ValueError, where: str = "", kind: object = None) -> str:

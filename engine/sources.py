@@ -7,7 +7,7 @@ model that needs it: strings of `koopman_tension` and the truth do not.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -43,32 +43,69 @@ class SourceState:
     frame: int
     limit_m: float
 
+    def after(self, inner: Any, steps: int) -> SourceState:
+        return SourceState(inner, self.frame + steps, self.limit_m)
 
-class StringSource(ABC):
-    """Frames of displacement in m after an initial displacement at rest.
+
+class _TorchModel:
+    """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
+
+    def __init__(self, model: StringModel[Any]) -> None:
+        self._model = model
+
+    def encode(self, displacement: NDArray[np.float32]) -> Any:
+        return self._call(self._model.encode, displacement)
+
+    def advance(self, state: Any, steps: int, readout: Array | None = None) -> tuple[Floats, Any]:
+        frames, after = self._call(self._model.advance, state, steps, readout)
+        return frames.numpy(), after
+
+    def sample(self, state: Any, frames: NDArray[np.int64], steps: int) -> tuple[Floats, Any]:
+        motion, after = self._call(self._model.sample, state, frames, steps)
+        return motion.numpy(), after
+
+    @staticmethod
+    def _call(method: Callable[..., Any], *values: Any) -> Any:
+        import torch
+
+        with torch.inference_mode():
+            return method(*(torch.from_numpy(value) if isinstance(value, np.ndarray) else value for value in values))
+
+
+class ModelSource:
+    """A preset's model.
 
     Attributes:
         any_frame: whether `sample` takes much less time than `advance`, because it leaves the other frames or their
             shapes out.
     """
 
-    rate_hz: int
-    grid_points: int
-    any_frame: bool
+    def __init__(self, preset: Preset) -> None:
+        self._model: TensionArrays | _TorchModel
+        if preset.info.of_many_strings:
+            self._model, self.any_frame = TensionArrays(preset.configuration, preset.weights), True
+        else:
+            self._model, self.any_frame = _TorchModel(preset.model), preset.model.any_frame
+        self._scale_m = preset.info.scale_m
+        self.rate_hz = preset.info.rate_hz
+        self.grid_points = preset.info.grid_points
 
-    @abstractmethod
     def start(self, displacement_m: Array) -> SourceState:
         """The state at frame 0 for displacements (batch, grid_points), already projected on the modes in use."""
+        _check_grid(displacement_m, self.grid_points)
+        inner = self._model.encode((displacement_m / self._scale_m).astype(np.float32))
+        peak_m = max(float(np.abs(displacement_m).max(initial=0.0)), LEAST_PEAK_M)
+        return SourceState(inner, 0, RUNAWAY_FACTOR * peak_m)
 
-    @abstractmethod
     def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
         """The next frames, (batch, steps, grid_points), or (…, points) where `readout` (grid_points, points) says.
 
         Raises:
             Runaway: see there.
         """
+        frames, inner = self._model.advance(state.inner, steps, readout)
+        return self._checked(frames, np.arange(1, steps + 1), state), state.after(inner, steps)
 
-    @abstractmethod
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
         """Sample the motion on the whole grid, as `advance`, keeping some frames, (batch, frames, grid_points).
 
@@ -78,65 +115,11 @@ class StringSource(ABC):
         Raises:
             Runaway: see there.
         """
-
-
-class _TorchModel:
-    """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
-
-    def __init__(self, model: StringModel[Any]) -> None:
-        self._model: Any = model
-
-    def encode(self, displacement: NDArray[np.float32]) -> Any:
-        import torch
-
-        with torch.inference_mode():
-            return self._model.encode(torch.from_numpy(displacement))
-
-    def advance(self, state: Any, steps: int, readout: Array | None = None) -> tuple[Floats, Any]:
-        import torch
-
-        with torch.inference_mode():
-            frames, after = self._model.advance(state, steps, None if readout is None else torch.from_numpy(readout))
-        return frames.numpy(), after
-
-    def sample(self, state: Any, frames: NDArray[np.int64], steps: int) -> tuple[Floats, Any]:
-        import torch
-
-        with torch.inference_mode():
-            motion, after = self._model.sample(state, torch.from_numpy(frames), steps)
-        return motion.numpy(), after
-
-
-class ModelSource(StringSource):
-    """A preset's model."""
-
-    def __init__(self, preset: Preset) -> None:
-        self._model: TensionArrays | _TorchModel
-        if preset.info.of_many_strings:
-            self._model, self.any_frame = TensionArrays(preset.configuration, preset.weights), True
-        else:
-            from engine.models.base import AnyFrameModel
-
-            self._model, self.any_frame = _TorchModel(preset.model), isinstance(preset.model, AnyFrameModel)
-        self._scale_m = preset.info.scale_m
-        self.rate_hz = preset.info.rate_hz
-        self.grid_points = preset.info.grid_points
-
-    def start(self, displacement_m: Array) -> SourceState:
-        _check_grid(displacement_m, self.grid_points)
-        inner = self._model.encode((displacement_m / self._scale_m).astype(np.float32))
-        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(np.abs(displacement_m).max()), LEAST_PEAK_M))
-
-    def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
-        frames, inner = self._model.advance(state.inner, steps, readout)
-        return self._checked(frames, np.arange(1, steps + 1), state), self._after(state, inner, steps)
-
-    def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
         if not self.any_frame or len(frames) == steps:
             every, after = self.advance(state, steps)
             return every if len(frames) == steps else every[:, frames - 1], after
         motion, inner = self._model.sample(state.inner, frames, steps)
-        return self._checked(motion, frames, state), self._after(state, inner, steps)
+        return self._checked(motion, frames, state), state.after(inner, steps)
 
     def _checked(self, displacement: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
         """The displacement in m, checked. Raises Runaway."""
@@ -147,13 +130,9 @@ class ModelSource(StringSource):
             raise Runaway((state.frame + int(frames[first])) / self.rate_hz)
         return displacement
 
-    @staticmethod
-    def _after(state: SourceState, inner: Any, steps: int) -> SourceState:
-        return SourceState(inner, state.frame + steps, state.limit_m)
 
-
-class TruthSource(StringSource):
-    """The physics of a preset's string, at the preset's rate and with its modes.
+class TruthSource:
+    """The physics of a preset's string, at the preset's rate and with its modes; the methods of `ModelSource`.
 
     Args:
         substeps: of the solver (see `SplittingSolver`); None is its default, exact to 1e-7.
@@ -173,13 +152,14 @@ class TruthSource(StringSource):
     def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
         amplitudes, inner = self._solver.advance(state.inner, steps)
         shapes = self._resonator.shapes
-        to_points = shapes if readout is None else shapes @ readout
-        return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
+        return amplitudes @ (shapes if readout is None else shapes @ readout), state.after(inner, steps)
 
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
         amplitudes, inner = self._solver.sample(state.inner, frames, steps)
-        motion = amplitudes @ self._resonator.shapes
-        return motion, SourceState(inner, state.frame + steps, state.limit_m)
+        return amplitudes @ self._resonator.shapes, state.after(inner, steps)
+
+
+StringSource = ModelSource | TruthSource
 
 
 def _check_grid(displacement: Array, grid_points: int) -> None:

@@ -73,7 +73,10 @@ def checked(records: Iterable[T | SchemaError]) -> Iterator[T]:
 
 
 def _rows(lines: io.StringIO, apart: bool) -> Iterator[list[str] | SchemaError]:
-    reader = (next(csv.reader([line]), []) for line in lines) if apart else csv.reader(lines)
+    def values_of(line: str) -> list[str]:
+        return next(csv.reader([line]), [])
+
+    reader = map(values_of, lines) if apart else csv.reader(lines)  # a map continues after an error
     while True:
         try:
             yield next(reader)
@@ -81,8 +84,6 @@ def _rows(lines: io.StringIO, apart: bool) -> Iterator[list[str] | SchemaError]:
             return
         except csv.Error as error:
             yield SchemaError(f"not a line of values ({error})")
-            if apart:  # a generator ends with its error
-                reader = (next(csv.reader([line]), []) for line in lines)
 
 
 def _record(kind: type[T], columns: Sequence[str], texts: Sequence[str], where: str) -> T:

@@ -16,20 +16,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.effects import Body, Effects, Impulse
-from engine.effects.curves import curves_of
+from engine.effects.body import curves_of
 from engine.kernels import cache
 from engine.kernels.constants import QUANTUM
-from engine.models._tension_arrays import CURVES
+from engine.models._tension_law import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
 from engine.python_process import python_command, python_environment
-from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, project
 from engine.values.drum import DrumParameters
 from engine.values.ear import Ear
 from engine.values.effects import Room
 from engine.values.string import StringParameters
-from engine.voices import CompiledPlayer, Mixer, Program, Voice, model_program, plain_program, truth_program
+from engine.voices import CompiledPlayer, Mixer, Voice, model_program, plain_program, truth_program
 
 if TYPE_CHECKING:
     from engine.models.base import StringModel
@@ -51,10 +50,10 @@ INFO = PresetInfo(
     initialisation="",
     seed=0,
 )
+INITIAL_M = project(Pluck().displacement(INFO.grid_points), INFO.modes)
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
 LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
-MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
-BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
+BANKS: tuple[dict[str, Any], ...] = ({}, {"adiabatic": True})
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
 FRAMES = 4 * QUANTUM
 
@@ -62,7 +61,7 @@ FRAMES = 4 * QUANTUM
 def warm() -> None:
     """Load what a pluck needs at once; where not all has been compiled yet, compile all."""
     if cache.is_whole():
-        _sound(_struck(model_program(PRESET, RATE_HZ), EARS[0]))
+        _sound(Voice(model_program(PRESET, RATE_HZ), INITIAL_M, EARS[0]))
     else:
         with _beside("playing"):
             models()
@@ -119,9 +118,12 @@ def responses() -> None:
 
 
 def _each() -> Iterator[Voice]:
-    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+    from engine.voices.banks import bank_program
+
+    banks = [bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ) for sizes in BANKS]
+    for program in (*filter(None, banks), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
-            yield _struck(program, ear)
+            yield Voice(program, INITIAL_M, ear)
 
 
 def models() -> None:
@@ -132,17 +134,13 @@ def models() -> None:
 
     readout = torch.from_numpy(listening_weights(np.array([0.3]), INFO.grid_points)).float()
     with torch.inference_mode():
-        for name, sizes in (
-            ("koopman_tension", INFO.model_configuration),
-            ("s5", {"grid_points": INFO.grid_points}),
-            ("fgru", {"grid_points": INFO.grid_points}),
-            ("frnn", {"grid_points": INFO.grid_points}),
-        ):
+        grid = {"grid_points": INFO.grid_points}
+        for name, sizes in ((INFO.model, INFO.model_configuration), ("s5", grid), ("fgru", grid), ("frnn", grid)):
             model = _model(name, sizes)
-            _, state = model.advance(model.encode(torch.from_numpy(_initial_m()[None] / INFO.scale_m).float()), 2)
+            _, state = model.advance(model.encode(torch.from_numpy(INITIAL_M[None] / INFO.scale_m).float()), 2)
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
-    truth.advance(truth.start(_initial_m()[None]), 2)
+    truth.advance(truth.start(INITIAL_M[None]), 2)
 
 
 def _drum() -> None:
@@ -172,18 +170,6 @@ def _loudness() -> None:
     loudness.looked_at(0, 1, 0)
 
 
-def _bank(sizes: dict[str, Any]) -> Program:
-    from engine.voices.banks import bank_program
-
-    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
-    assert program is not None
-    return program
-
-
-def _struck(program: Program, ear: Ear) -> Voice:
-    return Voice(program, _initial_m(), ear)
-
-
 def _sound(voice: Voice) -> None:
     mixer = Mixer(RATE_HZ)
     mixer.add(voice)
@@ -200,10 +186,6 @@ def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
     physics = Physics(INFO.resonator, INFO.rate_hz)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     return model.eval()
-
-
-def _initial_m() -> Array:
-    return project(Pluck().displacement(INFO.grid_points), INFO.modes)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import resonator_of
 from engine.schema import write
 from engine.values.string import StringParameters
-from engine.voices.derivative import REACH_FRAMES, differentiator_taps
+from engine.voices.ear import REACH_FRAMES, differentiator_taps
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # windows need no screen, however pytest is started
 

@@ -22,10 +22,10 @@ from engine.compare.partials import (
     partial_errors,
     segment_frames,
     track_partials,
+    true_phasors,
 )
 from engine.compare.relative import ErrorSums, RelativeError
 from engine.compare.spectra import Array, spectral_distances
-from engine.compare.true_partials import true_phasors
 from engine.models.base import KoopmanModel, StringModel
 from engine.pluck import DEFAULT_LISTEN
 from engine.resonators.sine_transform import listening_weights

@@ -18,8 +18,8 @@ from engine.compare.partials import (
     partial_errors,
     segment_frames,
     track_partials,
+    true_phasors,
 )
-from engine.compare.true_partials import true_phasors
 from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, project, to_modes

@@ -9,6 +9,7 @@ from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import own_impulse
 from app.patches.patch import BodyChoice, Patch
 from engine.effects import BODIES, Body, Effects
+from engine.effects.body import curves_of
 from engine.values.effects import Amp, Room
 
 
@@ -65,8 +66,6 @@ def channels_of(patch: Patch, wheeled: bool = False) -> int:
 
 def body_curves(patch: Patch) -> NDArray[np.float64] | None:
     """The curves of a patch's body, whose resonances favour some keys, at whatever mix; None: it has no body."""
-    from engine.effects.curves import curves_of  # brings the compiler
-
     body = _body(patch.body.model_copy(update={"mix": 1.0}))[0]
     return None if body is None else curves_of(body)
 

@@ -14,7 +14,7 @@ half the rate that a segment does not show both quadratures of a mode is it not 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -22,7 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.resonators.base import Resonator
+from engine.truth import ModalState, SplittingSolver
 
+OVERSAMPLING = 4  # of the truth whose phasors are wanted
 SEGMENT_S = 0.005  # or a period of the lowest mode, if that is longer
 FLOOR_DB = -60.0  # a mode so far below the loudest one of the segment is absent
 WEAK_DB = -30.0  # a prediction so far below the truth has a level, but no phase that means anything
@@ -52,11 +54,32 @@ def phasors(before: Array, now: Array, after: Array, spacing_s: float, resonator
     return now + 1j * quadrature
 
 
-def _complex(real: Array, imaginary: Array) -> Phasors:
-    """The complex numbers of two parts, also where these are not finite: a product with i would make others."""
-    numbers = real.astype(np.complex128)
-    numbers.imag = imaginary
-    return numbers
+def true_phasors(
+    resonator: Resonator,
+    initial: Array,
+    rate_hz: float,
+    steps: int,
+    block: int,
+    *,
+    substeps: int | None = None,
+) -> Iterator[Phasors]:
+    """Phasors of frames 1 … steps in m, complex128 (batch, up to `block`, modes).
+
+    Args:
+        initial: modal amplitudes at rest in m, (batch, modes).
+        substeps: of the solver in a frame; None is its default.
+    """
+    sample_hz = OVERSAMPLING * rate_hz
+    fewer = None if substeps is None else -(-substeps // OVERSAMPLING)
+    solver = SplittingSolver(resonator, sample_hz, substeps=fewer)
+    state = ModalState.at_rest(initial)
+    for first in range(0, steps, block):
+        samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
+        beyond, _ = solver.advance(state, 1)
+        every = np.concatenate([samples, beyond], axis=1)
+        before, now, after = (every[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1))
+        count = now.shape[1]
+        yield phasors(before[:, :count], now, after, 1 / sample_hz, resonator)
 
 
 def segment_frames(rate_hz: float, lowest_hz: float) -> int:
@@ -114,8 +137,9 @@ def track_partials(predicted: NDArray[np.floating[Any]], truth: Phasors, length:
     shape = (len(truth), truth.shape[1] // length, length, truth.shape[2])
     frames = shape[1] * length
     z, q = truth[:, :frames].reshape(shape), predicted[:, :frames].reshape(shape).astype(np.float64)
-    with np.errstate(invalid="ignore"):  # of a prediction that is not finite
-        match = _complex((z.real * q).sum(2), -(z.imag * q).sum(2))
+    with np.errstate(invalid="ignore"):  # of a prediction that is not finite: a product with i would make others
+        match = (z.real * q).sum(2).astype(np.complex128)
+        match.imag = -(z.imag * q).sum(2)
     return PartialTrack(
         (z.real**2 + z.imag**2).sum(2), (z**2).sum(2), match, (z[:, :, :-1].conj() * z[:, :, 1:]).sum(2)
     )
@@ -158,21 +182,15 @@ class PartialErrors:
 
     def by_mode(self, window: int) -> list[PartialSummary]:
         """The medians over the trajectories, mode by mode."""
-        return [
-            PartialSummary(
-                mode + 1,
-                int(np.isfinite(self.frequency_hz[:, window, mode]).sum()),
-                _median(self.frequency_hz[:, window, mode]),
-                _median(np.abs(self.level_db[:, window, mode])),
-                _median(np.abs(self.phase_cycles[:, window, mode])),
-                _median(np.abs(self.cents[:, window, mode])),
-                _median(self.t60_s[:, window, mode]),
-                _median(np.abs(self.t60_error_percent[:, window, mode])),
-                _median(self.glide_cents[:, window, mode]),
-                _median(np.abs(self.glide_error_cents[:, window, mode])),
-            )
-            for mode in range(self.energy.shape[2])
-        ]
+        summaries = []
+        for mode in range(self.energy.shape[2]):
+            values = {field.name: getattr(self, field.name)[:, window, mode] for field in fields(self)[1:]}
+            there = int(np.isfinite(values["frequency_hz"]).sum())
+            medians = {
+                name: _median(each if name == "glide_cents" else np.abs(each)) for name, each in values.items()
+            }
+            summaries.append(PartialSummary(mode + 1, there, **medians))
+        return summaries
 
     def weighted(self, window: int) -> WeightedPartials:
         """The means of the magnitudes over all modes and trajectories, by the truth's energy."""

@@ -88,7 +88,7 @@ class ErrorSums:
         """
         if steps is not None and not 1 <= steps <= self._frames.shape[1]:
             raise ValueError(f"steps must lie in 1 … {self._frames.shape[1]}, not {steps}")
-        return RelativeError(*self._relative(slice(steps)))
+        return RelativeError(*_totals(self._frames[:, :steps]))
 
     def windows(self, rate_hz: float, edges_s: Sequence[float]) -> list[WindowError]:
         """Errors between successive edges; windows that lie past the last frame are left out."""
@@ -97,7 +97,7 @@ class ErrorSums:
         for start_s, stop_s in pairwise(edges_s):
             first, last = (min(round(edge * rate_hz), steps) for edge in (start_s, stop_s))
             if last > first:
-                errors.append(WindowError(*self._relative(slice(first, last)), start_s, stop_s))
+                errors.append(WindowError(*_totals(self._frames[:, first:last]), start_s, stop_s))
         return errors
 
     def per_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -151,18 +151,13 @@ class ErrorSums:
 
     def of(self, rows: Sequence[int]) -> RelativeError:
         """The errors of some trajectories over all frames."""
-        mse, mae = _ratios(self._trajectories[:, list(rows)].sum(1, keepdims=True))
-        return RelativeError(float(mse[0]), float(mae[0]))
+        return RelativeError(*_totals(self._trajectories[:, list(rows)]))
 
     def shares(self) -> NDArray[np.float64]:
         """The share of each trajectory in all squared error, (trajectories,); zeros where there is no error."""
         squared = self._trajectories[0]
         whole = float(squared.sum())
         return squared / whole if whole > 0 else squared.copy()
-
-    def _relative(self, frames: slice) -> tuple[float, float]:
-        mse, mae = _ratios(self._frames[:, frames].sum(1, keepdims=True))
-        return float(mse[0]), float(mae[0])
 
 
 class ErrorWindows:
@@ -256,6 +251,12 @@ def _over_points(terms: Any) -> NDArray[np.float64]:
     import torch
 
     return np.asarray(terms.sum(dim=2, dtype=torch.float64).cpu().numpy())
+
+
+def _totals(sums: NDArray[np.float64]) -> tuple[float, float]:
+    """The ratios of all sums (4, n) together."""
+    mse, mae = _ratios(sums.sum(1, keepdims=True))
+    return float(mse[0]), float(mae[0])
 
 
 def _ratios(sums: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -17,13 +17,46 @@ from numpy.typing import NDArray
 
 from engine import bounds
 from engine.effects.body_table import BODIES, Wood
-from engine.effects.impulse import Impulse
-from engine.kernels.constants import BODY_HIGHEST_HZ
+from engine.kernels.constants import BODY_HIGHEST_HZ, CURVES_HZ, LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
+from engine.kernels.records import BODY, slots
 
 SOUND_M_S = 343.0
 SUBSONIC = 0.55  # of the lowest mode: below it a body radiates next to nothing
 MOST_PER_HZ = 0.06  # modes: where more overlap, fewer and stronger ones sound the same
 LEAST_ALIKE = 0.2  # of left and right, at high frequencies
+PEAK = (1e-6, 1e6)  # of an impulse response
+LARGEST_GAIN = 1e3  # at any frequency, of a response that is as loud as what it is given
+LARGEST_WHOLE = 2**31 - 1  # of a sample
+
+
+@dataclass(frozen=True, eq=False)
+class Impulse:
+    """An impulse response from anywhere, (frames, 1 or 2).
+
+    Raises:
+        ValueError: it is too long, has too many channels, is silent or inaudible, or has samples that are no numbers.
+    """
+
+    samples: NDArray[np.float64]
+    rate_hz: int
+
+    def __post_init__(self) -> None:
+        bounds.check("its rate", self.rate_hz, bounds.IMPULSE_RATE_HZ, "Hz")
+        if self.samples.ndim != 2:
+            raise ValueError(f"an impulse response is (frames, channels), not of {self.samples.ndim} dimensions")
+        bounds.check("its channels", self.samples.shape[1], (1, bounds.MOST_IMPULSE_CHANNELS))
+        bounds.check("its length", len(self.samples) / self.rate_hz, (0.0, bounds.LONGEST_IMPULSE_S), "s")
+        if not np.isfinite(self.samples).all():
+            raise ValueError("it has samples that are no numbers")
+        peak = float(np.abs(self.samples).max(initial=0.0))
+        if peak < PEAK[0]:
+            raise ValueError("it is silent")
+        bounds.check("its largest sample", peak, PEAK)
+        from engine.effects.responses import as_loud  # brings the compiler
+
+        size = 1 << (2 * len(self.samples) - 1).bit_length()
+        if not np.abs(np.fft.rfft(as_loud(self.samples, self.rate_hz), size, axis=0)).max() <= LARGEST_GAIN:
+            raise ValueError(f"it has next to nothing between {LOUDNESS_LOW_HZ:g} and {LOUDNESS_HIGH_HZ:g} Hz")
 
 
 @dataclass(frozen=True)
@@ -74,6 +107,19 @@ def _response(name: str, impulse: Impulse | None, size: float, rate_hz: int) -> 
     return response
 
 
+@lru_cache(maxsize=16)
+def curves_of(body: Body) -> NDArray[np.float64]:
+    """The effect of a body alone on a key's loudness, (BODY_SLOTS,), see `kernels.constants`.
+
+    It takes some hundredths of a second, once: the array is remembered, and not to be written.
+    """
+    from engine.effects import responses
+
+    curves = responses.curves_of(body.response(CURVES_HZ))
+    curves.setflags(write=False)
+    return curves
+
+
 def subsonic_hz(wood: Wood) -> float:
     """The frequency below which a body radiates next to nothing, at a size of 1."""
     return SUBSONIC * wood.lowest[0].frequency_hz
@@ -114,3 +160,25 @@ def _higher_hz(wood: Wood, draw: np.random.Generator) -> NDArray[np.float64]:
     counted = np.cumsum(_density(wood, grid_hz))  # modes from the first one up to a frequency
     count = int(counted[-1])
     return np.interp(np.cumsum(draw.rayleigh(math.sqrt(2 / math.pi), count)), counted, grid_hz, right=last_hz)
+
+
+def body_memory(body: Body | None) -> NDArray[np.float64]:
+    """A body at a size of 1 as plug-ins have it: the record `BODY`, then modes or samples; all 0: none."""
+    memory, rows = np.zeros(slots(BODY)), np.zeros(0)
+    record = memory.view(BODY)[0]
+    record["longest_s"] = bounds.LONGEST_IMPULSE_S
+    if body is not None and body.impulse is not None:
+        samples = body.impulse.samples
+        unit = float(np.abs(samples).max()) / LARGEST_WHOLE  # where it is loud, finer than single precision
+        record["frames"], record["channels"] = samples.shape
+        record["hz"], record["unit"] = body.impulse.rate_hz, unit
+        whole = np.zeros(2 * -(-samples.size // 2), np.int32)
+        whole[: samples.size] = np.rint(samples / unit).ravel()
+        rows = whole.view(np.float64)
+    elif body is not None:
+        wood = BODIES[body.name]
+        rows = modes_of(wood).ravel()
+        record["modes"] = rows.size // 4
+        record["seconds"] = wood.seconds
+        record["subsonic_hz"] = subsonic_hz(wood)
+    return np.concatenate([memory, rows])

@@ -1,4 +1,4 @@
-"""Amplifier, then body and room together as one impulse response, for the mixer and for arrays alike."""
+"""Amplifier, then body and room together as one impulse response."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects.amp import amplified
 from engine.effects.body import Body
 from engine.effects.room import room_response
-from engine.kernels.mixer_records import LARGEST, SMALLEST
 from engine.values.effects import Amp, Room
 
 
@@ -29,11 +27,6 @@ class Effects:
     room: Room | None = None
     amp: Amp | None = None
     level_db: float = 0.0
-
-    @property
-    def neutral(self) -> bool:
-        """Return True if nothing is changed at all."""
-        return not self.rings and (self.amp is None or self.amp.drive_db == 0.0)
 
     @property
     def rings(self) -> bool:
@@ -83,25 +76,3 @@ def _parts(
     other = room_response(room.t60_s, rate_hz) if room else nothing
     both = in_series(one, other) if body and room else nothing
     return (one, other, both), powers_of(one, other, rate_hz)
-
-
-def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:
-    """Apply these effects to sound (frames, 1 or 2) as a mixer does: its first frames, as many, (frames, 2).
-
-    Give silence after the sound where the end shall ring out, `Effects.tail_s`. Samples that are no numbers, and
-    those too large or too small to be sound, are taken as silence, as the mixer does.
-    """
-    from scipy.signal import oaconvolve  # which takes the better part of a second to load, as Numba does
-
-    stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
-    if effects is None or effects.neutral or not len(stereo):
-        return stereo
-    wild = ~(np.abs(stereo) < LARGEST).all(1)
-    stereo[wild] = 0.0
-    stereo[np.abs(stereo) < SMALLEST] = 0.0
-    if effects.amp is not None:
-        stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
-    if not effects.rings:
-        return stereo
-    wet: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
-    return wet

@@ -1,4 +1,4 @@
-"""Impulse responses as `engine.kernels` computes them, with the memory for it; responses are (frames, 2)."""
+"""Impulse responses as `engine.kernels` computes and convolves them, with the memory for it; (frames, 2) each."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
-from engine.kernels import bodies, constants, fourier, responses, rooms
+from engine.kernels import bodies, constants, convolver, fourier, responses
+from engine.kernels.fields import record_of
+from engine.kernels.mixer_records import CONVOLVER, IMPULSE, WINDOW
 
 Response = NDArray[np.float64]
+LONGEST_S = 2 * bounds.LONGEST_IMPULSE_S  # a body's and a room's
 
 
 def work_space(size: int) -> NDArray[np.float64]:
@@ -71,16 +74,6 @@ def of_given(samples: NDArray[np.float64], own_hz: float, size: float, rate_hz: 
     return response
 
 
-def of_room(noise: Response, t60_s: float, rate_hz: float) -> Response:
-    """The response of a room from noise of power 1."""
-    t60_s, rate_hz = float(t60_s), float(rate_hz)
-    made = np.array(noise[: rooms.room_frames(t60_s)])
-    response = np.empty((responses.resampled_frames(len(made), constants.ROOM_HZ, rate_hz), 2))
-    work = work_space(max(responses.work_size(len(made), constants.ROOM_HZ, rate_hz), int(rate_hz)))
-    rooms.respond(work, t60_s, made, rate_hz, response)
-    return response
-
-
 def in_series(one: Response, other: Response) -> Response:
     """The response of one behind the other."""
     both = np.empty((len(one) + len(other) - 1, 2))
@@ -108,3 +101,20 @@ def curves_of(response: Response) -> NDArray[np.float64]:
     work = work_space(responses.curves_size(len(response)))
     responses.curves(work, stereo(response), curve)
     return curve
+
+
+def partitioned(impulse: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A response (frames, channels) as the compiled convolver reads it: spectra of its partitions."""
+    frames, channels = impulse.shape
+    memory = np.zeros(convolver.partitioned_slots(frames, channels))
+    convolver.partition(work_space(2 * WINDOW), np.array(impulse), frames, record_of(memory, IMPULSE))
+    return memory
+
+
+def convolver_memory(rate_hz: int) -> NDArray[np.float64]:
+    """The memory of a convolver for responses of up to `LONGEST_S`."""
+    frames = round(LONGEST_S * rate_hz)
+    memory = np.empty(convolver.convolver_slots(frames))
+    memory[:] = 0.0  # written to, so that the device's thread finds every page in place
+    convolver.begin(record_of(memory, CONVOLVER), float(rate_hz), frames)
+    return memory

@@ -26,9 +26,13 @@ _SEED = 1
 @lru_cache(maxsize=8)
 def room_response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
     """The response of the reverberation alone, (frames, 2), as loud as what it is given; not to be written."""
-    from engine.effects.responses import of_room  # brings the compiler
+    from engine.effects.responses import work_space  # brings the compiler
+    from engine.kernels import responses, rooms
 
-    response = of_room(room_noise(), t60_s, rate_hz)
+    made = np.array(room_noise()[: rooms.room_frames(float(t60_s))])
+    response = np.empty((responses.resampled_frames(len(made), ROOM_HZ, float(rate_hz)), 2))
+    work = work_space(max(responses.work_size(len(made), ROOM_HZ, float(rate_hz)), int(rate_hz)))
+    rooms.respond(work, float(t60_s), made, float(rate_hz), response)
     response.setflags(write=False)
     return response
 

@@ -24,10 +24,14 @@ WIDTHS = range(128, 31, -1)  # rows of an image: all in one image is slower than
 def linear(inputs: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
     """`torch.nn.functional.linear`: (..., in) to (..., out)."""
     rows = inputs.numel() // weight.shape[1]
-    if not _in_training(inputs, rows):
+    plain = inputs.device.type in ("cpu", "cuda") and inputs.dtype == torch.float32
+    if not plain or rows < FEWEST_ROWS or not torch.is_grad_enabled():
         return functional.linear(inputs, weight, bias)
     if inputs.device.type in PARTED_ON:
-        return _in_parts(inputs, weight, bias, _largest_divisor(rows, PARTS))
+        split = inputs.reshape(_largest_divisor(rows, PARTS), -1, weight.shape[1])
+        outputs = torch.bmm(split, weight.T.expand(len(split), -1, -1))
+        outputs = outputs if bias is None else outputs + bias
+        return outputs.view(*inputs.shape[:-1], len(weight))
     width = _largest_divisor(rows, WIDTHS)
     if width == 1:
         return functional.linear(inputs, weight, bias)
@@ -41,19 +45,6 @@ class Dense(nn.Linear):
 
     def forward(self, inputs: Tensor) -> Tensor:
         return linear(inputs, self.weight, self.bias)
-
-
-def _in_parts(inputs: Tensor, weight: Tensor, bias: Tensor | None, parts: int) -> Tensor:
-    """`linear` of `parts` of the rows, in one call."""
-    split = inputs.reshape(parts, -1, weight.shape[1])
-    outputs = torch.bmm(split, weight.T.expand(parts, -1, -1))
-    outputs = outputs if bias is None else outputs + bias
-    return outputs.view(*inputs.shape[:-1], len(weight))
-
-
-def _in_training(inputs: Tensor, rows: int) -> bool:
-    plain = inputs.device.type in ("cpu", "cuda") and inputs.dtype == torch.float32
-    return plain and rows >= FEWEST_ROWS and torch.is_grad_enabled()
 
 
 def _largest_divisor(rows: int, choices: range) -> int:

@@ -7,16 +7,18 @@ exact after millions of samples and every splitting into blocks the same motion.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._dense import Dense, linear
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
+from engine.models.base import LINEAR_STRING, Physics, StringModel
+from engine.models.eigenvalues import StoredEigenvalues
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
 SEGMENT = 64  # frames of the fine table of powers
@@ -30,8 +32,10 @@ class KoopmanState:
     step: int
 
 
-class DiagonalModel(AnyFrameModel[KoopmanState]):
+class DiagonalModel(StringModel[KoopmanState]):
     """Advances by powers of the eigenvalues; a subclass encodes, decodes and says what its eigenvalues are."""
+
+    any_frame: ClassVar = True
 
     @abstractmethod
     def powers(self, frames: Tensor) -> Tensor:
@@ -69,16 +73,18 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
         return (coarse[:, :, None] * fine).flatten(1, 2)[:, :count]
 
 
-class LearnedEigenvalues(DiagonalModel):
-    """A diagonal model whose eigenvalues are two parameters: λ = exp(-exp(ν_log) + i exp(θ_log)), a latent each."""
+class LearnedEigenvalues(StoredEigenvalues, DiagonalModel):
+    """A diagonal model with its eigenvalues in two parameters; its encoder gives real parts first."""
 
     initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
-    nu_log: nn.Parameter  # (state_size,)
-    theta_log: nn.Parameter
+    encoder: Any  # a dense layer or a perceptron
+
+    def encode(self, displacement: Tensor) -> KoopmanState:
+        return KoopmanState(complex_outputs(self.encoder, displacement), 0)
 
     def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
+        return eigenvalues.powers(self.eigenvalue_logs(), frames)
 
     def observed(self, latents: Tensor) -> Tensor:
         """The states that the decoder reads, complex like `latents` (..., state_size): the latents themselves."""
@@ -97,7 +103,7 @@ class LearnedEigenvalues(DiagonalModel):
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
-        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
+        return [self.eigenvalue_logs()]
 
 
 def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
@@ -110,7 +116,7 @@ def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor
     return linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
 
 
-def complex_outputs(layer: nn.Module, inputs: Tensor) -> Tensor:
+def complex_outputs(layer: nn.Linear | nn.Sequential, inputs: Tensor) -> Tensor:
     """A dense layer's outputs, or a perceptron's, whose first half are real parts, as complex (..., n).
 
     The last weight's rows are interleaved to match the memory of complex numbers.
@@ -157,27 +163,14 @@ def linear_string_eigenvalues(
     return torch.complex(linear.real * stretch, linear.imag * raised)
 
 
-def linear_string_encoder(analysis: Tensor) -> Tensor:
-    """Weights (2n, grid_points), real parts first, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
+def linear_string_encoder(size: int, physics: Physics) -> Tensor:
+    """Weights (2 size, grid_points), real parts first, of an encoder whose latents move as Re(λᵏ z₀) = q_k of a mode.
 
     z₀ = q₀: with the damping that is a string at rest to about σ/ω. (`eigenvalues.slope_at_rest` is what lacks; the
     starts of Koopman and Koopman_var have always left it to the training.)
     """
+    analysis = physics.analysis[torch.arange(size) % physics.modes]
     return torch.cat([analysis, torch.zeros_like(analysis)])
-
-
-def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:
-    """Write log λ = -exp(ν_log) + i exp(θ_log) into the two parameters."""
-    nu, theta = eigenvalues.stored(log_eigenvalues)
-    nu_log.copy_(nu)
-    theta_log.copy_(theta)
-
-
-def store_ring(nu_log: Tensor, theta_log: Tensor, generator: torch.Generator) -> None:
-    """Eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1 (the paper, §4.2)."""
-    nu, theta = eigenvalues.draw_ring(len(nu_log), generator)
-    nu_log.copy_(nu)
-    theta_log.copy_(theta)
 
 
 def perceptron(*widths: int) -> nn.Sequential:
@@ -193,6 +186,16 @@ def dense_layers(model: nn.Module) -> list[nn.Linear]:
     return [layer for layer in model.modules() if isinstance(layer, nn.Linear)]
 
 
-def initialise_orthogonal(layer: nn.Linear, generator: torch.Generator) -> None:
-    nn.init.orthogonal_(layer.weight, generator=generator)
-    nn.init.zeros_(layer.bias)
+def draw_orthogonal(layers: Iterable[nn.Linear], generator: torch.Generator) -> None:
+    for layer in layers:
+        nn.init.orthogonal_(layer.weight, generator=generator)
+        nn.init.zeros_(layer.bias)
+
+
+def draw_normal(layers: Iterable[nn.Linear], generator: torch.Generator) -> None:
+    """Draw weights by their fan-in, with no value beyond two standard deviations."""
+    for layer in layers:
+        std = layer.in_features**-0.5
+        nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
+        if layer.bias is not None:
+            nn.init.zeros_(layer.bias)

@@ -31,13 +31,9 @@ def joined(first: Tensor, second: Tensor) -> Tensor:
     return torch.cat([part for pair in pairs for part in pair], 2)
 
 
-def _matrices(field: Tensor) -> tuple[Tensor, Tensor]:
-    """The folded transform and its inverse for fields like this one."""
-    return _matrices_on(len(field), field.dtype, field.device)
-
-
 @cache
-def _matrices_on(points: int, dtype: torch.dtype, device: torch.device) -> tuple[Tensor, Tensor]:
+def _matrices(points: int, dtype: torch.dtype, device: torch.device) -> tuple[Tensor, Tensor]:
+    """The folded transform and its inverse."""
     forward, inverse = (torch.from_numpy(matrix).to(device, dtype) for matrix in exact_matrices(points))
     return forward, inverse
 
@@ -48,7 +44,7 @@ def _analyse(field: Tensor, matrix: Tensor) -> Tensor:
     # the first point and a middle one stand alone
     mirrored = functional.pad(field[half:].flip(0), (0, 0, 0, 0, 1, 2 * half - 1 - points))
     folded = torch.stack([field[:half] + mirrored, field[:half] - mirrored])
-    parts = torch.bmm(matrix, folded.view(2, half, batch * width)).view(2, -1, batch, width)
+    parts = torch.bmm(matrix, folded.view(2, half, batch * width)).view(2, points, batch, width)
     return torch.cat([parts[0], parts[1]], dim=2)
 
 
@@ -69,7 +65,7 @@ def fgru_rollout(
         gates, gates_bias: of z and r, (frequency, 2·width, 4·width) and (points, 2·width).
         candidate, bias: the same, half as wide.
     """
-    forward, inverse = _matrices(hidden)
+    forward, inverse = _matrices(len(hidden), hidden.dtype, hidden.device)
     fields = []
     for _ in range(steps):
         both = _synthesise(torch.bmm(_analyse(hidden, forward), gates), inverse) + gates_bias[:, None]
@@ -89,7 +85,7 @@ def frnn_rollout(
         matrices, biases: (depth, frequency, 2·width, 2·width) and (depth, points, width).
         pointwise, offsets: (depth, width out, width in) and (depth, width).
     """
-    forward, inverse = _matrices(hidden)
+    forward, inverse = _matrices(len(hidden), hidden.dtype, hidden.device)
     fields = []
     for _ in range(steps):
         for matrix, bias, weight, offset in zip(matrices, biases, pointwise, offsets, strict=True):

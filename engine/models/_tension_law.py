@@ -1,7 +1,7 @@
-"""The law of `koopman_tension`, which its module states, on arrays and on tensors alike.
+"""The law of `koopman_tension`, which its module states, on arrays and on tensors alike, and the arrays of a file.
 
 `KoopmanTension` is this law with weights that torch can train. `TensionArrays` is the same law of a file's arrays:
-pictures of a string are drawn without torch.
+presets of many strings are read, played and drawn without torch.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from engine.array_library import Values, as_array, in_double, library_of
 from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
-from engine.models._tension_arrays import shapes_of_arrays
 from engine.models.configurations import KoopmanTensionConfiguration
+from engine.resonators.base import Array, Resonator
 
+CURVES = ("A", "r", "p")  # what is learned; the rest follows from the resonator
+SAME_RESONATOR = 1e-9  # relative: processors round logarithms and sines differently
+SLOWEST_LOG = -24.0  # ν_log of a mode without losses: after a minute at 48 kHz it is 0.001 dB down
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 LEAST_GROWTH = 1e-9  # of A in a quotient: gradients stay finite
@@ -142,9 +145,10 @@ class TensionLaw:
         """Strings with the same number of nodes go together."""
         nodes = self._nodes(state) if state.nodes is None else state.nodes
         state, ran = replace(state, nodes=nodes), []
-        groups = [np.flatnonzero(nodes == count) for count in np.unique(nodes)]
-        for rows in groups:
-            part, step = state.rows(rows), self.step(int(nodes[rows[0]]))
+        counts = np.unique(nodes).tolist() or [1]  # of no string, any
+        groups = [np.flatnonzero(nodes == count) for count in counts]
+        for count, rows in zip(counts, groups, strict=True):
+            part, step = state.rows(rows), self.step(count)
             ran.append(run(part if state.begun else self._set_out(part, step), step))
         if len(ran) == 1:
             return ran[0]
@@ -288,6 +292,54 @@ class TensionArrays(TensionLaw):
         self.configuration = configuration
         for name in shapes_of_arrays(configuration):
             setattr(self, name, arrays[name])
+
+
+def shapes_of_arrays(c: KoopmanTensionConfiguration) -> dict[str, tuple[int, ...]]:
+    """The shape of each float64 array, by name."""
+    modes = (c.modes,)
+    return {
+        **dict.fromkeys(CURVES, (c.degree + 1,)),
+        **dict.fromkeys(("nu_log", "theta_log", "coupling", "stretch"), modes),
+        "shapes": (c.modes, c.grid_points),
+        "analysis": (c.grid_points, c.modes),
+    }
+
+
+def resonator_arrays(
+    c: KoopmanTensionConfiguration, resonator: Resonator, rate_hz: float, scale_m: float
+) -> dict[str, Array]:
+    """The arrays of a resonator, its modes first; latents to spare rest: no shape, and no share in the tension.
+
+    Raises:
+        ValueError: it has more modes than the model, or another grid.
+    """
+    n = resonator.modes
+    if n > c.modes or resonator.points != c.grid_points:
+        raise ValueError(
+            f"model_configuration.modes is {c.modes} on {c.grid_points} points, the resonator has {n} modes on "
+            f"{resonator.points}"
+        )
+    spare = ((0, c.modes - n),)
+    analysis = np.zeros((resonator.points, n)) if resonator.analysis is None else resonator.analysis
+    eigenvalues = np.pad(resonator.eigenvalues() / rate_hz, spare, "edge")
+    with np.errstate(divide="ignore"):  # without losses
+        nu_log = np.maximum(np.log(-eigenvalues.real), SLOWEST_LOG)
+    return {
+        "nu_log": nu_log,
+        "theta_log": np.log(eigenvalues.imag),
+        "coupling": np.pad(resonator.coupling / rate_hz**2, spare),
+        "stretch": np.pad(resonator.stretch * scale_m**2, spare),
+        "shapes": np.pad(resonator.shapes, (*spare, (0, 0))),
+        "analysis": np.pad(analysis, ((0, 0), *spare)),
+    }
+
+
+def check_resonator(arrays: Mapping[str, Array], expected: Mapping[str, Array]) -> None:
+    """Raise ValueError, naming the array, where one is of another resonator than expected."""
+    for name, array in expected.items():
+        atol = 1e-3 * SAME_RESONATOR * float(np.abs(array).max())
+        if not np.allclose(arrays[name], array, rtol=SAME_RESONATOR, atol=atol):
+            raise ValueError(f"tensor {name!r} is of another string, or of other modes, rate_hz or scale_m")
 
 
 def _compiles(values: Values) -> bool:

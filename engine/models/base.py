@@ -47,31 +47,90 @@ class Physics:
         """log λ = (-σ + iω_d) / rate at rest, complex128 (modes,)."""
         return torch.from_numpy(self.resonator.eigenvalues() / self.rate_hz)
 
+    @property
+    def analysis(self) -> Tensor:
+        """(modes, grid_points): analysis @ displacement = amplitudes."""
+        return torch.from_numpy(self.resonator.inverse).T
+
+    @property
+    def shapes(self) -> Tensor:
+        """(grid_points, modes): shapes @ amplitudes = displacement."""
+        return torch.from_numpy(self.resonator.shapes).T
+
+
+@dataclass(frozen=True)
+class StringModes:
+    """The modes of an unknown string as its motions show them, in normalised units, float64; times are in samples.
+
+    Where they come from is the caller's: `training.fitting.phases` finds them in displacement alone.
+
+    A mode n that starts at rest at q moves as q Re s exp[(log λ) t + i Σ_m κ_nm ∫ E_m]. Here E_m(t) is the square of
+    mode m's start, decaying twice as fast as its motion.
+
+    Attributes:
+        shapes: (modes, grid_points), linearly independent.
+        log_eigenvalues: log λ = -σ + iω, complex128 (modes,).
+        starts: s, complex128 (modes,).
+        coupling: κ, rad/sample, (modes, modes).
+        squares: q² of typical strings, (strings, modes).
+    """
+
+    shapes: Tensor
+    log_eigenvalues: Tensor
+    starts: Tensor
+    coupling: Tensor
+    squares: Tensor
+
+    @property
+    def analysis(self) -> Tensor:
+        """(modes, grid_points): of a displacement, each mode's amplitude."""
+        return torch.linalg.pinv(self.shapes).T
+
+    @property
+    def drift(self) -> Tensor:
+        """The typical Σ κ_m q_m², (modes,)."""
+        return self.coupling @ self.squares.mean(0)
+
 
 class StringModel(nn.Module, ABC, Generic[State]):
-    """A learned map from an initial displacement to the motion that follows."""
+    """A learned map from an initial displacement to the motion that follows.
 
-    grid_points: int
-    configuration: Any  # the frozen dataclass that it was built from
+    Args:
+        configuration: a frozen dataclass of sizes, `grid_points` among them.
+    """
+
     # by name what a start receives of the resonator, in words; empty: nothing. The first is the source's own.
     initialisations: ClassVar[Mapping[str, str]]
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
     eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
     coupling_parameters: ClassVar[frozenset[str]] = frozenset()
+    # whether `sample` takes much less time than `advance`; `koopman_tension` steps, but leaves most shapes out
+    any_frame: ClassVar[bool] = False
     mapped: ClassVar[bool] = True  # whether `torch.func.vmap` can map copies of it in training
+
+    def __init__(self, configuration: Any) -> None:
+        super().__init__()
+        self.configuration = configuration
+        self.grid_points: int = configuration.grid_points
 
     @classmethod
     def own_initialisation(cls) -> str:
         """The one of the model's source."""
         return next(iter(cls.initialisations))
 
-    @abstractmethod
+    @torch.no_grad()
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """Set every weight in place; `how` is one of `initialisations` and is recorded in the preset.
 
         Raises:
             ValueError: an unknown `how`, or one that these sizes do not allow.
         """
+        bounds.check_choice("initialisation", how, self.initialisations)
+        self.set_weights(how, physics, generator)
+
+    @abstractmethod
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """Set every weight as a start of the model does: `initialise`, which has checked `how`, without gradients."""
 
     @abstractmethod
     def encode(self, displacement: Tensor) -> State:
@@ -93,6 +152,18 @@ class StringModel(nn.Module, ABC, Generic[State]):
             and the last state.
         """
 
+    def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
+        """Sample the motion on the grid, as `advance`, keeping some frames: `any_frame` models compute no others.
+
+        Args:
+            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
+
+        Returns:
+            displacement (batch, frames, grid_points), and the state after all `steps`.
+        """
+        motion, after = self.advance(state, steps)
+        return motion[:, frames - 1], after
+
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         """The learned frequencies and decays: log λ a sample, complex128, a tensor each layer.
@@ -106,25 +177,6 @@ class StringModel(nn.Module, ABC, Generic[State]):
         return self.advance(self.encode(displacement), steps, readout)[0]
 
 
-class AnyFrameModel(StringModel[State]):
-    """A model that computes some frames of a motion in much less time than all of them.
-
-    Most compute any frame by itself. `koopman_tension` steps through all frames and computes the wanted shapes alone;
-    they are the larger part of its cost.
-    """
-
-    @abstractmethod
-    def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
-        """Sample the motion on the grid, as `advance`, computing only some frames.
-
-        Args:
-            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
-
-        Returns:
-            displacement (batch, frames, grid_points), and the state after all `steps`.
-        """
-
-
 @runtime_checkable
 class KoopmanModel(Protocol):
     """A model whose latents can be had at any frame."""
@@ -132,11 +184,6 @@ class KoopmanModel(Protocol):
     def encode(self, displacement: Tensor) -> Any: ...
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
     def decode(self, latents: Tensor) -> Tensor: ...
-
-
-def check_initialisation(model: StringModel[State], how: str) -> None:
-    """Raise ValueError, naming what there is, where a model does not know `how`."""
-    bounds.check_choice("initialisation", how, model.initialisations)
 
 
 def count_parameters(model: nn.Module) -> int:

@@ -10,11 +10,30 @@ from engine import bounds
 LEAST_PHASE = 0.02  # of `koopman_tension` between nodes: a voice of more would take too much of the device's time
 
 
+@dataclass(frozen=True)
 class _Sizes:
-    """Raises ValueError, naming the field, where a size is out of its bounds."""
+    """Sizes within `bounds`: every whole number of a model's configuration, and each of its tuples.
+
+    Raises:
+        ValueError: one is out of its bounds; the message names the field.
+    """
+
+    grid_points: int = 101
 
     def __post_init__(self) -> None:
-        bounds.check_sizes(self)
+        for name, value in vars(self).items():
+            if isinstance(value, bool):
+                continue
+            if isinstance(value, int):
+                bounds.check(name, value, bounds.SIZES.get(name, bounds.OTHER_SIZES))
+            elif isinstance(value, float):
+                bounds.check(name, value, (-1e12, 1e12))
+            elif len(value) > bounds.MOST_LAYERS_OF_WIDTHS:
+                most = bounds.MOST_LAYERS_OF_WIDTHS
+                raise ValueError(f"{name} has {len(value)} entries, at most {most} may be given")
+            else:
+                for width in value:
+                    bounds.check(name, width, (1, bounds.LARGEST_WIDTH))
 
 
 @dataclass(frozen=True)
@@ -26,7 +45,6 @@ class DMDConfiguration(_Sizes):
         rank: singular vectors kept, which is the number of modes. Two for each mode of the string are enough.
     """
 
-    grid_points: int = 101
     lags: int = 2
     rank: int = 50
 
@@ -49,7 +67,6 @@ class KoopmanConfiguration(_Sizes):
             does not name it, its number of parameters has it.
     """
 
-    grid_points: int = 101
     state_size: int = 128
     encoder_widths: tuple[int, ...] = (128, 128)
     decoder_widths: tuple[int, ...] = (128, 128)
@@ -65,7 +82,6 @@ class KoopmanVarConfiguration(_Sizes):
         multiplier_widths: hidden widths of the multiplier's MLP.
     """
 
-    grid_points: int = 101
     state_size: int = 128
     multiplier_widths: tuple[int, ...] = (128, 128, 128)
 
@@ -83,7 +99,6 @@ class IntegratedPhaseConfiguration(_Sizes):
         second_order: whether g counts by Σ E_m.
     """
 
-    grid_points: int = 101
     state_size: int = 25
     encoder_widths: tuple[int, ...] = (128, 128)
     eigenvalue_widths: tuple[int, ...] = (128, 128)
@@ -103,7 +118,6 @@ class KoopmanTensionConfiguration(_Sizes):
         highest_phase: the same of the highest mode; below π/2 no two modes are pumped.
     """
 
-    grid_points: int = 101
     modes: int = 25
     degree: int = 3
     node_phase: float = 0.05
@@ -125,7 +139,6 @@ class FGRUConfiguration(_Sizes):
         width: channels of the hidden field.
     """
 
-    grid_points: int = 101
     width: int = 32
 
 
@@ -138,7 +151,6 @@ class FRNNConfiguration(_Sizes):
         depth: Fourier layers in a step.
     """
 
-    grid_points: int = 101
     width: int = 32
     depth: int = 3
 
@@ -152,7 +164,6 @@ class LRUConfiguration(_Sizes):
         layers: blocks after the first layer.
     """
 
-    grid_points: int = 101
     state_size: int = 128
     layers: int = 8
 
@@ -167,7 +178,6 @@ class S5Configuration(_Sizes):
         layers: blocks after the first layer.
     """
 
-    grid_points: int = 101
     state_size: int = 128
     hippo_blocks: int = 16
     layers: int = 6

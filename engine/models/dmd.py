@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._diagonal import DiagonalModel, KoopmanState, dense, read_weight
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.base import LINEAR_STRING, Physics
 from engine.models.configurations import DMDConfiguration
 
 _ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
@@ -37,9 +37,7 @@ class DMD(DiagonalModel):
     initialisations: ClassVar = {"physics": LINEAR_STRING}
 
     def __init__(self, configuration: DMDConfiguration) -> None:
-        super().__init__()
-        self.configuration = configuration
-        self.grid_points = configuration.grid_points
+        super().__init__(configuration)
         r = configuration.rank
         self.magnitude_log = nn.Parameter(torch.full((r,), _VANISHED, dtype=torch.float64))
         self.angle = nn.Parameter(torch.zeros(r, dtype=torch.float64))
@@ -80,7 +78,7 @@ class DMD(DiagonalModel):
         return KoopmanState(torch.complex(*b.chunk(2, dim=-1)), 0)
 
     def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(torch.complex(self.magnitude_log.double(), self.angle.double()), frames)
+        return eigenvalues.powers(self._eigenvalue_logs(), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         real, imaginary = read_weight(self.modes, readout).chunk(2, dim=-1)
@@ -88,11 +86,13 @@ class DMD(DiagonalModel):
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
-        return [torch.complex(self.magnitude_log.double(), self.angle.double())]
+        return [self._eigenvalue_logs()]
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def _eigenvalue_logs(self) -> Tensor:
+        return torch.complex(self.magnitude_log.double(), self.angle.double())
+
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """physics: the linear string itself, which is what a fit finds in linear motion. The source has no other."""
-        check_initialisation(self, how)
         c, modes = self.configuration, physics.modes
         if c.rank < 2 * modes:
             raise ValueError(
@@ -100,7 +100,7 @@ class DMD(DiagonalModel):
             )
         half = torch.exp(physics.log_eigenvalues)
         eigenvalues = torch.cat([half, half.conj()])
-        frame = torch.from_numpy(physics.resonator.shapes).T.repeat(1, 2)  # (grid_points, 2 modes)
+        frame = physics.shapes.repeat(1, 2)  # (grid_points, 2 modes)
         self._store(eigenvalues, torch.cat([frame * eigenvalues**-lag for lag in range(c.lags)]))
 
     def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:

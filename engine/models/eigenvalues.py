@@ -10,22 +10,38 @@ from __future__ import annotations
 import math
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from engine.models._tension_arrays import SLOWEST_LOG
+from engine.models._tension_law import SLOWEST_LOG
 
 VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
 STORED = frozenset({"nu_log", "theta_log"})  # the names of parameters that hold ν_log and θ_log
 
 
-def log_eigenvalues(nu_log: Tensor, theta_log: Tensor) -> Tensor:
-    """log λ = -exp(ν_log) + i exp(θ_log), complex128 (n,)."""
-    return torch.complex(-nu_log.double().exp(), theta_log.double().exp())
+class StoredEigenvalues:
+    """A module with its eigenvalues in two parameters (n,)."""
 
+    nu_log: nn.Parameter
+    theta_log: nn.Parameter
 
-def stored(log_eigenvalues: Tensor) -> tuple[Tensor, Tensor]:
-    """ν_log and θ_log (n,) of log λ, complex (n,); a mode without losses has SLOWEST_LOG."""
-    return (-log_eigenvalues.real).log().clamp(min=SLOWEST_LOG), log_eigenvalues.imag.log()
+    def eigenvalue_logs(self) -> Tensor:
+        """log λ = -exp(ν_log) + i exp(θ_log), complex128 (n,)."""
+        return torch.complex(-self.nu_log.double().exp(), self.theta_log.double().exp())
+
+    def store_eigenvalues(self, log_eigenvalues: Tensor) -> None:
+        """Store the first log λ, complex (n or fewer,); a mode without losses has SLOWEST_LOG."""
+        count = len(log_eigenvalues)
+        self.nu_log[:count] = (-log_eigenvalues.real).log().clamp(min=SLOWEST_LOG)
+        self.theta_log[:count] = log_eigenvalues.imag.log()
+
+    def draw_eigenvalues(self, generator: torch.Generator) -> Tensor:
+        """Draw them uniform in the ring 0.99 ≤ |λ| ≤ 1 (the paper, §4.2), and return ν_log in float64."""
+        u = torch.rand(2, len(self.nu_log), generator=generator, dtype=torch.float64)
+        radius_squared = 0.99**2 + u[0] * (1 - 0.99**2)
+        nu_log = torch.log(-0.5 * torch.log(radius_squared))
+        self.nu_log.copy_(nu_log)
+        self.theta_log.copy_(torch.log(2 * math.pi * u[1]))
+        return nu_log
 
 
 def powers(log_eigenvalues: Tensor, steps: Tensor) -> Tensor:
@@ -41,15 +57,3 @@ def slope_at_rest(log_eigenvalues: Tensor) -> Tensor:
     0 = Re[(1 + ib) log λ], so that b = -σ/ω.
     """
     return log_eigenvalues.real / log_eigenvalues.imag
-
-
-def draw_ring(size: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """ν_log and θ_log, float64 (size,), of eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1 (the paper, §4.2)."""
-    u = torch.rand(2, size, generator=generator, dtype=torch.float64)
-    radius_squared = 0.99**2 + u[0] * (1 - 0.99**2)
-    return torch.log(-0.5 * torch.log(radius_squared)), torch.log(2 * math.pi * u[1])
-
-
-def pack(pair: Tensor) -> Tensor:
-    """(..., 2n) with the real parts first to complex (..., n)."""
-    return torch.complex(*pair.chunk(2, dim=-1))

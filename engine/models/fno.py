@@ -17,6 +17,7 @@ recurrence needs the whole field.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -26,7 +27,7 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import channel_matrices, fgru_rollout, frnn_rollout, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.base import Physics, StringModel
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 
 if TYPE_CHECKING:
@@ -75,19 +76,18 @@ class _FourierRecurrent(StringModel[FieldState]):
     mapped: ClassVar = False  # its training calls compiled code
     kept_fields: int  # of a step, for its gradient
 
-    def __init__(self, grid_points: int, width: int) -> None:
-        super().__init__()
-        self.grid_points = grid_points
-        self.in_mapping = nn.Linear(1, width)
-        self.out_mapping = nn.Linear(width, 1)
+    def __init__(self, configuration: FGRUConfiguration | FRNNConfiguration) -> None:
+        super().__init__(configuration)
+        self.in_mapping = nn.Linear(1, configuration.width)
+        self.out_mapping = nn.Linear(configuration.width, 1)
 
     @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         """(grid_points, batch, width) to the fields after each step (steps, …)."""
 
     @abstractmethod
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
-        """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
+        """The kernel, and its weights and biases between the transforms and the map out."""
 
     def encode(self, displacement: Tensor) -> FieldState:
         return FieldState(self.in_mapping(displacement[..., None]))
@@ -105,8 +105,11 @@ class _FourierRecurrent(StringModel[FieldState]):
     def _advance_plain(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
-        step_bytes = self.kept_fields * fields.numel() * fields.element_size()
-        length = min(steps, max(1, _kept_bytes(hidden.device) // step_bytes))
+        step_bytes = max(1, self.kept_fields * fields.numel() * fields.element_size())
+        kept_bytes = KEPT_BYTES
+        if hidden.device.type == "cuda":
+            kept_bytes = int(KEPT_SHARE * torch.cuda.get_device_properties(hidden.device).total_memory)
+        length = min(steps, max(1, kept_bytes // step_bytes))
         for first in range(0, steps, length):
             count = min(length, steps - first)
             if length == steps:
@@ -120,24 +123,25 @@ class _FourierRecurrent(StringModel[FieldState]):
     def _advance_compiled(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields = hidden.detach().clone(memory_format=torch.contiguous_format)
         frames = fields.new_empty(len(fields), steps, self.grid_points)
-        self._render(fields.numpy(), frames.numpy())
+        advance, weights = self.compiled()
+        transforms, out = transform_matrices(self.grid_points), _dense_arrays([self.out_mapping])
+        for field, trajectory in zip(fields.numpy(), frames.numpy(), strict=True):
+            advance(field, trajectory, transforms, *weights, out)
         return frames, fields
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
         paper: Fourier weights and biases uniform and positive (`FourierConvolution.initialise`); the other maps
             uniform within ±1/√inputs.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for module in self.modules():
-                if isinstance(module, FourierConvolution):
-                    module.initialise(generator)
-                elif isinstance(module, nn.Linear):
-                    bound = module.in_features**-0.5
-                    nn.init.uniform_(module.weight, -bound, bound, generator=generator)
-                    nn.init.uniform_(module.bias, -bound, bound, generator=generator)
+        for module in self.modules():
+            if isinstance(module, FourierConvolution):
+                module.initialise(generator)
+            elif isinstance(module, nn.Linear):
+                bound = module.in_features**-0.5
+                nn.init.uniform_(module.weight, -bound, bound, generator=generator)
+                nn.init.uniform_(module.bias, -bound, bound, generator=generator)
 
 
 class FGRU(_FourierRecurrent):
@@ -146,8 +150,7 @@ class FGRU(_FourierRecurrent):
     kept_fields = 20
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width)
-        self.configuration = configuration
+        super().__init__(configuration)
         sizes = configuration.grid_points, configuration.width
         self.z_layer = FourierConvolution(*sizes)
         self.r_layer = FourierConvolution(*sizes)
@@ -159,22 +162,17 @@ class FGRU(_FourierRecurrent):
         weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
         return fgru_rollout(hidden, *weights, steps)
 
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = transform_matrices(self.grid_points)
-        convolutions = _convolution_arrays(self.z_layer, self.r_layer, self.h_layer)
-        out = _dense_arrays(self.out_mapping)
-        for field, trajectory in zip(hidden, frames, strict=True):
-            kernel.advance_fgru(field, trajectory, transforms, convolutions, out)
+        return kernel.advance_fgru, (_convolution_arrays([self.z_layer, self.r_layer, self.h_layer]),)
 
 
 class FRNN(_FourierRecurrent):
     """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
 
     def __init__(self, configuration: FRNNConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width)
-        self.configuration = configuration
+        super().__init__(configuration)
         self.kept_fields = 10 * configuration.depth
         sizes = configuration.grid_points, configuration.width
         self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))
@@ -197,34 +195,21 @@ class FRNN(_FourierRecurrent):
     def _pointwise(self) -> list[nn.Linear]:
         return [layer for layer in self.pointwise_layers if isinstance(layer, nn.Linear)]
 
-    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+    def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = transform_matrices(self.grid_points)
-        convolutions = _convolution_arrays(*self.fourier_layers)
-        pointwise = _dense_arrays(*self.pointwise_layers)
-        out = _dense_arrays(self.out_mapping)
-        for field, trajectory in zip(hidden, frames, strict=True):
-            kernel.advance_frnn(field, trajectory, transforms, convolutions, pointwise, out)
-
-
-def _kept_bytes(device: torch.device) -> int:
-    if device.type != "cuda":
-        return KEPT_BYTES
-    return int(KEPT_SHARE * torch.cuda.get_device_properties(device).total_memory)
+        return kernel.advance_frnn, (_convolution_arrays(self._convolutions), _dense_arrays(self._pointwise))
 
 
 @torch.no_grad()
-def _convolution_arrays(*layers: nn.Module) -> kernel.Pair:
+def _convolution_arrays(layers: Sequence[FourierConvolution]) -> kernel.Pair:
     """Weights (layers, frequency, in, real/imaginary, out), and biases in space (layers, grid_points, width)."""
-    convolutions = [layer for layer in layers if isinstance(layer, FourierConvolution)]
-    weights = torch.stack([layer.weight.detach() for layer in convolutions])
-    return weights.numpy(), torch.stack([layer.bias_field() for layer in convolutions]).numpy()
+    weights = torch.stack([layer.weight.detach() for layer in layers])
+    return weights.numpy(), torch.stack([layer.bias_field() for layer in layers]).numpy()
 
 
 @torch.no_grad()
-def _dense_arrays(*layers: nn.Module) -> kernel.Pair:
+def _dense_arrays(layers: Sequence[nn.Linear]) -> kernel.Pair:
     """Weights (layers, in, out) and biases (layers, out)."""
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    weights = torch.stack([layer.weight.T.contiguous() for layer in linear])
-    return weights.numpy(), torch.stack([layer.bias.detach() for layer in linear]).numpy()
+    weights = torch.stack([layer.weight.T.contiguous() for layer in layers])
+    return weights.numpy(), torch.stack([layer.bias.detach() for layer in layers]).numpy()

@@ -62,16 +62,14 @@ from engine.models._averaging import (
 from engine.models._cubics import hermite, integrate_parabolas
 from engine.models._diagonal import (
     dense_layers,
-    initialise_orthogonal,
+    draw_normal,
+    draw_orthogonal,
     linear_string_eigenvalues,
     read_layer,
-    store_eigenvalues,
-    store_ring,
 )
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
+from engine.models.base import LINEAR_STRING, Physics, StringModel, StringModes
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.eigenvalues import pack
-from engine.models.string_modes import StringModes
+from engine.models.eigenvalues import StoredEigenvalues
 
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
@@ -116,23 +114,10 @@ class _Motion(NamedTuple):
     phase_rate: Tensor
 
 
-class _Segments(NamedTuple):
-    """Cubics of log |z| and of its phase, one a segment.
-
-    Attributes:
-        ends: left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases.
-        alive: the latents that are loud enough to count.
-        begin: the wanted frames' place in the first segment.
-    """
-
-    ends: Tensor
-    alive: Tensor
-    begin: int
-
-
-class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
+class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     """See the module."""
 
+    any_frame: ClassVar = True
     initialisations: ClassVar = {
         "random": "",
         "physics": LINEAR_STRING,
@@ -142,10 +127,8 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     coupling_parameters: ClassVar = frozenset({"K"})
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
-        super().__init__()
-        self.configuration = c = configuration
-        self.grid_points = c.grid_points
-        n = c.state_size
+        super().__init__(configuration)
+        c, n = configuration, configuration.state_size
         self.encoder = nn.Linear(c.grid_points, 2 * n)
         self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)
         # float64: of frequencies rounded to 1e-7 the phase has within seconds a larger error than all else
@@ -168,8 +151,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(displacement)
         real, imag = z.chunk(2, dim=-1)
-        z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
-        return _at_rest(pack(z))
+        return _at_rest(torch.complex(*self._modulate(self.M_in, self.A_in, real, imag, slice(None))))
 
     def advance(
         self, state: IntegratedPhaseState, steps: int, readout: Tensor | None = None
@@ -216,23 +198,27 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         costs a sine, a cosine and an exponential a latent.
         """
         length = min(SEGMENT, self.configuration.node_spacing)
-        segments, later = self._segments(state, rates, count, length)
-        ends = segments.ends[..., segments.alive].to(self.decoder.weight.dtype)
+        ends, alive, later = self._segments(state, rates, count, length)
+        ends = ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
         radius = torch.exp(log_radius)
-        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, segments.alive)
-        frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
-        return frames[:, segments.begin : segments.begin + count], later
+        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
+        begin = (state.time + 1) % length
+        return frames.permute(1, 2, 0, 3).flatten(1, 2)[:, begin : begin + count], later
 
     def _segments(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, length: int
-    ) -> tuple[_Segments, IntegratedPhaseState]:
-        """The segments of `length` frames that hold the next `count` frames, and the state after those.
+    ) -> tuple[Tensor, Tensor, IntegratedPhaseState]:
+        """Cubics of log |z| and of its phase in the segments of `length` frames that hold the next `count` frames.
 
         Segments lie at fixed frames, so a frame is the same in whichever block it is rendered. A gain that would
         change by more than b in a segment, which no string does, has its slope held there: so within a segment no
         gain exceeds b by more than 8/27 of it.
+
+        Returns:
+            left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases; the
+            latents that are loud enough to count; and the state after those frames.
         """
         first, last = (state.time + 1) // length, (state.time + count) // length
         times = torch.arange(first, last + 2, device=state.origin.device).double() * length
@@ -243,14 +229,13 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         angle = torch.where(start == 0, 1, start).angle()  # at zero it has no gradient
         level = motion.gain - rates.sigma * times[:, None] + start.abs().clamp(min=1e-300).log()
         # a string's high modes are over long before it is, and numbers too small for float32 are slow
-        alive = (level.detach().amax((0, 1)) > SILENCE).nonzero()[:, 0]
+        alive = (level.detach() > SILENCE).flatten(0, 1).any(0).nonzero()[:, 0]
         left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
         right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
         held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)
         slopes = torch.stack([held - rates.sigma * length, motion.phase_rate * length])
         ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])
-        segments = _Segments(ends, alive, state.time + 1 - first * length)
-        return segments, IntegratedPhaseState(state.origin, end, integral)
+        return ends, alive, IntegratedPhaseState(state.origin, end, integral)
 
     def _move(self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: int) -> tuple[_Motion, Tensor]:
         """Gain and phase at `times` (times,) since frame 0, and the `integral` of a state at the time `end`.
@@ -354,9 +339,9 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         """The log eigenvalues of a quiet string: they change with the energy."""
-        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
+        return [self.eigenvalue_logs()]
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
 
         random: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder, K = 0: no physics.
@@ -370,22 +355,20 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
         The last two are prior knowledge that the paper's models do not have: say so in a table.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for network in (self.encoder_residual, self.g):
-                if network is not None:
-                    _initialise_mlp(network, generator)
-            for linear in (self.encoder, self.decoder):
-                initialise_orthogonal(linear, generator)
-            for matrix in (self.K, self.M_in, self.M_out, self.A_in, self.A_out):
-                if matrix is not None:
-                    nn.init.zeros_(matrix)
-            if how == "random":
-                store_ring(self.nu_log, self.theta_log, generator)
-            else:
-                self._initialise_linear_string(physics, generator)
-            if how == "averaging" and physics.resonator.tension_modulated:
-                self._initialise_averaging(physics)
+        for network in (self.encoder_residual, self.g):
+            if network is not None:
+                draw_normal(dense_layers(network), generator)
+                nn.init.zeros_(dense_layers(network)[-1].weight)
+        draw_orthogonal((self.encoder, self.decoder), generator)
+        for matrix in (self.K, self.M_in, self.M_out, self.A_in, self.A_out):
+            if matrix is not None:
+                nn.init.zeros_(matrix)
+        if how == "random":
+            self.draw_eigenvalues(generator)
+            return
+        self._set_linear_string(physics, generator)
+        if how == "averaging" and physics.resonator.tension_modulated:
+            self._set_averaging(physics)
 
     @torch.no_grad()
     def store_modes(self, modes: StringModes) -> None:
@@ -402,7 +385,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         analysis = modes.analysis
         starts = modes.starts
         omega = modes.log_eigenvalues.imag
-        self.nu_log[:count], self.theta_log[:count] = eigenvalues.stored(modes.log_eigenvalues)
+        self.store_eigenvalues(modes.log_eigenvalues)
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)
         self.encoder.weight[:count] = (starts.real[:, None] * analysis).to(self.K.dtype)
@@ -414,7 +397,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         coupling = coupling / self.energy_units[:count] / self._rate_units[:count, None]
         self.K[n : n + count, :count] = coupling.to(self.K.dtype)
 
-    def _initialise_averaging(self, physics: Physics) -> None:
+    def _set_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
         mode = torch.arange(n) % modes
         averaged = torch.zeros(2 * n, n, dtype=torch.float64)
@@ -429,19 +412,19 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
             self.A_in[:, :modes] = averaged_amplitude(physics)[mode] / self._modulation_units[:modes]
             self.A_out.copy_(-self.A_in)
 
-    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+    def _set_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
-        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        self.store_eigenvalues(log_eigenvalues)
         mode = torch.arange(n) % modes
         unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
         self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
         self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
-        analysis = torch.from_numpy(physics.resonator.inverse).T[mode]
+        analysis = physics.analysis[mode]
         imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
         self.encoder.weight.copy_(torch.cat([analysis, imaginary]))
         self.decoder.weight.zero_()
-        self.decoder.weight[:, :modes] = torch.from_numpy(physics.resonator.shapes).T.to(self.decoder.weight)
+        self.decoder.weight[:, :modes] = physics.shapes.to(self.decoder.weight)
 
 
 def _integrated_nodes(time: int, spacing: int) -> int:
@@ -470,13 +453,3 @@ def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = T
     for wide_in, wide_out in pairwise((values, *widths)):
         layers += [nn.Linear(wide_in, wide_out), nn.SiLU()]
     return nn.Sequential(*layers, nn.Linear(widths[-1], outputs, bias=last_bias))
-
-
-def _initialise_mlp(network: nn.Sequential, generator: torch.Generator) -> None:
-    layers = dense_layers(network)
-    for layer in layers:
-        std = layer.in_features**-0.5
-        nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
-        if layer.bias is not None:
-            nn.init.zeros_(layer.bias)
-    nn.init.zeros_(layers[-1].weight)

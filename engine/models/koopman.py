@@ -15,20 +15,16 @@ from torch import Tensor, nn
 
 from engine.models._dense import Dense, linear
 from engine.models._diagonal import (
-    KoopmanState,
     LearnedEigenvalues,
-    complex_outputs,
     dense,
     dense_layers,
-    initialise_orthogonal,
+    draw_orthogonal,
     linear_string_eigenvalues,
     linear_string_encoder,
     perceptron,
     read_layer,
-    store_eigenvalues,
-    store_ring,
 )
-from engine.models.base import Physics, check_initialisation
+from engine.models.base import Physics
 from engine.models.configurations import KoopmanConfiguration
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
@@ -42,9 +38,7 @@ class Koopman(LearnedEigenvalues):
     """See the module."""
 
     def __init__(self, configuration: KoopmanConfiguration) -> None:
-        super().__init__()
-        self.configuration = configuration
-        self.grid_points = configuration.grid_points
+        super().__init__(configuration)
         n = configuration.state_size
         self.encoder = perceptron(configuration.grid_points, *configuration.encoder_widths, 2 * n)
         if configuration.mixing_layer:
@@ -52,9 +46,6 @@ class Koopman(LearnedEigenvalues):
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.decoder = perceptron(2 * n, *configuration.decoder_widths, configuration.grid_points)
-
-    def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(complex_outputs(self.encoder, displacement), 0)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)
@@ -65,7 +56,7 @@ class Koopman(LearnedEigenvalues):
             hidden = layer(nn.functional.selu(hidden))
         return linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
         paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal layers.
@@ -74,14 +65,11 @@ class Koopman(LearnedEigenvalues):
             frequencies up to `SHARPEST` higher, which a tension-modulated string passes through. They are not
             heard at first. Prior knowledge that the paper's model does not have: say so in a table.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for layer in (*dense_layers(self.encoder), *dense_layers(self.decoder)):
-                initialise_orthogonal(layer, generator)
-            if how == "paper":
-                store_ring(self.nu_log, self.theta_log, generator)
-            else:
-                self._initialise_linear_string(physics, generator)
+        draw_orthogonal(dense_layers(self), generator)
+        if how == "paper":
+            self.draw_eigenvalues(generator)
+        else:
+            self._set_linear_string(physics, generator)
 
     @torch.no_grad()
     def store_basis(self, log_eigenvalues: Tensor, shapes: Tensor, generator: torch.Generator) -> None:
@@ -91,22 +79,20 @@ class Koopman(LearnedEigenvalues):
             log_eigenvalues: complex (state_size,).
             shapes: (state_size, grid_points).
         """
-        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        self.store_eigenvalues(log_eigenvalues)
         synthesis = torch.cat([shapes.T, torch.zeros_like(shapes.T)], dim=1)
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, held_at=HELD_AT_EXACT, spare=False)
 
-    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
-        c, modes = self.configuration, physics.modes
+    def _set_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        c = self.configuration
         sharpest = SHARPEST if physics.resonator.tension_modulated else 0.0
-        log_eigenvalues = linear_string_eigenvalues(c.state_size, physics, generator, sharpest)
-        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = torch.from_numpy(physics.resonator.inverse).T[torch.arange(c.state_size) % modes]
+        self.store_eigenvalues(linear_string_eigenvalues(c.state_size, physics, generator, sharpest))
         encoder = dense_layers(self.encoder)
         if c.mixing_layer:
             nn.init.eye_(encoder.pop().weight)
-        _store_linear_map(encoder, linear_string_encoder(analysis), generator)
+        _store_linear_map(encoder, linear_string_encoder(c.state_size, physics), generator)
         synthesis = torch.zeros(c.grid_points, 2 * c.state_size)
-        synthesis[:, :modes] = torch.from_numpy(physics.resonator.shapes).T
+        synthesis[:, : physics.modes] = physics.shapes
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, SPARE_WEIGHT)
 
 

@@ -48,44 +48,44 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models._tension_arrays import resonator_arrays
-from engine.models._tension_law import KoopmanTensionState, TensionLaw
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
+from engine.models._tension_law import (
+    CURVES,
+    KoopmanTensionState,
+    TensionLaw,
+    resonator_arrays,
+    shapes_of_arrays,
+)
+from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.configurations import KoopmanTensionConfiguration
 
 SERIES = 1 / 12  # r and p of small hω
 
 
-class KoopmanTension(TensionLaw, AnyFrameModel[KoopmanTensionState]):
+class KoopmanTension(TensionLaw, StringModel[KoopmanTensionState]):
     """See the module. The resonator is a buffer: `for_resonator` gives the same model of another."""
 
+    any_frame: ClassVar = True
     initialisations: ClassVar = {
         "kicks": f"{LINEAR_STRING}, and how tension couples them",
         "series": f"{LINEAR_STRING}, how tension couples them, and the error of kicks for small steps",
     }
 
     def __init__(self, configuration: KoopmanTensionConfiguration) -> None:
-        super().__init__()
-        self.configuration = c = configuration
-        self.grid_points = c.grid_points
-        curve = (c.degree + 1,)
-        self.A = nn.Parameter(torch.zeros(curve, dtype=torch.float64))
-        self.r = nn.Parameter(torch.zeros(curve, dtype=torch.float64))
-        self.p = nn.Parameter(torch.zeros(curve, dtype=torch.float64))
-        for name in ("nu_log", "theta_log", "coupling", "stretch"):
-            self.register_buffer(name, torch.zeros(c.modes, dtype=torch.float64))
-        self.register_buffer("shapes", torch.zeros(c.modes, c.grid_points, dtype=torch.float64))
-        self.register_buffer("analysis", torch.zeros(c.grid_points, c.modes, dtype=torch.float64))
+        super().__init__(configuration)
+        for name, shape in shapes_of_arrays(configuration).items():
+            zeros = torch.zeros(shape, dtype=torch.float64)
+            if name in CURVES:
+                self.register_parameter(name, nn.Parameter(zeros))
+            else:
+                self.register_buffer(name, zeros)
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. kicks: no correction. series: those that backward error analysis knows."""
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for curve in (self.A, self.r, self.p):
-                curve.zero_()
-            if how == "series":
-                self.r[0] = self.p[0] = SERIES
-            self._take(physics)
+        for name in CURVES:
+            getattr(self, name).zero_()
+        if how == "series":
+            self.r[0] = self.p[0] = SERIES
+        self._take(physics)
 
     @torch.no_grad()
     def for_resonator(self, physics: Physics) -> KoopmanTension:
@@ -93,14 +93,10 @@ class KoopmanTension(TensionLaw, AnyFrameModel[KoopmanTensionState]):
         resonator = physics.resonator
         sizes = replace(self.configuration, modes=resonator.modes, grid_points=resonator.points)
         other = KoopmanTension(sizes)
-        for name in ("A", "r", "p"):
+        for name in CURVES:
             getattr(other, name).copy_(getattr(self, name))
         other._take(physics)
         return other.train(self.training)
-
-    @torch.no_grad()
-    def advance_modes(self, state: KoopmanTensionState, steps: int) -> tuple[Tensor, KoopmanTensionState]:
-        return super().advance_modes(state, steps)
 
     def _take(self, physics: Physics) -> None:
         arrays = resonator_arrays(self.configuration, physics.resonator, physics.rate_hz, physics.scale_m)

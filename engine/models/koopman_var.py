@@ -14,20 +14,18 @@ from torch import Tensor, nn
 
 from engine.models._dense import Dense
 from engine.models._diagonal import (
-    KoopmanState,
     LearnedEigenvalues,
     complex_outputs,
     dense,
     dense_layers,
-    initialise_orthogonal,
+    draw_normal,
+    draw_orthogonal,
     linear_string_eigenvalues,
     linear_string_encoder,
     perceptron,
     read_layer,
-    store_eigenvalues,
-    store_ring,
 )
-from engine.models.base import Physics, check_initialisation
+from engine.models.base import Physics
 from engine.models.configurations import KoopmanVarConfiguration
 
 
@@ -35,18 +33,13 @@ class KoopmanVar(LearnedEigenvalues):
     """See the module."""
 
     def __init__(self, configuration: KoopmanVarConfiguration) -> None:
-        super().__init__()
-        self.configuration = configuration
-        self.grid_points = configuration.grid_points
+        super().__init__(configuration)
         n = configuration.state_size
         self.encoder = Dense(configuration.grid_points, 2 * n)
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
-
-    def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(complex_outputs(self.encoder, displacement), 0)
 
     def observed(self, latents: Tensor) -> Tensor:
         """The multiplied states m(|z|²) ⊙ z."""
@@ -60,7 +53,7 @@ class KoopmanVar(LearnedEigenvalues):
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(states, *read_layer(self.decoder, readout))
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
         paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder.
@@ -68,28 +61,17 @@ class KoopmanVar(LearnedEigenvalues):
             the others repeat those frequencies with other decay rates and are not yet heard. A multiplier of 1
             starts it as the linear string. Prior knowledge that the paper's model does not have: say so in a table.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for layer in dense_layers(self.multiplier):
-                std = layer.in_features**-0.5
-                nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
-                nn.init.zeros_(layer.bias)
-            for layer in (self.encoder, self.decoder):
-                initialise_orthogonal(layer, generator)
-            if how == "paper":
-                store_ring(self.nu_log, self.theta_log, generator)
-            else:
-                self._initialise_linear_string(physics, generator)
-
-    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
-        n, modes = self.configuration.state_size, physics.modes
-        log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
-        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = torch.from_numpy(physics.resonator.inverse).T[torch.arange(n) % modes]
-        self.encoder.weight.copy_(linear_string_encoder(analysis))
+        n = self.configuration.state_size
+        draw_normal(dense_layers(self.multiplier), generator)
+        draw_orthogonal((self.encoder, self.decoder), generator)
+        if how == "paper":
+            self.draw_eigenvalues(generator)
+            return
+        self.store_eigenvalues(linear_string_eigenvalues(n, physics, generator))
+        self.encoder.weight.copy_(linear_string_encoder(n, physics))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
-        self.decoder.weight[:, :modes] = torch.from_numpy(physics.resonator.shapes).T
+        self.decoder.weight[:, : physics.modes] = physics.shapes
         last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1

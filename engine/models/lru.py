@@ -11,33 +11,30 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models import eigenvalues
-from engine.models.configurations import LRUConfiguration
+from engine.models.eigenvalues import STORED, StoredEigenvalues
 from engine.models.ssm import DiagonalSSM, SSMString
 
 
-class LRULayer(DiagonalSSM):
+class LRULayer(StoredEigenvalues, DiagonalSSM):
     """A linear recurrent unit."""
 
     conjugates: ClassVar = 1
 
-    def __init__(self, states: int, inputs: int, outputs: int) -> None:
-        super().__init__(states, inputs, outputs)
+    def __init__(self, states: int, points: int) -> None:
+        super().__init__(states, points)
         self.nu_log = nn.Parameter(torch.zeros(states))
         self.theta_log = nn.Parameter(torch.zeros(states))
         self.gamma_log = nn.Parameter(torch.zeros(states))
 
     def log_eigenvalues(self) -> Tensor:
-        return eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)
+        return self.eigenvalue_logs()
 
     def input_matrix(self) -> Tensor:
         return self.B * self.gamma_log.exp()[:, None, None]
 
     def initialise(self, how: str, generator: torch.Generator) -> None:
         """λ uniform in the ring 0.99 ≤ |λ| ≤ 1; γ keeps the states at unit variance under white noise."""
-        nu_log, theta_log = eigenvalues.draw_ring(self.nu_log.shape[0], generator)
-        self.nu_log.copy_(nu_log)
-        self.theta_log.copy_(theta_log)
+        nu_log = self.draw_eigenvalues(generator)
         self.gamma_log.copy_(0.5 * torch.log(-torch.expm1(-2 * nu_log.exp())))
         self.B.normal_(std=(2 * self.B.shape[2]) ** -0.5, generator=generator)
         self.C.normal_(std=self.C.shape[1] ** -0.5, generator=generator)
@@ -45,7 +42,7 @@ class LRULayer(DiagonalSSM):
 
     def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
         modes = len(log_eigenvalues)
-        self.nu_log[:modes], self.theta_log[:modes] = eigenvalues.stored(log_eigenvalues)
+        self.store_eigenvalues(log_eigenvalues)
         self.gamma_log[:modes] = 0
         self.B[:modes] = input_matrix.to(self.B)
 
@@ -53,12 +50,7 @@ class LRULayer(DiagonalSSM):
 class LRU(SSMString):
     """See the module."""
 
-    eigenvalue_parameters: ClassVar = eigenvalues.STORED
+    eigenvalue_parameters: ClassVar = STORED
 
-    def __init__(self, configuration: LRUConfiguration) -> None:
-        points, states = configuration.grid_points, configuration.state_size
-        super().__init__(
-            LRULayer(states, points, points),
-            [LRULayer(states, points, points) for _ in range(configuration.layers)],
-        )
-        self.configuration = configuration
+    def build_layer(self) -> LRULayer:
+        return LRULayer(self.configuration.state_size, self.grid_points)

@@ -14,7 +14,6 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models.configurations import S5Configuration
 from engine.models.ssm import DiagonalSSM, SSMString, draw_lecun, scale_rows
 
 # the initial draw of Δ, in the source's arbitrary unit of time; Smith et al. have 1e-3 as the smallest, too
@@ -39,8 +38,8 @@ class S5Layer(DiagonalSSM):
 
     conjugates: ClassVar = 2
 
-    def __init__(self, states: int, inputs: int, outputs: int, hippo_blocks: int) -> None:
-        super().__init__(states, inputs, outputs)
+    def __init__(self, states: int, points: int, hippo_blocks: int) -> None:
+        super().__init__(states, points)
         self.hippo_blocks = hippo_blocks
         self.Lambda_re = nn.Parameter(torch.full((states,), -0.5))
         self.Lambda_im = nn.Parameter(torch.zeros(states))
@@ -58,18 +57,18 @@ class S5Layer(DiagonalSSM):
         The paper's code draws C by `lecun_normal` on (outputs, 2P, 2), whose fan-in counts the outputs, too: 2P · H
         with 2P states of both halves. For "physics" it is 2P, and the smallest Δ is another, as in its runs so far.
         """
-        states, _, inputs = self.B.shape
-        outputs, size = self.C.shape[0], 2 * states // self.hippo_blocks
+        states, _, points = self.B.shape
+        size = 2 * states // self.hippo_blocks
         rates, vectors = hippo_normal(size)
         rates, vectors = rates[: size // 2], vectors[:, : size // 2]
         self.Lambda_re.copy_(rates.real.repeat(self.hippo_blocks))
         self.Lambda_im.copy_(rates.imag.repeat(self.hippo_blocks))
         everywhere = torch.block_diag(*[vectors] * self.hippo_blocks)  # (2 states, states)
-        real_B = draw_lecun((2 * states, inputs), 2 * states, generator)
+        real_B = draw_lecun((2 * states, points), 2 * states, generator)
         drawn = everywhere.mH @ real_B.to(everywhere)
         self.B.copy_(torch.stack([drawn.real, drawn.imag], dim=1))
-        fan_in = 2 * states * (outputs if how == "paper" else 1)
-        pair = draw_lecun((outputs, 2 * states, 2), fan_in, generator)
+        fan_in = 2 * states * (points if how == "paper" else 1)
+        pair = draw_lecun((points, 2 * states, 2), fan_in, generator)
         self.C.copy_(torch.view_as_real(torch.view_as_complex(pair) @ everywhere))
         self.D.normal_(generator=generator)
         self.log_step.uniform_(math.log(SMALLEST_STEP[how]), math.log(LARGEST_STEP), generator=generator)
@@ -91,12 +90,6 @@ class S5(SSMString):
 
     eigenvalue_parameters: ClassVar = frozenset({"Lambda_re", "Lambda_im", "log_step"})
 
-    def __init__(self, configuration: S5Configuration) -> None:
-        points = configuration.grid_points
-        states = configuration.state_size // 2
-        blocks = configuration.hippo_blocks
-        super().__init__(
-            S5Layer(states, points, points, blocks),
-            [S5Layer(states, points, points, blocks) for _ in range(configuration.layers)],
-        )
-        self.configuration = configuration
+    def build_layer(self) -> S5Layer:
+        c = self.configuration
+        return S5Layer(c.state_size // 2, c.grid_points, c.hippo_blocks)

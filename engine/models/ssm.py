@@ -12,17 +12,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from engine.models._dense import Dense, linear
-from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation
+from engine.models.base import LINEAR_STRING, Physics, StringModel
+from engine.models.configurations import LRUConfiguration, S5Configuration
 from engine.models.eigenvalues import powers, slope_at_rest
 
 CHUNK = 32  # steps between two exact carries; fewer cost more carries, more collect more rounding
@@ -157,17 +158,17 @@ def scale_rows(matrix: Tensor, factor: Tensor) -> Tensor:
 class DiagonalSSM(nn.Module, ABC):
     """x_k = λ x_{k-1} + B̄ u_k, y_k = Re(C̄ x_k) + D u_k with complex diagonal dynamics.
 
-    B is (states, 2, inputs) and C (outputs, states, 2), real and imaginary parts in the axis of size 2: products with
+    B is (states, 2, points) and C (points, states, 2), real and imaginary parts in the axis of size 2: products with
     interleaved real and imaginary parts then need no copy. Subclasses say how λ and B̄ follow from what is stored.
     """
 
     conjugates: ClassVar[int]  # states that each stored one stands for: C̄ = conjugates · C
 
-    def __init__(self, states: int, inputs: int, outputs: int) -> None:
+    def __init__(self, states: int, points: int) -> None:
         super().__init__()
-        self.B = nn.Parameter(torch.zeros(states, 2, inputs))
-        self.C = nn.Parameter(torch.zeros(outputs, states, 2))
-        self.D = nn.Parameter(torch.zeros(outputs))
+        self.B = nn.Parameter(torch.zeros(states, 2, points))
+        self.C = nn.Parameter(torch.zeros(points, states, 2))
+        self.D = nn.Parameter(torch.zeros(points))
 
     @abstractmethod
     def log_eigenvalues(self) -> Tensor:
@@ -311,11 +312,15 @@ class SSMString(StringModel[SSMState], ABC):
 
     initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
 
-    def __init__(self, first_layer: DiagonalSSM, blocks: Sequence[DiagonalSSM]) -> None:
-        super().__init__()
-        self.grid_points = grid_points = first_layer.C.shape[0]
-        self.first_layer = first_layer
-        self.layers = nn.ModuleList([GatedBlock(seq, grid_points) for seq in blocks])
+    def __init__(self, configuration: LRUConfiguration | S5Configuration) -> None:
+        super().__init__(configuration)
+        self.first_layer = self.build_layer()
+        blocks = [GatedBlock(self.build_layer(), self.grid_points) for _ in range(configuration.layers)]
+        self.layers = nn.ModuleList(blocks)
+
+    @abstractmethod
+    def build_layer(self) -> DiagonalSSM:
+        """A layer of the model's kind and sizes."""
 
     def encode(self, displacement: Tensor) -> SSMState:
         origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
@@ -327,7 +332,7 @@ class SSMString(StringModel[SSMState], ABC):
         stored = [(ssm.log_eigenvalues(), ssm.conjugates) for ssm in self._ssms()]
         return [torch.cat([log, log.conj()]) if conjugates == 2 else log for log, conjugates in stored]
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
         paper: as the source draws every layer.
@@ -335,42 +340,39 @@ class SSMString(StringModel[SSMState], ABC):
             states are not yet heard, and the blocks, which correct it, start at zero. Prior knowledge that the
             paper's models do not have: say so in a table.
         """
-        check_initialisation(self, how)
-        with torch.no_grad():
-            for ssm_or_block in (self.first_layer, *self.layers):
-                ssm_or_block.initialise(how, generator)
-            if how == "physics":
-                self._initialise_linear_string(physics)
+        self.first_layer.initialise(how, generator)
+        for block in self._blocks():
+            block.initialise(how, generator)
+        if how == "physics":
+            self._set_linear_string(physics)
 
-    def _initialise_linear_string(self, physics: Physics) -> None:
-        points = self.grid_points
-        modes = physics.modes
-        first = self.first_layer
+    def _set_linear_string(self, physics: Physics) -> None:
+        modes, first = physics.modes, self.first_layer
         if first.B.shape[0] < modes:
             raise ValueError(
                 f"initialisation 'physics' needs a stored state for each of the {modes} modes, not {first.B.shape[0]}"
             )
         log_eigenvalues = physics.log_eigenvalues
         # q_k = Re(z λᵏ) with Re z = q₀; Im z makes the velocity zero
-        analysis = torch.from_numpy(physics.resonator.inverse).T
-        imaginary = slope_at_rest(log_eigenvalues)[:, None] * analysis
-        first.set_modes(log_eigenvalues, torch.stack([analysis, imaginary], dim=1))
+        imaginary = slope_at_rest(log_eigenvalues)[:, None] * physics.analysis
+        first.set_modes(log_eigenvalues, torch.stack([physics.analysis, imaginary], dim=1))
         first.C.zero_()
-        first.C[:, :modes, 0] = (torch.from_numpy(physics.resonator.shapes).T / first.conjugates).to(first.C)
-        for block in self.layers:
-            assert isinstance(block, GatedBlock)
-            block.gate.weight[:points].zero_()
+        first.C[:, :modes, 0] = (physics.shapes / first.conjugates).to(first.C)
+        for block in self._blocks():
+            block.gate.weight[: self.grid_points].zero_()
+
+    def _blocks(self) -> list[GatedBlock]:
+        return [block for block in self.layers if isinstance(block, GatedBlock)]
 
     def _ssms(self) -> list[DiagonalSSM]:
         return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first
 
     def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
         # batch statistics need the whole time at once
-        at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
+        at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // max(1, len(state.latents[0])))
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
-        layers = cast("Iterable[GatedBlock]", self.layers)
-        folded = (state.folded or tuple(block.fold() for block in layers)) if rendering else ()
-        blocks: Sequence[GatedBlock | FoldedBlock] = folded or list(layers)
+        folded = (state.folded or tuple(block.fold() for block in self._blocks())) if rendering else ()
+        blocks: Sequence[GatedBlock | FoldedBlock] = folded or self._blocks()
         parts = []
         for done in range(0, steps, at_once):
             part, state = self._stretch(blocks, state, min(at_once, steps - done))

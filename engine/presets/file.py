@@ -13,7 +13,8 @@ import json
 import math
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +26,7 @@ from safetensors import SafetensorError, safe_open
 
 from engine import bounds
 from engine.models import build_model, read_model_configuration
-from engine.models._tension_arrays import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
+from engine.models._tension_law import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
 from engine.plain_text import name_text, one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
@@ -169,29 +170,21 @@ def _digest(path: Path, changed_ns: int, size_bytes: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-class _open:
+@contextmanager
+def _open(path: Path) -> Iterator[Any]:
     """`safe_open` with the file checked first and every failure in our words."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> Any:
-        try:
-            _check_kind(self._path, self._path.stat())
-            check_header(self._path)
-            self._file = safe_open(self._path, framework="numpy")
-            return self._file.__enter__()
-        except FileNotFoundError:
-            raise PresetError(f"{self._path}: no such preset file; check the path") from None
-        except (SafetensorError, UnicodeError) as error:
-            raise PresetError(
-                f"{self._path}: not a whole safetensors file ({error}); get the preset again"
-            ) from error
-        except OSError as error:
-            raise PresetError(f"{self._path}: cannot be read ({error.strerror or error})") from error
-
-    def __exit__(self, *exception: Any) -> None:
-        self._file.__exit__(*exception)
+    try:
+        _check_kind(path, path.stat())
+        check_header(path)
+        opened = safe_open(path, framework="numpy")
+    except FileNotFoundError:
+        raise PresetError(f"{path}: no such preset file; check the path") from None
+    except (SafetensorError, UnicodeError) as error:
+        raise PresetError(f"{path}: not a whole safetensors file ({error}); get the preset again") from error
+    except OSError as error:
+        raise PresetError(f"{path}: cannot be read ({error.strerror or error})") from error
+    with opened as file:
+        yield file
 
 
 def _check_kind(path: Path, state: os.stat_result) -> None:
@@ -220,17 +213,12 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
         raise PresetError(f"{path}: has no {METADATA_KEY!r} metadata; it is not a preset of this program")
     try:
         data = parse_json(text, "metadata")
-    except SchemaError as error:
-        raise PresetError(f"{path}: {error}; get the preset again") from error
-    if not isinstance(data, dict):
-        raise PresetError(f"{path}: metadata is no JSON object; get the preset again")
-    try:
-        data = migrated(data)
+        if not isinstance(data, dict):
+            raise SchemaError("metadata is no JSON object")
+        info = read(PresetInfo, migrated(data), "metadata")
+        configuration = _configuration(info)
     except UnknownVersion as error:
         raise PresetError(f"{path}: {error}") from error
-    try:
-        info = read(PresetInfo, data, "metadata")
-        configuration = _configuration(info)
     except SchemaError as error:
         raise PresetError(f"{path}: {error}; get the preset again or train it again") from error
     if configuration.grid_points != info.grid_points:

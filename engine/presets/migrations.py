@@ -31,11 +31,6 @@ def _knows(data: Metadata) -> Metadata:
     return {**data, "knows": knows}
 
 
-def _one_string(data: Metadata) -> Metadata:
-    """2 → 3: a preset may be of a family of strings; those before are of one."""
-    return dict(data)
-
-
 def _displacement_alone(data: Metadata) -> Metadata:
     """3 → 4: every model sets out from the displacement; no other input was ever shipped."""
     sizes = data.get("model_configuration")
@@ -78,7 +73,7 @@ def _pair(data: object) -> tuple[float, float]:
 
 MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {
     1: _knows,
-    2: _one_string,
+    2: dict,  # a preset may be of a family of strings; those before are of one
     3: _displacement_alone,
     4: _range_of_training,
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from engine.values.string import StringParameters
 
@@ -12,13 +11,6 @@ BRIGHT_HZ = 3_000.0  # where the second decay time is given
 NEAR = 1.03  # of a range's end: nothing changes there
 
 Bounds = tuple[float, float]
-
-
-class Beyond(NamedTuple):
-    """A difference of a string from a family; `error_grows`: it is known to be played less well."""
-
-    words: str
-    error_grows: bool
 
 
 @dataclass(frozen=True)
@@ -48,34 +40,18 @@ class StringFamily:
         low, high = self.half_width
         return {"gaussian": (low, high), "raised_cosine": (2 * low, 2 * high)}
 
-    def outside(self, string: StringParameters) -> list[Beyond]:
-        """The differences of a string from these; empty where there are none.
-
-        The error of a model grows where high modes ring longer than in the training. With pitch, inharmonicity and
-        the decay of the first mode it does not, as measured in `docs/many-strings.md`.
-        """
-        sigma, pitch_hz = string.decay_rate(1), string.pitch_hz
-        bright = max(2, round(BRIGHT_HZ / max(pitch_hz, 1.0)))
-        bright_t60_s = math.log(1000) / max(string.decay_rate(bright), 1e-9)
-        facts = (
-            ("pitch", pitch_hz, self.pitch_hz, " Hz", False),
-            ("inharmonicity", inharmonicity(string), self.inharmonicity, "", False),
-            ("decay time", math.log(1000) / max(sigma, 1e-9), (self.t60_s,), " s", False),
-            ("decay time near 3 kHz", bright_t60_s, (self.bright_t60_s,), " s", bright_t60_s > self.bright_t60_s[1]),
-        )
-        return [
-            Beyond(
-                f"{name} {value:.3g}{unit} is outside the trained "
-                + " and ".join(f"{low:g} … {high:g}{unit}" for low, high in trained),
-                error_grows,
-            )
-            for name, value, trained, unit, error_grows in facts
-            if not any(low / NEAR <= value <= high * NEAR for low, high in trained)
-        ]
-
     def warnings(self, string: StringParameters) -> list[str]:
-        """The differences of `outside` in words, where the error of a model is known to grow."""
-        return [one.words for one in self.outside(string) if one.error_grows]
+        """The reason why a model of these plays a string less well, in words; empty where it plays it as well.
+
+        Its error grows where high modes ring longer than in the training. With pitch, inharmonicity and the decay of
+        the first mode it does not, as measured in `docs/many-strings.md`.
+        """
+        bright = max(2, round(BRIGHT_HZ / max(string.pitch_hz, 1.0)))
+        t60_s = math.log(1000) / max(string.decay_rate(bright), 1e-9)
+        low, high = self.bright_t60_s
+        if t60_s <= high * NEAR:
+            return []
+        return [f"decay time near 3 kHz {t60_s:.3g} s is outside the trained {low:g} … {high:g} s"]
 
 
 def inharmonicity(string: StringParameters) -> float:

@@ -115,25 +115,19 @@ class RecordedAttack:
 
     def __post_init__(self) -> None:
         bounds.check("rate_hz", self.rate_hz, (1_000, 48_000), "Hz")
-        count = sum(map(len, self.rows))
-        bounds.check("samples of an attack", count, (1, LONGEST_ATTACK_S * self.rate_hz))
-        if not any(map(any, self.rows)):
+        samples = [sample for row in self.rows for sample in row]
+        bounds.check("samples of an attack", len(samples), (1, LONGEST_ATTACK_S * self.rate_hz))
+        if not any(samples):
             raise ValueError("an attack must not be silent")
-        for row in self.rows:
-            for sample in row:
-                bounds.check("sample", sample, (-ATTACK_PEAK, ATTACK_PEAK))
+        for sample in samples:
+            bounds.check("sample", sample, (-ATTACK_PEAK, ATTACK_PEAK))
 
     @staticmethod
     def of(samples: Array, rate_hz: int) -> RecordedAttack:
         """The attack from samples (frames,) of any level."""
         whole = np.rint(samples / np.abs(samples).max() * ATTACK_PEAK).astype(int).tolist()
-        return RecordedAttack(
-            rate_hz,
-            tuple(
-                tuple(whole[first : first + bounds.MOST_ENTRIES])
-                for first in range(0, len(whole), bounds.MOST_ENTRIES)
-            ),
-        )
+        most = bounds.MOST_ENTRIES
+        return RecordedAttack(rate_hz, tuple(tuple(whole[at : at + most]) for at in range(0, len(whole), most)))
 
     @property
     def samples(self) -> Array:

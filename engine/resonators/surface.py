@@ -35,19 +35,9 @@ class Surface:
     sides: Array
     rows: Array
 
-    @classmethod
-    def below(cls, shape: str, length_m: float, width_m: float, wavenumber: float) -> Surface:
-        """All modes up to a wavenumber, by rising wavenumber; of a pair the cosine comes first."""
-        sides = np.array([SHAPES.index(shape), length_m, width_m], np.float64)
-        return cls(sides, modes_below(shape, length_m / width_m, wavenumber * kernel.size(sides)))
-
     @property
     def round(self) -> bool:
         return bool(self.sides[0] == kernel.CIRCLE)
-
-    @property
-    def area_m2(self) -> float:
-        return float(math.pi * kernel.size(self.sides) ** 2)
 
     @property
     def wavenumber(self) -> Array:

@@ -5,7 +5,6 @@
 """
 
 from engine.truth.oracle import solve_dop853
-from engine.truth.splitting import SplittingSolver, default_substeps
-from engine.truth.state import ModalState
+from engine.truth.splitting import ModalState, SplittingSolver, default_substeps
 
 __all__ = ["ModalState", "SplittingSolver", "default_substeps", "solve_dop853"]

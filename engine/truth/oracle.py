@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine.array_library import Values, as_array, library_of
 from engine.resonators.base import Resonator
-from engine.truth.state import ModalState
+from engine.truth.splitting import ModalState
 
 REPORT_EVERY = 0.01  # of a trajectory
 
@@ -58,4 +58,4 @@ def solve_dop853(
         if not solution.success:
             raise RuntimeError(f"DOP853 failed: {solution.message}")
         trajectories.append(solution.y[:modes].T)
-    return library_of(state.amplitude).asarray(np.stack(trajectories))
+    return library_of(state.amplitude).asarray(np.reshape(trajectories, (len(starts), steps + 1, modes)))

@@ -13,16 +13,44 @@ import math
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.array_library import Values, as_array, library_of
+from engine.array_library import Values, as_array, in_double, library_of
 from engine.bounds import MOST_SUBSTEPS, SUBSTEPS_IN_A_PERIOD
 from engine.kernels.rotation import rotation
 from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.base import Array, Resonator
-from engine.truth.state import ModalState
+
+
+@dataclass(frozen=True)
+class ModalState:
+    """The state of a string, which is passed in and out: arrays, or tensors, float64 (batch, modes).
+
+    Modal amplitudes are in m, their velocities in m/s.
+    """
+
+    amplitude: Values
+    velocity: Values
+
+    def __post_init__(self) -> None:
+        if self.amplitude.ndim != 2 or self.amplitude.shape != self.velocity.shape:
+            raise ValueError(
+                "a modal state needs amplitude and velocity of one shape (batch, modes), not "
+                f"{tuple(self.amplitude.shape)} and {tuple(self.velocity.shape)}"
+            )
+
+    @classmethod
+    def at_rest(cls, amplitude: Values) -> ModalState:
+        """A string released with zero velocity from `amplitude` (batch, modes) in m."""
+        released = in_double(amplitude)
+        return cls(released, library_of(released).zeros_like(released))
+
+    @property
+    def modes(self) -> int:
+        return int(self.amplitude.shape[1])
 
 
 def default_substeps(resonator: Resonator, rate_hz: float) -> int:

@@ -10,7 +10,7 @@ from engine.values.number import Number
 
 @dataclass(frozen=True)
 class Amp:
-    """An amplifier for the sum of all strings, whose sound is in mono: see `engine.effects.amp`.
+    """An amplifier for the sum of all strings, in mono: see `engine.kernels.amplifier`. Its cabinet is a body.
 
     Attributes:
         drive_db: gain before the shape that bends peaks; 0: there is no amplifier.

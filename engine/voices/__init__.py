@@ -4,10 +4,10 @@ They are compiled in `engine.kernels`.
 
 program    what all voices of a source share at one sample rate
 programs   those of a preset, and of the truth
-ear        the signal of a string for who listens to it
+ear        the signal of a string for who listens to it, and velocity from displacement
+memory     what kernels read and write
 voice      one pluck of a program
 mixer      the sum: what a device plays
-derivative velocity from displacement
 offline    a voice for a file
 """
 

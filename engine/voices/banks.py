@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import singledispatch
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, singledispatch
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import nn
+from torch import Tensor, nn
 
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import MOST_LATENTS
@@ -21,7 +21,7 @@ from engine.models.dmd import DMD
 from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, IntegratedPhase
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
-from engine.voices.program import Program, Strike, fits, packed, voice_ends_s
+from engine.voices.program import Program, fits, packed, voice_ends_s
 
 
 @singledispatch
@@ -39,7 +39,6 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
     if max(widths) > MOST_LATENTS or len(widths) >= MOST_WIDTHS:
         return None
     rates = model._rates()
-    units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
     network = np.zeros(0, np.float32)
     at_zero = torch.zeros(2 * n)
     sizes = [0]
@@ -49,27 +48,20 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
         sizes = [n, *(layer.out_features for layer in layers)]
         network = np.concatenate([_flat(layer) for layer in layers])
     turn = rates.coupling[:, n:]
-    modulation = largest_m = torch.zeros(0, dtype=torch.float64)
-    if model.M_out is not None:
-        matrix = (model.M_out * model._modulation_units).double().view(2, n, 2, n)
-        modulation = matrix.permute(1, 3, 0, 2).contiguous()  # (of, by, gain or turn, of Re z² or of Im z²)
-        largest_m = modulation.abs().sum((2, 3)).amax(0)
+    matrix = (model.M_out * model._modulation_units).double().view(2, n, 2, n)
+    modulation = matrix.permute(1, 3, 0, 2).contiguous()  # (of, by, gain or turn, of Re z² or of Im z²)
     change = torch.zeros(0, dtype=torch.float64)
     if model.A_out is not None:
         change = (model.A_out * model._modulation_units[:n]).double().T.contiguous()
-    ratio = info.rate_hz / rate_hz
     values = {
-        "modes": n,
-        "ratio": ratio,
         "spacing": c.node_spacing,
         "limit": GAIN_LIMIT,
         "second_order": c.second_order,
         "higher": model.g is not None or c.adiabatic,
         "adiabatic": c.adiabatic,
         "layers": len(sizes) - 1 if model.g is not None else 0,
-        "modulates": model.M_out is not None,
-        "loudness": math.log(info.scale_m / FULL_SCALE_M),
-        "early": math.ceil(SETTLED * c.node_spacing / ratio / QUANTUM) * QUANTUM,
+        "modulates": True,
+        "early": math.ceil(SETTLED * c.node_spacing / (info.rate_hz / rate_hz) / QUANTUM) * QUANTUM,
         "widths": sizes + [0] * (MOST_WIDTHS - len(sizes)),
     }
     parts = (
@@ -78,30 +70,16 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
         rates.coupling,
         rates.coupling.abs().amax(1),
         turn / rates.omega,
-        units,
+        model.energy_units,
         model._rate_units,
         at_zero.double(),
         torch.from_numpy(np.pad(network, (0, len(network) % 2)).view(np.float64)),
         modulation,
-        largest_m,
+        modulation.abs().sum((2, 3)).amax(0),
         change,
     )
-    memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
-    weight, offset = model.decoder.weight.double(), model.decoder.bias.double()
-
-    def start(displacement_m: Array) -> tuple[Array, Array]:
-        return _polar(_origin(model, displacement_m / info.scale_m))
-
-    if rate_hz != info.rate_hz:
-        weight = weight * torch.from_numpy(fits((rates.omega * ratio).numpy())).repeat(2)
-
-    decoder, constant = weight.numpy(), offset.numpy()
-
-    def read(weights: Array) -> tuple[Array, Array]:
-        scale = info.scale_m / FULL_SCALE_M
-        return scale * weights.T @ decoder, scale * constant @ weights
-
-    return _bank(memory, n, rate_hz, start, read, info)
+    decoder = model.decoder.weight.double(), model.decoder.bias.double()
+    return _bank(info, rate_hz, values, parts, partial(_origin, model), *decoder)
 
 
 @bank_program.register
@@ -114,42 +92,48 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
     if not 0 < n <= MOST_LATENTS:
         return None
     zeros = torch.zeros(n, dtype=torch.float64)
-    parts = [sigma, omega, torch.zeros(n, 2 * n, dtype=torch.float64), zeros, *(zeros[:0] for _ in range(8))]
-    ratio = info.rate_hz / rate_hz
-    values = {
-        "modes": n,
-        "ratio": ratio,
-        "spacing": 1.0,
-        "limit": 1.0,
-        "loudness": math.log(info.scale_m / FULL_SCALE_M),
-    }
-    memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
+    parts = (sigma, omega, torch.zeros(n, 2 * n, dtype=torch.float64), zeros, *(zeros[:0] for _ in range(8)))
     real, imaginary = model.modes.double().chunk(2, dim=-1)
-    modes = torch.cat([real[:, present], -imaginary[:, present]], dim=-1)
-    if rate_hz != info.rate_hz:
-        modes = modes * torch.from_numpy(fits((omega * ratio).numpy())).repeat(2)
+    decoder = torch.cat([real[:, present], -imaginary[:, present]], dim=-1)
+    offset = torch.zeros(info.grid_points, dtype=torch.float64)
 
-    def start(displacement_m: Array) -> tuple[Array, Array]:
-        return _polar(_origin(model, displacement_m / info.scale_m)[present.numpy()])
+    def encode(displacement: Array) -> NDArray[np.complex128]:
+        return _origin(model, displacement)[present.numpy()]
 
-    decoder = modes.numpy()
-
-    def read(weights: Array) -> tuple[Array, Array]:
-        return info.scale_m / FULL_SCALE_M * weights.T @ decoder, np.zeros(weights.shape[1])
-
-    return _bank(memory, n, rate_hz, start, read, info)
+    return _bank(info, rate_hz, {"spacing": 1.0, "limit": 1.0}, parts, encode, decoder, offset)
 
 
 def _bank(
-    memory: Array,
-    modes: int,
-    rate_hz: int,
-    start: Strike,
-    read: Callable[[Array], tuple[Array, Array]],
     info: PresetInfo,
+    rate_hz: int,
+    values: Mapping[str, Any],
+    parts: Sequence[Tensor],
+    encode: Callable[[Array], NDArray[np.complex128]],
+    decoder: Tensor,
+    offset: Tensor,
 ) -> Program:
-    force = info.resonator.force_weights
-    return Program(BANK, memory, modes, rate_hz, info.grid_points, start, read, None, voice_ends_s(info), force)
+    """The program of latents by their `BANK_PARTS`, which are σ, ω …, all in the model's units.
+
+    Args:
+        encode: a displacement's (grid_points,) latents (n,).
+        decoder, offset: (grid_points, 2 n), real parts first, and (grid_points,).
+    """
+    omega, ratio, scale = parts[1], info.rate_hz / rate_hz, info.scale_m / FULL_SCALE_M
+    values = {**values, "modes": len(omega), "ratio": ratio, "loudness": math.log(scale)}
+    memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
+    if rate_hz != info.rate_hz:
+        decoder = decoder * torch.from_numpy(fits((omega * ratio).numpy())).repeat(2)
+    matrix, constant = decoder.numpy(), offset.numpy()
+
+    def start(displacement_m: Array) -> tuple[Array, Array]:
+        latents = encode(displacement_m / info.scale_m)
+        return np.log(np.maximum(np.abs(latents), 1e-300)), np.angle(latents)
+
+    def read(weights: Array) -> tuple[Array, Array]:
+        return scale * weights.T @ matrix, scale * constant @ weights
+
+    ends_s, force = voice_ends_s(info), info.resonator.force_weights
+    return Program(BANK, memory, len(omega), rate_hz, info.grid_points, start, read, None, ends_s, force)
 
 
 def _origin(model: IntegratedPhase | DMD, displacement: Array) -> NDArray[np.complex128]:
@@ -157,10 +141,6 @@ def _origin(model: IntegratedPhase | DMD, displacement: Array) -> NDArray[np.com
     with torch.inference_mode():
         state = model.encode(torch.from_numpy(displacement[None]).float())
     return state.origin[0].to(torch.complex128).numpy()
-
-
-def _polar(latents: NDArray[np.complex128]) -> tuple[Array, Array]:
-    return np.log(np.maximum(np.abs(latents), 1e-300)), np.angle(latents)
 
 
 def _flat(layer: nn.Linear) -> NDArray[np.float32]:

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.effects import Effects
-from engine.effects.partitions import convolver, partitioned
+from engine.effects.responses import convolver_memory, partitioned
 from engine.kernels.amplifier import drive
 from engine.kernels.constants import AHEAD
-from engine.kernels.fields import record_of, slot, slots
-from engine.kernels.memory import publish
+from engine.kernels.fields import record_of, slots
 from engine.kernels.mixer_records import CAUSE_DEVICE, CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, MIXER, RING
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.values.effects import Amp
-from engine.voices.derivative import differentiator_taps
+from engine.voices.ear import differentiator_taps
+from engine.voices.memory import KernelMemory, Reading
 from engine.voices.voice import Voice, possible_s
 
 if TYPE_CHECKING:
@@ -44,14 +44,28 @@ class Gap:
     milliseconds: float
 
 
-class Mixer:
+class Mixer(KernelMemory):
     """The mixer of voices, on memory that the kernels use.
 
     Commands come from any thread, frames are taken by one.
 
     Args:
         limited: whether the safety limiter is at work: for ears, not for files. It delays by `AHEAD` frames.
+
+    Attributes:
+        active: voices that sound or wait, those of a player among them.
+        frames: of sound given so far.
+        calls: of the device's callback.
+        non_finite: samples that were replaced by silence.
     """
+
+    layout = MIXER
+    channels = Reading(int, "channels")
+    active = Reading(int, "active")
+    frames = Reading(int, "frames")
+    calls = Reading(int, "calls")
+    underflows = Reading(int, "underflows")
+    non_finite = Reading(int, "non_finite")
 
     def __init__(self, rate_hz: int, channels: int = 2, limited: bool = True) -> None:
         self.rate_hz = rate_hz
@@ -73,14 +87,6 @@ class Mixer:
         record["smoothing"] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
         record["taps"] = differentiator_taps(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
 
-    @property
-    def channels(self) -> int:
-        return int(self.record["channels"])
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
-
     def add(self, *voices: Voice) -> None:
         """Hand voices over: they begin together, with the next quantum. Any thread, at once.
 
@@ -101,11 +107,7 @@ class Mixer:
                 self._voices.append(voice)
             for voice in voices[room:]:
                 voice.refuse()
-            self._publish("pushed", pushed + min(len(voices), room))
-
-    def _publish(self, field: str, whole: int) -> None:
-        """Write a whole number after all that was written before."""
-        publish(self.memory.view(np.int64), slot(MIXER, field), whole)
+            self.publish("pushed", pushed + min(len(voices), room))
 
     def set_player(self, player: CompiledPlayer) -> None:
         """The events of this player are played from the next quantum on; what the one before has struck rings on.
@@ -122,8 +124,8 @@ class Mixer:
             if present == player.address:
                 return
             self._players = [(other, self.frames) for other, _ in self._players if other is not player]
-            self._publish("player_before", present)
-            self._publish("player", player.address)
+            self.publish("player_before", present)
+            self.publish("player", player.address)
             for other, _ in self._players:
                 if other.address == before:
                     other.release(LEFT_S)
@@ -133,7 +135,7 @@ class Mixer:
         """Free those that play nothing any more. Under the lock."""
         for player, _ in self._players:
             if player.address == int(self.record["player_before"]) and player.rests:
-                self._publish("player_before", 0)
+                self.publish("player_before", 0)
                 self._players = [(one, self.frames if one is player else frame) for one, frame in self._players]
         held = [int(self.record[name]) for name in ("player", "player_before")]
         # a quantum that has begun may still play one that was taken out
@@ -159,13 +161,13 @@ class Mixer:
             drive(self.record, float(amp.drive_db), float(amp.tone_db), float(effects.level_db))
             if effects.rings:
                 if self._convolver is None:
-                    self._convolver = convolver(self.rate_hz)
+                    self._convolver = convolver_memory(self.rate_hz)
                 memory = partitioned(effects.impulse(self.rate_hz))
                 address = int(memory.ctypes.data)
                 self._impulses[address] = memory
             if self._convolver is not None:
-                self._publish("convolver", self._convolver.ctypes.data)
-                self._publish("effects", address)
+                self.publish("convolver", self._convolver.ctypes.data)
+                self.publish("effects", address)
             self.effects = effects
             self._forget_impulses()
 
@@ -189,19 +191,13 @@ class Mixer:
         with self._lock:
             return [voice for voice in self._voices if not voice.over]
 
-    @property
-    def active(self) -> int:
-        """Voices that sound or wait, those of a player among them."""
-        return int(self.record["active"])
-
     def render(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), where no device takes them."""
         from engine.kernels.mixer import render
 
-        channels = int(self.record["channels"])
-        out = np.zeros(frames * channels, np.float32)
-        render(self.record, frames, out, float(self.record["frames"]) / self.rate_hz)
-        return out.reshape(frames, channels)
+        out = np.zeros(frames * self.channels, np.float32)
+        render(self.record, frames, out, self.seconds)
+        return out.reshape(frames, self.channels)
 
     def set_volume(self, factor: float) -> None:
         """Set the volume of everything; 1 leaves the samples as they are."""
@@ -215,23 +211,9 @@ class Mixer:
         self.record["tone_length"] = self.rate_hz
 
     @property
-    def frames(self) -> int:
-        """The frames of sound given so far."""
-        return int(self.record["frames"])
-
-    @property
     def seconds(self) -> float:
         """The seconds of sound given so far."""
-        return float(self.record["frames"]) / self.rate_hz
-
-    @property
-    def calls(self) -> int:
-        """The number of calls of the device's callback."""
-        return int(self.record["calls"])
-
-    @property
-    def underflows(self) -> int:
-        return int(self.record["underflows"])
+        return self.frames / self.rate_hz
 
     @property
     def output_latency_s(self) -> float:
@@ -263,8 +245,3 @@ class Mixer:
             gaps.append(Gap(float(frame) / self.rate_hz, CAUSES.get(int(cause), "unknown"), lasted_ms))
         self._gaps_read = total
         return gaps
-
-    @property
-    def non_finite(self) -> int:
-        """Samples that were replaced by silence."""
-        return int(self.record["non_finite"])

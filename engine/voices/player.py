@@ -10,18 +10,18 @@ import math
 import threading
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import constants as of
-from engine.kernels.fields import record_of, slot, slots
-from engine.kernels.memory import publish
+from engine.kernels.fields import record_of, slots
 from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots
 from engine.kernels.voice_records import OMEGA_SQUARED, SOUNDING, VOICE, WAITING, WEIGHT_ROWS, voice_bytes
 from engine.pluck import SHAPES, Pluck
 from engine.values.string import StringParameters
+from engine.voices.memory import KernelMemory
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
@@ -29,11 +29,10 @@ PAGE_SLOTS = 512  # of 4 kB
 LOG_DB = 20 / math.log(10)
 
 REPORTED = tuple(name for name in REPORT.names or () if name != "own")
-PUSHED = slot(PLAYER, "pushed")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(KernelMemory):
     """An instrument as the kernels read it, with the memory that it points to.
 
     Attributes:
@@ -43,10 +42,6 @@ class Table:
 
     memory: NDArray[np.float64]
     programs: tuple[NDArray[np.float64], ...] = ()
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
     @property
     def record(self) -> np.void:
@@ -147,7 +142,11 @@ class Channel:
     fine_tuning: int
 
 
-class CompiledPlayer:
+SWITCHES = ("legato", "slides", "harmonics", "tremolo", "strums")  # in the order of the kernels
+CHANNEL_VALUES = tuple(field.name for field in fields(Channel) if field.name not in SWITCHES)
+
+
+class CompiledPlayer(KernelMemory):
     """Plays the instrument of its latest table in the mixer that it is given to.
 
     Args:
@@ -158,6 +157,8 @@ class CompiledPlayer:
         missed: whether reports came faster than they were asked for, since `missing` was asked.
     """
 
+    layout = PLAYER
+
     def __init__(self, rate_hz: int, modes: int = of.MOST_MODES, most_notes: int = 40) -> None:
         from engine.kernels.playing.events import begin  # Numba only when it is needed
 
@@ -166,7 +167,6 @@ class CompiledPlayer:
         self._voice_slots = voice_bytes(modes + of.MOST_PAIRS) // 8
         at_hand = slots(PLAYER) + AT_HAND * of.MOST_SOURCES * self._voice_slots
         memory[slots(PLAYER) : at_hand : PAGE_SLOTS] = 0.0  # else the audio thread would wait for pages of memory
-        self._counts = memory.view(np.int64)
         self.record = record = record_of(memory, PLAYER)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
@@ -180,10 +180,6 @@ class CompiledPlayer:
         record["most"] = most_notes
         record["source_gains"] = 1.0
         begin(self.address)
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
     # Events
 
@@ -218,7 +214,10 @@ class CompiledPlayer:
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at, mm, width, shape = (0, 0, 0, 0) if by_hand is None else _drawn(by_hand)
+            at, mm, width, shape = 0.0, 0.0, 0.0, 0
+            if by_hand is not None:
+                at, mm, width = by_hand.position, by_hand.amplitude_mm, by_hand.width
+                shape = SHAPES.index(by_hand.shape)
             head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
             self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
         return number
@@ -241,7 +240,7 @@ class CompiledPlayer:
         room = of.EVENTS - (pushed - int(self.record["taken"]))
         for number in range(min(room, len(self._backlog))):
             self.record["events"][(pushed + number) % of.EVENTS] = self._backlog.popleft()
-            publish(self._counts, PUSHED, pushed + number + 1)
+            self.publish("pushed", pushed + number + 1)
 
     @property
     def waiting(self) -> int:
@@ -403,25 +402,12 @@ class CompiledPlayer:
     def channel(self, number: int) -> Channel:
         """The positions of a channel's wheels and pedals."""
         state = self.record["channels"][number].copy()
-        slide, wide = int(state["slide"]), float(state["range_semitones"])
-        legato, slides, harmonics, tremolo, strums = map(bool, state["switches"])
-        return Channel(
-            float(state["bend"]),
-            bool(state["pedal"]),
-            slide if slide >= 0 else None,
-            wide if wide >= 0 else None,
-            round(127 * float(state["mute"])),
-            legato,
-            slides,
-            int(state["slide_time"]),
-            harmonics,
-            tremolo,
-            strums,
-            int(state["volume"]),
-            int(state["expression"]),
-            int(state["coarse_tuning"]),
-            int(state["fine_tuning"]),
-        )
+        values = {name: state[name].item() for name in CHANNEL_VALUES}
+        values |= zip(SWITCHES, map(bool, state["switches"]), strict=True)
+        values |= {"pedal": bool(values["pedal"]), "mute": round(127 * values["mute"])}
+        for name in ("slide", "range_semitones"):
+            values[name] = values[name] if values[name] >= 0 else None
+        return Channel(**values)
 
 
 def _string(row: NDArray[np.float64]) -> StringParameters | None:
@@ -430,7 +416,3 @@ def _string(row: NDArray[np.float64]) -> StringParameters | None:
         return StringParameters(*row.tolist())
     except ValueError:
         return None
-
-
-def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:
-    return pluck.position, pluck.amplitude_mm, pluck.width, SHAPES.index(pluck.shape)

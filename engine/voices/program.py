@@ -17,6 +17,7 @@ from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.values.ear import Ear
 from engine.voices.ear import weights_of
+from engine.voices.memory import KernelMemory
 
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 KEPT_WEIGHTS = 32  # listening points of a program
@@ -25,7 +26,7 @@ Strike = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(KernelMemory):
     """See the module; the kernels read `memory`.
 
     Attributes:
@@ -68,10 +69,6 @@ class Program:
     def rendered(self) -> bool:
         """Return True if somebody renders the samples of its voices."""
         return self.kind == RENDERED
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
 
 def voice_ends_s(info: PresetInfo) -> float:

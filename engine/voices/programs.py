@@ -24,7 +24,7 @@ from engine.kernels.voice_records import (
     TRUTH_PROGRAM,
 )
 from engine.levels import FULL_SCALE_M
-from engine.models._tension_arrays import CURVES
+from engine.models._tension_law import CURVES
 from engine.models.configurations import KoopmanTensionConfiguration
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array, Resonator

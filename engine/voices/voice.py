@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import voice_records as at
-from engine.kernels.fields import record_of, slot, slots
-from engine.kernels.memory import publish
+from engine.kernels.fields import record_of, slots
 from engine.kernels.mixer_records import SCRATCH_SLOTS
 from engine.kernels.voice_records import (
     ATTACK_S,
@@ -26,6 +25,7 @@ from engine.levels import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
 from engine.values.ear import Ear
 from engine.voices.ear import largest
+from engine.voices.memory import KernelMemory
 from engine.voices.program import Program
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def possible_s(seconds: float) -> float | None:
     return float(seconds) if 0.0 <= seconds <= LONGEST_WAIT_S else None
 
 
-class Voice:
+class Voice(KernelMemory):
     """A voice, made and commanded by one thread, rendered by another: a command is heard within a quantum.
 
     Args:
@@ -49,6 +49,8 @@ class Voice:
         seconds: of a rendered voice: how much room there is for its samples, of which none is needed after its end.
         begin: what `program.start` gives for this displacement, where it is known.
     """
+
+    layout = VOICE
 
     def __init__(
         self,
@@ -112,10 +114,6 @@ class Voice:
         """The rows of a voice, (rows, modes); `voice_records` has their numbers."""
         n = self.program.modes
         return self.memory[slots(VOICE) + WEIGHT_ROWS * n :].reshape(-1, n)
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
 
     @property
     def over(self) -> bool:
@@ -217,7 +215,7 @@ class Voice:
             return False
         self._set_weights(1, ear)
         self.record["weights_faded"] = 0
-        publish(self.memory.view(np.int64), slot(VOICE, "next_weights"), 1)
+        self.publish("next_weights", 1)
         self.ear = ear
         return True
 
@@ -227,7 +225,7 @@ class Voice:
         ready = int(self.record["ready"])
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
-        publish(self.memory.view(np.int64), slot(VOICE, "ready"), ready + count)
+        self.publish("ready", ready + count)
 
     def level_of_samples(self, seconds: float) -> float:
         """Root mean square of what a rendered voice was given for its first seconds."""
@@ -272,9 +270,8 @@ class Voice:
         n = self.program.modes
         weights, bias = self.program.weights(ear)
         rows = self.memory[slots(VOICE) : slots(VOICE) + WEIGHT_ROWS * n].reshape(2, 2, 2 * n)
-        for point in range(len(ear.points)):
-            rows[which, point] = weights[point]
-            self.record["bias"][which, point] = bias[point]
+        rows[which, : len(weights)] = weights
+        self.record["bias"][which, : len(bias)] = bias
 
 
 def resonator_rows(resonator: Resonator) -> NDArray[np.float64]:

@@ -39,6 +39,7 @@ def test_blocks_chain_and_listening_is_the_grid_there(preset_file: Path) -> None
             block, state = source.advance(state, steps, weights)
             heard.append(block)
         assert state.frame == 300
+        assert source.advance(source.start(initial[:0]), 8)[0].shape == (0, 8, 101)
         with pytest.raises(ValueError, match=r"must have shape \(batch, 101\), not \(1, 50\)"):
             source.start(np.zeros((1, 50)))
         scale = float(np.abs(whole).max())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -32,16 +31,14 @@ class Truth(StringModel[tuple[ModalState, int]]):
     initialisations: ClassVar = {}
 
     def __init__(self, data: Dataset, gain: float = 1.0, broken: float = math.inf) -> None:
-        super().__init__()
         c = data.configuration
-        self.grid_points = c.grid_points
-        self.configuration = SimpleNamespace(input="displacement")
+        super().__init__(c)
         self.gain = nn.Parameter(torch.tensor(gain))
         self._broken = broken
         self._scale_m = data.scale_m
         self._solver = SplittingSolver(c.resonator, c.rate_hz)
 
-    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+    def set_weights(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         raise NotImplementedError
 
     def encode(self, displacement: Tensor, second: Tensor | None = None) -> tuple[ModalState, int]:

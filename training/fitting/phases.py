@@ -23,7 +23,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from engine.models.string_modes import StringModes
+from engine.models.base import StringModes
 from training.fitting.modes import SLOWEST, Modes
 
 FIRST_FRAMES = 12

@@ -27,8 +27,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.models.base import StringModes
 from engine.models.fno import FGRU, FRNN, FourierConvolution
-from engine.models.string_modes import StringModes
 from training.fitting import phases
 from training.fitting.modes import SLOWEST, Modes
 

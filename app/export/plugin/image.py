@@ -31,7 +31,7 @@ from engine.kernels.fields import record_of
 from engine.kernels.records import TABLE
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
-from engine.voices.derivative import differentiator_taps
+from engine.voices.ear import differentiator_taps
 
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"

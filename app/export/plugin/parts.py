@@ -13,7 +13,7 @@ from app.instrument.drum_keys import DrumKeys, struck_drum
 from app.instrument.effects import effects_of
 from app.patches.patch import Patch
 from app.shared.parameters import OF_PATCHES
-from engine.effects.body_record import body_memory
+from engine.effects.body import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels.fields import record_of, slots

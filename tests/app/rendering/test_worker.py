@@ -17,7 +17,8 @@ from app.playing.sources import Sources
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import SourceLine
-from engine.models.koopman_var import KoopmanState, KoopmanVar
+from engine.models._diagonal import KoopmanState
+from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects import Body, Effects, apply
-from engine.effects.impulse import Impulse
+from engine.effects import Body, Effects, Impulse
 from engine.kernels.constants import LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
 from engine.values.effects import Amp, Room
 from engine.voices import Mixer
-from tests.engine.sounds import RATE_HZ, voice_of
+from tests.engine.sounds import RATE_HZ, apply, voice_of
 
 
 def pink(frames: int) -> NDArray[np.float64]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.effects.amp import amplified
 from engine.kernels import amplifier
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import MIXER
 from engine.values.effects import Amp
-from tests.engine.sounds import RATE_HZ, Signal
+from tests.engine.sounds import RATE_HZ, Signal, amplified
 
 SIZE = 2**15
 FULL_DB = 36.0

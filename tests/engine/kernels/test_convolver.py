@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from engine.effects import Body, Effects, Impulse, apply
+from engine.effects import Body, Effects, Impulse
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.mixer_records import WINDOW
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice
-from tests.engine.sounds import RATE_HZ, Samples, Signal, noise, voice_of
+from tests.engine.sounds import RATE_HZ, Samples, Signal, apply, noise, voice_of
 
 
 def wet(samples: Samples, gain: float = 1.0) -> Voice:

@@ -7,9 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from engine.effects import Body, Effects
-from engine.effects.curves import curves_of
-from engine.effects.impulse import Impulse
+from engine.effects import Body, Effects, Impulse
+from engine.effects.body import curves_of
 from engine.kernels import constants as of
 from engine.kernels import loudness
 from engine.kernels.constants import CURVES_HZ as RATE_HZ

@@ -21,8 +21,7 @@ from engine.values.ear import Ear
 from engine.values.effects import Room
 from engine.values.string import StringParameters
 from engine.voices import Mixer, Voice, plain_program
-from engine.voices import mixer as mixer_module
-from engine.voices import voice as voice_module
+from engine.voices import memory as memory_module
 from engine.voices.programs import solver_program
 
 RATE_HZ = 48_000
@@ -48,8 +47,7 @@ def published(monkeypatch: pytest.MonkeyPatch) -> Published:
     def note(slots: np.ndarray, slot: int, whole: int) -> None:
         found.append((slot, whole))
 
-    monkeypatch.setattr(mixer_module, "publish", note)
-    monkeypatch.setattr(voice_module, "publish", note)
+    monkeypatch.setattr(memory_module, "publish", note)
     return found
 
 

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from engine.effects import Body, Effects, Impulse, responses
-from engine.effects.body_record import body_memory
-from engine.effects.curves import curves_of
-from engine.effects.partitions import partitioned
+from engine.effects.body import body_memory, curves_of
+from engine.effects.responses import partitioned
 from engine.effects.room import room_noise, room_response
 from engine.kernels import prepared
 from engine.kernels.records import NEEDS, RESPONSES

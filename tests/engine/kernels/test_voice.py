@@ -17,7 +17,7 @@ from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
 from engine.voices import Mixer, Voice, model_program, truth_program
-from engine.voices.derivative import REACH_FRAMES
+from engine.voices.ear import REACH_FRAMES
 from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
 from tests.engine.sounds import (

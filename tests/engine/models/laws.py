@@ -19,7 +19,7 @@ from torch import Tensor
 
 from engine.models import MODELS, build_model, model_class
 from engine.models._diagonal import DiagonalModel
-from engine.models.base import AnyFrameModel, Physics, StringModel, count_parameters
+from engine.models.base import Physics, StringModel, count_parameters
 from engine.presets import load_preset, read_info, save_preset
 from engine.resonators.string import resonator_of
 from engine.schema import write
@@ -155,6 +155,16 @@ class ModelLaws:
             assert relative(motion.model(released[None], 50), motion.whole[row : row + 1, :50]) < self.near
 
     @torch.no_grad()
+    def test_no_string_moves_nowhere(self, motion: Motion) -> None:
+        """A batch of none: empty arrays, by every way."""
+        model, none = motion.model, motion.released[:0]
+        _, state = model.advance(model.encode(none), 40)
+        assert model.advance(state, 70, listening_weights([0.37, 0.123], POINTS))[0].shape == (0, 70, 2)
+        assert model.sample(state, torch.tensor([2, 9]), 30)[0].shape == (0, 2, POINTS)
+        with torch.enable_grad():
+            assert model(none, 40).shape == (0, 40, POINTS)
+
+    @torch.no_grad()
     def test_a_state_can_be_gone_on_from_twice(self, motion: Motion) -> None:
         _, state = motion.model.advance(motion.model.encode(motion.released), 50)
         assert torch.equal(motion.model.advance(state, 30)[0], motion.model.advance(state, 30)[0])
@@ -172,7 +182,7 @@ class ModelLaws:
     def test_some_frames_are_those_of_all(self, motion: Motion) -> None:
         """From any state, of any of the next frames, none among them, and the state after them continues the same."""
         model = motion.model
-        if not isinstance(model, AnyFrameModel):
+        if not model.any_frame:
             pytest.skip("it steps through every frame")
         state, done = model.encode(motion.released), 0
         for steps, frames in ((1, [1]), (300, [1, 2, 12, 299]), (650, []), (900, [7, 500, 900]), (49, [48])):

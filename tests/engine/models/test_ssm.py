@@ -224,7 +224,7 @@ def test_hippo_is_normal_up_to_its_rank_one_part() -> None:
 def test_the_papers_code_counts_the_outputs_in_the_fan_in_and_begins_with_shorter_steps(
     how: str, fan_in: int, smallest: float
 ) -> None:
-    layer = S5Layer(64, 101, 101, 16)
+    layer = S5Layer(64, 101, 16)
     layer.initialise(how, torch.Generator().manual_seed(0))
     # real and imaginary parts of variance 1/fan_in each; half of V's columns keep it
     assert float(layer.C.square().mean()) * fan_in == pytest.approx(1, rel=0.05)

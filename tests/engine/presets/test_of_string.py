@@ -106,21 +106,13 @@ def test_a_wrong_string_file_is_named(tmp_path: Path, text: str, words: str) -> 
     assert str(file) in str(caught.value)
 
 
-def test_a_string_beyond_the_family_is_reported() -> None:
-    family = load_preset(find_preset("studio_any_string")).info.family
-    assert family is not None
-    assert family.outside(StringParameters()) == []
-    low = StringParameters(tension_n=60.97 / 64)
-    assert any(one.words.startswith("pitch 3") and not one.error_grows for one in family.outside(low))
-
-
-BEYOND = {
-    "bass_e1": ("pitch 41.2",),
-    "harp_c6": ("pitch 1.05e+03",),
-    "piano_c2": ("decay time 27.6", "decay time near 3 kHz 8.0"),
-    "piano_f3": ("decay time near 3 kHz 5.32",),
-    "piano_c4": ("decay time near 3 kHz 3.61",),
-    "piano_cs5": ("decay time near 3 kHz 1.86",),
+BEYOND = {  # where high modes ring too long, as warned of; pitch alone makes no error grow
+    "bass_e1": "",
+    "harp_c6": "",
+    "piano_c2": "decay time near 3 kHz 8.0",
+    "piano_f3": "decay time near 3 kHz 5.32",
+    "piano_c4": "decay time near 3 kHz 3.61",
+    "piano_cs5": "decay time near 3 kHz 1.86",
 }
 NAMES = sorted(path.stem for path in STRINGS.glob("*.toml"))
 
@@ -131,10 +123,9 @@ def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> No
     many = load_preset(find_preset("studio_any_string"))
     string = read_string(find_string(name))
     assert many.info.family is not None
-    outside = many.info.family.outside(string)
-    expected_words = BEYOND.get(name, ())
-    assert len(outside) == len(expected_words)
-    assert all(one.words.startswith(start) for one, start in zip(outside, expected_words, strict=True))
+    warnings = many.info.family.warnings(string)
+    assert len(warnings) == bool(BEYOND.get(name))
+    assert all(words.startswith(BEYOND[name]) for words in warnings)
     _, description = read_described_string(find_string(name))
     assert ("Beyond the family: " in description) == (name in BEYOND)
     own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)

@@ -14,9 +14,9 @@ from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
+from engine.truth import ModalState
 from engine.truth.oracle import solve_dop853
 from engine.truth.splitting import SplittingSolver
-from engine.truth.state import ModalState
 from engine.values.string import Polarisations, StringParameters
 from tests.engine.sounds import relative
 

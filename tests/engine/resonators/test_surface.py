@@ -7,10 +7,18 @@ import scipy
 from engine.kernels import drum_modes as kernel
 from engine.resonators.base import Array
 from engine.resonators.surface import Surface, modes_below, tools
+from engine.values.drum import SHAPES
 
 SIDE = 251
 GRID = np.stack(np.meshgrid(*(np.linspace(-1, 1, SIDE),) * 2), axis=-1).reshape(-1, 2)
-CIRCLE, RECTANGLE = Surface.below("circle", 0.4, 0.4, 60.0), Surface.below("rectangle", 0.4, 0.3, 60.0)
+
+
+def surface_of(shape: str, length_m: float, width_m: float) -> Surface:
+    sides = np.array([SHAPES.index(shape), length_m, width_m])
+    return Surface(sides, modes_below(shape, length_m / width_m, 60.0 * kernel.size(sides)))
+
+
+CIRCLE, RECTANGLE = surface_of("circle", 0.4, 0.4), surface_of("rectangle", 0.4, 0.3)
 
 
 def cells(surface: Surface) -> np.ndarray:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from engine.kernels.constants import QUANTUM
 from engine.levels import FULL_SCALE_M
-from engine.models._tension_arrays import CURVES
+from engine.models._tension_law import CURVES
 from engine.models.base import Physics
 from engine.models.configurations import KoopmanTensionConfiguration
 from engine.models.koopman_tension import KoopmanTension

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
@@ -15,7 +17,7 @@ from engine.resonators.string import resonator_of
 from engine.truth import ModalState
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices.ear import largest, weights_of
+from engine.voices.ear import REACH_FRAMES, largest, weights_of
 from tests.engine.tensors import solve_linear
 
 POINTS = 101
@@ -91,3 +93,13 @@ def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string() -> None:
     assert [Ear((0.5,), each).full_scale for each in pickups] == [FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N]
     with pytest.raises(ValueError, match="another pick-up"):
         weights_of(BRIDGE, POINTS)
+
+
+@pytest.mark.parametrize("rate_hz", [4_000, 48_000])
+def test_velocity_is_the_derivative(rate_hz: int, derivative: Callable[..., np.ndarray]) -> None:
+    time_s = np.arange(4000) / rate_hz
+    omega = 2 * np.pi * rate_hz * np.array([[0.01, 0.13, 0.31, 0.42]])
+    signal = np.cos(omega * time_s[:, np.newaxis])
+    exact = -omega * np.sin(omega * time_s[:, np.newaxis])
+    inner = slice(0, len(signal) - 2 * REACH_FRAMES)  # the beginning, at rest, is exact as well
+    assert (np.abs(derivative(signal, rate_hz) - exact)[inner].max(axis=0) / omega[0]).max() < 6e-4

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
+from engine.truth import ModalState
 from engine.truth.splitting import SplittingSolver
-from engine.truth.state import ModalState
 from engine.values.string import StringParameters
 from training.recording.fit import LearnedNote
 from training.recording.glide import CENTS, Glide

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 import torch
 
+from engine.models.base import StringModes
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 from engine.models.fno import FGRU, FRNN, FourierConvolution
-from engine.models.string_modes import StringModes
 from engine.resonators.sine_transform import synthesis_matrix
 from tests.engine.tensors import convolved
 from tests.training.fitting.test_phases import motions_of
