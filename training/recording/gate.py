@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, signal
 
+from engine.resonators.base import Array
 from training.recording.note import Note, envelope
 from training.recording.numbering import SPECTRUM_S, PartialSeries, Peaks, followed, number, peaks_of
-
-Array = NDArray[np.float64]
 
 CLIPPED_RUNS = 3  # of so many equal samples at the peak
 CLIPPED_SAMPLES = 4

@@ -17,14 +17,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from engine.resonators.base import Array
 from training.recording.glide import CENTS
-from training.recording.refine import Fit, Pole, polarisations, real_rows
+from training.recording.refine import Complex, Fit, Pole, moments, polarisations, real_rows
 from training.recording.rest import Rest, at_rest
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 MODEL_ERRORS = {"cents": 0.6, "decay": 0.05, "level_db": 0.35}  # cents, a share, dB
 NORMAL_95 = 1.96
@@ -108,14 +105,10 @@ def figures_of(a: Complex, decay: Array, omega: Array) -> tuple[Array, Array, Ar
 
     σ is that of one exponential with the same centre of energy.
     """
-    s = -decay + 1j * omega
-    sums = s[:, :, None] + s[:, None].conj()
-    pairs = a[:, :, None] * a[:, None].conj()
-    energy = (-pairs / sums).sum((1, 2)).real
-    moment = (pairs / sums**2).sum((1, 2)).real
-    hz = (-pairs * s[:, :, None] / sums).sum((1, 2)).imag / np.maximum(energy, 1e-300) / (2 * math.pi)
-    mean = 0.5 * np.maximum(energy, 1e-300) / np.maximum(moment, 1e-300)
-    return hz, np.clip(mean, 1e-3, 1e4), 10 * np.log10(np.maximum(energy, 1e-300))
+    energy, moment, turn = moments(a, -decay + 1j * omega)
+    energy = np.maximum(energy, 1e-300)
+    mean = 0.5 * energy / np.maximum(moment, 1e-300)
+    return turn / energy / (2 * math.pi), np.clip(mean, 1e-3, 1e4), 10 * np.log10(energy)
 
 
 def _deviation(values: Array) -> float:

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from engine.resonators.base import Array
 from training.recording.checkpoint import checkpoint_of
 from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
@@ -21,7 +19,6 @@ from training.recording.preset import Source
 from training.recording.report import FitReport, report_of
 from training.recording.verdict import Verdict, verdict_of
 
-Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 SAME_PITCH_CENTS = 60.0

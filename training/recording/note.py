@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from engine.effects.responses import resampled
-
-Array = NDArray[np.float64]
+from engine.resonators.base import Array
 
 HIGHEST_RATE_HZ = 48_000  # recordings of higher rates are converted: nothing above 24 kHz is fitted
 LOWEST_RATE_HZ = 8_000

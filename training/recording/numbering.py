@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
+from engine.resonators.base import Array
 from training.recording.note import Note
-
-Array = NDArray[np.float64]
 
 F0_RANGE_HZ = (26.0, 4_300.0)
 STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])
@@ -254,19 +253,26 @@ def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     used = (off < tolerance(peaks.hz, series.f0_hz, peaks.width_hz)) & (k <= MOST_PARTIALS)
     if len(np.unique(k[used])) < 3:
         return series
-    k = k[used]
-    hz = peaks.hz[used]
-    weight = peaks.strength[used] + 0.05
-    # (f/k)² = f0² + f0² B k²
+    (square, slope), *_ = fit_law(k[used], peaks.hz[used], peaks.strength[used] + 0.05, 3)
+    if square <= 0:
+        return series
+    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+
+
+def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Array, Array]:
+    """f0² and f0² B of (f/k)² = f0² + f0² B k² by least squares; outliers lose weight from round to round.
+
+    Beside them the rows and the weights of the equations.
+    """
     rows = np.stack([np.ones_like(k), k**2], 1)
     scale = weight * k / hz  # errors in Hz are alike
-    for _ in range(3):
-        (square, slope), *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
-        if square <= 0:
-            return series
-        residual = np.abs((hz / k) ** 2 - rows @ np.array([square, slope])) * k / hz
-        scale = weight * k / hz / np.maximum(1.0, residual / (2 * np.median(residual) + 1e-9))
-    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+    for _ in range(rounds):
+        law, *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
+        if law[0] <= 0:
+            break
+        off = np.abs((hz / k) ** 2 - rows @ law) * k / hz
+        scale = weight * k / hz / np.maximum(1.0, off / (2 * np.median(off) + 1e-9))
+    return law, rows, scale
 
 
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:

@@ -9,17 +9,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, signal
 
 from engine.compare.relative import error_to_signal
 from engine.compare.spectra import log_spectral_distance, spectral_distances
+from engine.resonators.base import Array
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
 from training.recording.numbering import partial_hz
 from training.recording.physics import LearnedPhysics
-
-Array = NDArray[np.float64]
 
 LATE_S = 0.05  # after the onset: the second ESR begins here
 MOST_DELAY_S = 0.002

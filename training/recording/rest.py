@@ -19,13 +19,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize
 
+from engine.resonators.base import Array
 from training.recording.glide import Glide
 from training.recording.refine import Pole
-
-Array = NDArray[np.float64]
 
 SECONDS, POINTS = 2.4, 1200
 LAW_PARTIALS = 12  # the lowest, which have nearly all of the tension
