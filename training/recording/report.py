@@ -46,14 +46,11 @@ class FitErrors:
 
 @dataclass(frozen=True)
 class Band:
-    """The decay of an octave: T60 of the recording and of the learned note, in s.
-
-    It is nan where it does not decay.
-    """
+    """The decay of an octave: T60 of the recording and of the learned note; nan where it does not decay."""
 
     hz: float
-    recorded_s: float
-    learned_s: float
+    recorded_t60_s: float
+    learned_t60_s: float
 
 
 @dataclass(frozen=True)
@@ -61,20 +58,20 @@ class PartialReport:
     """A partial at rest, with 95 % intervals.
 
     Attributes:
-        cents: from the law of f0 and B.
+        cents_from_law: of f0 and B.
         level_db: of its energy, below the loudest partial's.
-        decay: σ in 1/s of the one exponential with the same centre of energy.
+        t60_s: of the one exponential with the same centre of energy.
         poles: that it is made of.
     """
 
     number: int
     hz: float
+    cents_from_law: float
     hz_interval: tuple[float, float]
-    cents: float
     level_db: float
     level_interval_db: tuple[float, float]
-    decay: float
-    decay_interval: tuple[float, float]
+    t60_s: float
+    t60_interval_s: tuple[float, float]
     poles: int
 
 
@@ -92,11 +89,9 @@ def report_of(note: Note, learned: LearnedNote, physics: LearnedPhysics) -> FitR
     """Compare a note with its recording."""
     truth = note.fitted()
     model = learned.render(np.arange(len(truth)) / note.rate_hz)
-    errors = errors_of(truth, model, note.rate_hz, note.noise_power)
+    sounds = truth, model, note.rate_hz, note.noise_power
     noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
-    return FitReport(
-        errors, noise, bands_of(truth, model, note.rate_hz, note.noise_power), partials_in(learned, physics)
-    )
+    return FitReport(errors_of(*sounds), noise, bands_of(*sounds), partials_in(learned, physics))
 
 
 def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialReport, ...]:
@@ -110,13 +105,18 @@ def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialR
         law = partial_hz(number, physics.f0_hz, physics.stiffness)
         hz = sum(spread.hz) / 2
         low, high = spread.level_db
-        decay = math.sqrt(spread.decay[0] * spread.decay[1])
-        poles = sum(pole.partial == number for pole in learned.poles)
-        interval = low - loudest, high - loudest
-        cents = 1200 * math.log2(hz / law)
+        slow, fast = spread.decay
         rows.append(
             PartialReport(
-                number, hz, spread.hz, cents, levels[number] - loudest, interval, decay, spread.decay, poles
+                number,
+                hz,
+                cents_from_law=1200 * math.log2(hz / law),
+                hz_interval=spread.hz,
+                level_db=levels[number] - loudest,
+                level_interval_db=(low - loudest, high - loudest),
+                t60_s=math.log(1000) / math.sqrt(slow * fast),
+                t60_interval_s=(math.log(1000) / fast, math.log(1000) / slow),
+                poles=sum(pole.partial == number for pole in learned.poles),
             )
         )
     return tuple(rows)

@@ -64,8 +64,8 @@ def verdict_of(note: Note, series: PartialSeries, learned: LearnedNote, report: 
     t = np.arange(len(truth)) / note.rate_hz
     whole = max(float(truth @ truth), 1e-30)
     linear_esr = error_to_signal(fit_note(note, series, free=0, glides=False).render(t), truth)
-    loud = [abs(partial.cents) < NEAR_CENTS for partial in report.partials if partial.level_db > LOUD_DB]
-    of_law = {partial.number for partial in report.partials if abs(partial.cents) < PULLED_CENTS}
+    loud = [abs(partial.cents_from_law) < NEAR_CENTS for partial in report.partials if partial.level_db > LOUD_DB]
+    of_law = {partial.number for partial in report.partials if abs(partial.cents_from_law) < PULLED_CENTS}
     tau = learned.glide.tau(t)
     sound = np.zeros(len(t))
     for pole in learned.poles:
