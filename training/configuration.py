@@ -59,6 +59,11 @@ class DatasetConfiguration:
                 " of data; ask for less"
             )
 
+    @property
+    def string_kind(self) -> str:
+        """The word of names and tables: "linear" or "nonlinear"."""
+        return "nonlinear" if self.tension_modulated else "linear"
+
     @cached_property
     def resonator(self) -> Resonator:
         """The resonator whose motion is learned."""

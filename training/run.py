@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,12 +16,12 @@ import torch
 from filelock import FileLock, Timeout
 
 from engine.compare.relative import ErrorSums
-from engine.models.base import count_parameters
-from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
+from engine.models.base import StringModel, count_parameters
+from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write
 from engine.whole_file import whole_file
 from training import provenance
-from training.configuration import DatasetConfiguration, TrainingConfiguration
+from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration
 from training.data.dataset import Dataset, load_dataset
 from training.data.draws import (
     CENTRE_RANGE,
@@ -33,8 +34,10 @@ from training.data.draws import (
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
 from training.fitting.log import TrainingLog
-from training.results import QUARTERS, Row
-from training.row_errors import REPEATED, configuration_of, row_errors
+from training.results import QUARTERS, SHORT_HORIZON, Row
+
+PREFIXES = {"validation": "", "test": "test_"}
+REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
 
 
 @dataclass(frozen=True)
@@ -148,15 +151,7 @@ def _row(
     """The row of a run that has ended; its preset and row are written."""
     configuration = run.configuration
     facts: dict[str, Any] = {
-        "digest": configuration.digest,
-        "name": run.name,
-        "model": configuration.model,
-        "string": "nonlinear" if configuration.data.tension_modulated else "linear",
-        "initial": configuration.data.initial,
-        "rate_hz": configuration.data.rate_hz,
-        "horizon": configuration.steps,
-        "recipe": run.recipe,
-        "seed": configuration.recipe.seed,
+        **row_facts(run.name, run.recipe, configuration),
         "initialisation": configuration.start,
         "device": torch.device(device).type,
         "threads": torch.get_num_threads(),
@@ -173,6 +168,21 @@ def _row(
     with whole_file(runs / run.name / "row.json") as unfinished:
         unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
     return row
+
+
+def row_facts(name: str, recipe: str, configuration: TrainingConfiguration) -> dict[str, Any]:
+    """The columns of a row that say which run it is."""
+    return {
+        "digest": configuration.digest,
+        "name": name,
+        "model": configuration.model,
+        "string": configuration.data.string_kind,
+        "initial": configuration.data.initial,
+        "rate_hz": configuration.data.rate_hz,
+        "horizon": configuration.steps,
+        "recipe": recipe,
+        "seed": configuration.recipe.seed,
+    }
 
 
 def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
@@ -195,6 +205,65 @@ def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def row_errors(
+    model: StringModel[Any], dataset: Dataset, whole: Mapping[str, ErrorSums], steps: int
+) -> dict[str, float | None]:
+    """The columns of a row by name.
+
+    None for an error that is infinite, and none over 400 frames of a shorter run.
+
+    Args:
+        whole: of "validation" and "test", over `steps` frames.
+    """
+    columns: dict[str, float | None] = {}
+    for split, prefix in PREFIXES.items():
+        columns |= _columns(prefix, "", whole[split])
+        if steps >= SHORT_HORIZON and dataset.configuration.stride == 1:
+            same = steps == SHORT_HORIZON
+            short = whole[split] if same else evaluate_model(model, dataset, split, SHORT_HORIZON)
+            columns |= _columns(prefix, f"_{SHORT_HORIZON}", short)
+    return columns
+
+
+def _columns(prefix: str, suffix: str, sums: ErrorSums) -> dict[str, float | None]:
+    total, deviation = sums.total(), sums.standard_error()
+    values = {
+        f"{prefix}rel_mse{suffix}": total.rel_mse,
+        f"{prefix}rel_mae{suffix}": total.rel_mae,
+        f"{prefix}rel_mse{suffix}_se": deviation.rel_mse,
+        f"{prefix}rel_mae{suffix}_se": deviation.rel_mae,
+    }
+    return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+def configuration_of(info: PresetInfo, where: str) -> TrainingConfiguration:
+    """The run that made a preset.
+
+    Raises:
+        SchemaError: the preset does not tell it.
+    """
+    return read_configuration(info.training, f"{where}: metadata.training")
+
+
+def data_of(preset: Preset) -> DatasetConfiguration:
+    """The data set on which a preset of one string was trained.
+
+    Raises:
+        PresetError: the preset does not name it, or names that of another model.
+    """
+    try:
+        data = configuration_of(preset.info, str(preset.path)).data
+    except SchemaError as error:
+        raise PresetError(f"{error}; without it the preset's data set is not known") from error
+    for name in ("rate_hz", "modes", "grid_points"):
+        mine, its = getattr(data, name), getattr(preset.info, name)
+        if mine != its:
+            raise PresetError(
+                f"{preset.path}: metadata.training.data.{name} is {mine}, the model's is {its}; get the preset again"
+            )
+    return data
 
 
 def _figures(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
@@ -259,12 +328,10 @@ def preset_info(
 
 def trained_range(data: DatasetConfiguration) -> TrainedRange:
     """The ranges of a data set's random draws; noise has neither a place nor a width."""
+    rise = data.largest_tension_rise
     if data.initial == "pluck":
-        position = PLUCK_POSITION_RANGE
-        width = PLUCK_WIDTH_RANGE
-        peak_m = PLUCK_PEAK_RANGE_M
-        widths = {"gaussian": width, "raised_cosine": width}
-        return TrainedRange(position, widths, peak_m, data.largest_tension_rise)
+        widths = {"gaussian": PLUCK_WIDTH_RANGE, "raised_cosine": PLUCK_WIDTH_RANGE}
+        return TrainedRange(PLUCK_POSITION_RANGE, widths, PLUCK_PEAK_RANGE_M, rise)
     if data.initial == "noise":
-        return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
-    return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
+        return TrainedRange(None, None, PEAK_RANGE_M, rise)
+    return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, rise)

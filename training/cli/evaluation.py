@@ -118,7 +118,7 @@ def evaluate(
         splits, configuration = ("all",), replace(configuration, count=fresh)
     _check_trajectories(trajectories, configuration, splits)
     from training.evaluate import held_out
-    from training.row_errors import configuration_of
+    from training.run import configuration_of
 
     if fresh is None:
         data = replace(load_data(configuration, cache), scale_m=info.scale_m)
@@ -308,7 +308,7 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     """
     from training.cell import load
     from training.configuration import DatasetConfiguration
-    from training.row_errors import data_of
+    from training.run import data_of
 
     info = preset.info
     if on is not None:

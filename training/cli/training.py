@@ -174,8 +174,7 @@ def known_errors(run: TrainingConfiguration) -> Known:
     from training.tables.paper import DatasetColumn, paper_errors
 
     known_by_source: Known = {}
-    kind = "nonlinear" if run.data.tension_modulated else "linear"
-    place = (kind, run.steps, run.model, DatasetColumn(run.data.initial, run.data.rate_hz))
+    place = (run.data.string_kind, run.steps, run.model, DatasetColumn(run.data.initial, run.data.rate_hz))
     paper = paper_errors().get(place) if follows_protocol(run.data) else None
     if paper is not None and paper.rel_mse and paper.rel_mae:
         known_by_source["paper"] = paper.rel_mse.mean, paper.rel_mae.mean

@@ -21,7 +21,7 @@ from engine.schema import SchemaError, read, write
 from training.cell import Cell
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
-from training.run import default_runs
+from training.run import default_runs, row_facts
 from training.sweeping.plan import Plan, PlannedRun
 from training.sweeping.task import PROGRESS, Task, TaskRun, Workers, WorkersError, read_progress
 
@@ -181,18 +181,5 @@ def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
 
 
 def _failed(run: PlannedRun, error: str) -> Row:
-    configuration = run.configuration
-    return Row(
-        digest=run.digest,
-        name=run.name,
-        status="failed",
-        model=run.cell.model,
-        string=run.cell.string_kind,
-        initial=run.cell.initial,
-        rate_hz=run.cell.rate_hz,
-        horizon=configuration.steps,
-        recipe=run.cell.recipe,
-        seed=run.cell.seed,
-        finished=now(),
-        message=error,
-    )
+    facts = row_facts(run.name, run.cell.recipe, run.configuration)
+    return Row(**facts, status="failed", finished=now(), message=error)
