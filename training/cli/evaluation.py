@@ -28,6 +28,8 @@ SCRIPT_BATCH, SCRIPT_TOLERANCE = 50, 0.01  # of the authors' script; what differ
 LONGEST_PAST_S = 60.0
 FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
+HEARD_FIGURES = ("distance_db", "level_db", "rise_db", "pitch_cents", "split_cents", "runs_away_s", "hum_db")
+HEARD_HEADS = ("spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s", "hum dB")
 REPORTED = {
     "se": "standard error over trajectories (bootstrap)",
     "spread": "spread over the trajectories",
@@ -82,22 +84,15 @@ def evaluate(
 
     They are printed beside those stored in the preset. A preset of many strings is measured on new plucks of one.
     """
-    of_heard = (("--all", everything), ("--write", write))
-    of_string = (("--string", string), ("--rate", rate), ("--modes", modes))
-    of_data = (
-        ("--past", past),
-        ("--partials", partials),
-        ("--trajectories", trajectories),
-        ("--held-out", fresh),
-        ("--on", on),
-        *of_string,
-    )
-    for option, value in of_data if heard else of_heard:
-        if value:
-            raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)
-    for option, value in of_string if on is not None else ():
-        if value:
-            raise typer.BadParameter("does not go with --on, whose run has a string", param_hint=option)
+    of_heard = {"--all": everything, "--write": write}
+    of_string = {"--string": string, "--rate": rate, "--modes": modes}
+    of_data = {"--past": past, "--partials": partials, "--trajectories": trajectories, "--held-out": fresh}
+    if heard:
+        _refuse({**of_data, "--on": on, **of_string}, "does not go with --heard")
+    else:
+        _refuse(of_heard, "does not go without --heard")
+    if on is not None:
+        _refuse(of_string, "does not go with --on, whose run has a string")
     if heard:
         _evaluate_heard(preset, everything, write, json)
         return
@@ -116,9 +111,13 @@ def evaluate(
     splits: tuple[str, ...] = ("validation", "test") if split == "both" else (split,)
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
-    _check_trajectories(trajectories, configuration, splits)
+    from training.data.dataset import split_rows
     from training.evaluate import held_out
     from training.run import configuration_of
+
+    for rows in (split_rows(configuration.count, name) for name in splits):
+        if trajectories is not None:
+            check_range("--trajectories", trajectories, 1, rows.stop - rows.start)
 
     if fresh is None:
         data = replace(load_data(configuration, cache), scale_m=info.scale_m)
@@ -156,15 +155,45 @@ def evaluate(
             _print_partials(name, window_errors)
 
 
+def _refuse(options: dict[str, Any], words: str) -> None:
+    """Raise typer.BadParameter at the first of these options that was given."""
+    for option, value in options.items():
+        if value:
+            raise typer.BadParameter(words, param_hint=option)
+
+
 def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
+    """Compare the sound of presets with the truth and print the differences, the truest preset first.
+
+    Presets that cannot be used are reported and left out.
+    """
     from engine.folders import usable_files
-    from engine.presets import find_preset
-    from training.cli.heard import show_heard
+    from engine.presets import PresetError, find_preset
+    from engine.schema import write as plain
+    from training.heard import measure
+    from training.heard_words import heard_word
 
     if everything == (preset is not None):
         raise typer.BadParameter("give a preset, or --all for all of them", param_hint="PRESET")
-    files = usable_files()
-    show_heard(files if preset is None else [find_preset(preset, files)], write, json)
+    files, rows = list(usable_files()), []
+    if preset is not None:
+        files = [find_preset(preset, files)]
+    with progress("listen") as report:
+        shares = Shares(report, len(files))
+        for path in files:
+            try:
+                rows.append(measure(path, write, shares.next()))
+            except (PresetError, ValueError) as error:
+                say(str(error))
+    rows.sort(key=lambda row: row.distance_db)
+    if json:
+        print_json([{**plain(row), "heard": heard_word(row)} for row in rows])
+        return
+    table = []
+    for row in rows:
+        figures = (getattr(row, name) for name in HEARD_FIGURES)
+        table.append([row.name, heard_word(row), *(None if v is None else round(v, 2) + 0.0 for v in figures)])
+    print_table(("preset", "heard", *HEARD_HEADS), table)
 
 
 @dataclass(frozen=True)
@@ -329,32 +358,23 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     return data_of(preset)
 
 
-def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:
-    from training.data.dataset import split_rows
-
-    for split in splits:
-        rows = split_rows(data.count, split)
-        if wanted is not None:
-            check_range("--trajectories", wanted, 1, rows.stop - rows.start)
-
-
-def _differ(errors: dict[str, Any], name: str) -> bool:
-    """Return True if the mean over batches is not the split's error within a percent."""
-    whole, batches = errors[name], errors[f"{name}_batches"]
-    return not math.isclose(whole, batches, rel_tol=SCRIPT_TOLERANCE)
-
-
 def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: Known) -> None:
+    def pair(form: str) -> list[Any]:
+        return [errors[form.format(name)] for name in ("rel_mse", "rel_mae")]
+
+    def tell(words: str, form: str) -> None:
+        if form.format("rel_mse") in errors:
+            print(f"{words}: {', '.join(map(number, pair(form)))}")
+
     print(f"{split.replace('_', ' ')}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
-    if "rel_mse_batches" in errors and any(_differ(errors, name) for name in ("rel_mse", "rel_mae")):
-        mse, mae = (number(errors[f"{name}_batches"]) for name in ("rel_mse", "rel_mae"))
-        print(f"mean over batches of {SCRIPT_BATCH}, as the authors' script has it: {mse}, {mae}")
-    if "stored_rel_mse" in errors:
-        print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
+    if "rel_mse_batches" in errors:
+        both = zip(pair("{}"), pair("{}_batches"), strict=True)
+        if not all(math.isclose(whole, mean, rel_tol=SCRIPT_TOLERANCE) for whole, mean in both):
+            tell(f"mean over batches of {SCRIPT_BATCH}, as the authors' script has it", "{}_batches")
+    tell("stored in the preset", "stored_{}")
     print_known(known)
-    for key, text in REPORTED.items():
-        if f"rel_mse_{key}" in errors:
-            print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")
+    for key, words in REPORTED.items():
+        tell(words, f"{{}}_{key}")
     print(
         f"{errors['trajectories']} trajectories, trained to {horizon_s:g} s; "
         f"sound at {DEFAULT_LISTEN:g} of the length: null depth {errors['null_depth_db']:.1f} dB, "
@@ -371,20 +391,13 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: K
     columns = ("from s", "to s", "rel. MSE", "± se", "rel. MAE", "± se", "null dB", "convergence", "spectra dB", "")
     figures = ("rel_mse", "rel_mse_se", "rel_mae", "rel_mae_se", "null_depth_db", "spectral_convergence")
     keys = ("start_s", "stop_s", *figures, "log_spectrum_db")
-    print_table(
-        columns,
-        [
-            [*(w[key] for key in keys), "past the training horizon" if w["past_horizon"] else ""]
-            for w in errors["windows"]
-        ],
-    )
+    words = {True: "past the training horizon", False: ""}
+    print_table(columns, [[*(w[key] for key in keys), words[w["past_horizon"]]] for w in errors["windows"]])
 
 
 def _by_rise(group: dict[str, Any]) -> list[object]:
-    rises, shares = (
-        [100 * group[name] for name in names] for names in (("from_rise", "to_rise"), ("share", "largest"))
-    )
-    return [group["trajectories"], *rises, group["rel_mse"], group["rel_mae"], *shares]
+    low, high, share, largest = (100 * group[name] for name in ("from_rise", "to_rise", "share", "largest"))
+    return [group["trajectories"], low, high, group["rel_mse"], group["rel_mae"], share, largest]
 
 
 def _print_partials(split: str, partials: dict[str, Any]) -> None:
@@ -394,16 +407,5 @@ def _print_partials(split: str, partials: dict[str, Any]) -> None:
     columns = ("mode", "trajectories", *figures)
     rows = [list(mode.values()) for mode in partials["modes"]]
     w = partials["weighted"]
-    mean = [
-        "all, by energy",
-        "",
-        "",
-        w["level_db"],
-        w["phase_cycles"],
-        w["cents"],
-        "",
-        "",
-        "",
-        w["glide_error_cents"],
-    ]
-    print_table(columns, [*rows, mean])
+    means = [w["level_db"], w["phase_cycles"], w["cents"], "", "", "", w["glide_error_cents"]]
+    print_table(columns, [*rows, ["all, by energy", "", "", *means]])

@@ -144,13 +144,10 @@ def _named(
 
 def _tell_row(file: Path, row: Row) -> None:
     print(file)
-    for split, mse, mae in (
-        ("validation", row.rel_mse, row.rel_mae),
-        ("test", row.test_rel_mse, row.test_rel_mae),
-    ):
-        print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
+    _print_errors("validation", row.rel_mse, row.rel_mae)
+    _print_errors("test", row.test_rel_mse, row.test_rel_mae)
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
-        print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
+        _print_errors("untrained", row.start_rel_mse, row.start_rel_mae, " (validation)")
     epoch = "" if row.epochs == 1 else f", best epoch {row.best_epoch}"  # a closed form has one
     print(f"trained in  {duration(row.seconds or 0.0)}{epoch}")
 
@@ -186,12 +183,16 @@ def known_errors(run: TrainingConfiguration) -> Known:
 
 def print_known(known: Known) -> None:
     for whose, (mse, mae) in known.items():
-        print(f"{whose:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)} (validation)")
+        _print_errors(whose, mse, mae, " (validation)")
+
+
+def _print_errors(what: str, mse: float | None, mae: float | None, note: str = "") -> None:
+    print(f"{what:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}{note}")
 
 
 def _tell_heard(file: Path) -> None:
     """Compare the sound of the preset with the truth, and add the result to the table beside it."""
-    from training.cli.heard import measure
+    from training.heard import measure
     from training.heard_words import heard_sentence
 
     try:
@@ -212,9 +213,7 @@ def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Datase
 def _device(wanted: Device) -> str:
     import torch
 
-    if wanted == "cpu":
-        return "cpu"
-    if torch.cuda.is_available():
+    if wanted != "cpu" and torch.cuda.is_available():
         return "cuda"
     if wanted == "cuda":
         raise Failure("no CUDA device can be used here; choose --device cpu")
