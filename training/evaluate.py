@@ -16,15 +16,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from engine.compare.partials import (
-    PartialErrors,
-    PartialTrack,
-    partial_errors,
-    segment_frames,
-    track_partials,
-)
+from engine.compare.partials import PartialErrors, PartialTrack, partial_errors, segment_frames, track_partials
 from engine.compare.relative import ErrorSums, RelativeError
-from engine.compare.spectra import Array, spectral_distances
+from engine.compare.spectra import spectral_distances
 from engine.compare.true_partials import true_phasors
 from engine.models.base import KoopmanModel, StringModel
 from engine.pluck import DEFAULT_LISTEN
@@ -143,7 +137,10 @@ def evaluate_past_horizon(
                 first = last
                 report((part + first / steps) / len(parts))
             distances.append([spectral_distances(*sounds[..., 1:][..., span].numpy()) for span in spans])
-    spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
+    spectra = []
+    for of_window in zip(*distances, strict=True):
+        means = (float(np.concatenate(values).mean()) for values in zip(*of_window, strict=True))
+        spectra.append(SpectralDistance(*means))
     return MotionErrors(string, sound, spectra)
 
 
@@ -178,14 +175,7 @@ def evaluate_partials(
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
             state, tracks = model.encode(torch.from_numpy(initial[rows] @ synthesis).float().to(device)), []
-            true = true_phasors(
-                c.resonator,
-                initial[rows],
-                c.rate_hz,
-                steps,
-                block,
-                substeps=c.substeps,
-            )
+            true = true_phasors(c.resonator, initial[rows], c.rate_hz, steps, block, substeps=c.substeps)
             for first, truth in zip(range(0, steps, block), true, strict=True):
                 predicted, state = model.advance(state, truth.shape[1], analysis)
                 tracks.append(track_partials(predicted.cpu().numpy() * np.float32(dataset.scale_m), truth, length))
@@ -267,20 +257,11 @@ def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple
         stored = dataset.amplitudes[rows, : steps + 1]
         return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
     initial = torch.from_numpy(draw_initial(c)[rows])
-    return initial, _simulated(_solver(c), initial, steps, block)
+    return initial, _simulated(c, initial, steps, block)
 
 
-def _simulated(solver: SplittingSolver, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
-    state = ModalState.at_rest(initial)
+def _simulated(c: DatasetConfiguration, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
+    solver, state = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps), ModalState.at_rest(initial)
     for first in range(0, steps, block):
         frames, state = solver.advance(state, min(block, steps - first))
         yield frames
-
-
-def _solver(c: DatasetConfiguration) -> SplittingSolver:
-    return SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
-
-
-def _mean_distance(of_parts: Sequence[tuple[Array, Array]]) -> SpectralDistance:
-    convergence, log_db = (float(np.concatenate(values).mean()) for values in zip(*of_parts, strict=True))
-    return SpectralDistance(convergence, log_db)

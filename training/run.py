@@ -6,8 +6,8 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -136,8 +136,13 @@ def run_rows(
 def _known_row(run: NamedRun, runs: Path) -> Row | None:
     """The row that the run left in its folder; None where there is none, or one of another configuration."""
     file = runs / run.name / "row.json"
-    row = _read_row(file) if file.exists() else None
-    return row if row is not None and row.digest == run.configuration.digest else None
+    if not file.exists():
+        return None
+    try:
+        row = read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
+    except ValueError as error:
+        raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
+    return row if row.digest == run.configuration.digest else None
 
 
 def _row(
@@ -193,18 +198,13 @@ def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
         return False
 
 
-@contextmanager
-def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
+def _held(path: Path, waits: Callable[[], None]) -> AbstractContextManager[object]:
     lock = FileLock(path)
     try:
-        lock.acquire(timeout=0)
+        return lock.acquire(timeout=0)
     except Timeout:
         waits()
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()
+        return lock.acquire()
 
 
 def row_errors(
@@ -284,13 +284,6 @@ def _figures(configuration: TrainingConfiguration, result: FitResult, sums: Erro
     for number, window in enumerate(sums.windows(data.rate_hz / data.stride, edges_s), 1):
         figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
     return figures
-
-
-def _read_row(file: Path) -> Row:
-    try:
-        return read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
-    except ValueError as error:
-        raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
 
 
 def default_runs() -> Path:

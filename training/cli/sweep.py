@@ -96,19 +96,19 @@ def sweep(
         return
     left = len(unfinished(chosen, known))
     every_s = None if minutes is None else PIECE_CHECKPOINT_S
+    kind: str = device
     if scheduler is None:
         layout = fitted(max(left, 1), device=device, workers=workers, threads=threads, per_device=per_device)
-        seeds_at_once = layout.device == "cuda"
-        options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, seeds_at_once, ends_s)
+        kind, threads = layout.device, layout.threads
         opened = process_workers(layout)
     else:
-        options = Options(file, runs, cache, device, threads, retries, every_s, device == "cuda", ends_s)
         if open_to_anybody(scheduler):
             say(
                 f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"
                 " on its workers; use tls:// with certificates, or a private network"
             )
         opened = cluster_workers(scheduler, workers)
+    options = Options(file, runs, cache, kind, threads, retries, every_s, kind == "cuda", ends_s)
     say(f"{chosen.name}: {left} of {len(chosen.runs)} runs to do; rows go to {file}")
     rows = [row for row in known if row.digest in {run.digest for run in chosen.runs}]
     if left:
@@ -142,11 +142,11 @@ def merge(
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:
-    rows = {row.digest: row for row in known}
+    errors = {row.digest: (row.status, row.rel_mae) for row in known}
     facts = []
     for run in plan.runs:
-        row = rows.get(run.digest)
-        facts.append({"name": run.name, "status": row.status if row else "", "rel_mae": row.rel_mae if row else None})
+        status, rel_mae = errors.get(run.digest, ("", None))
+        facts.append({"name": run.name, "status": status, "rel_mae": rel_mae})
     if json:
         print_json(facts)
         return
@@ -155,11 +155,7 @@ def _list(plan: Plan, known: list[Row], json: bool) -> None:
 
 
 def _tell(rows: list[Row], json: bool) -> None:
-    """Print the rows.
-
-    Raises:
-        Failure: one has failed.
-    """
+    """Print the rows. Raises Failure: one has failed."""
     from engine.schema import write
 
     if json:

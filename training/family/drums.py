@@ -264,22 +264,14 @@ def measure_drum(
     size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
     silent_below = UNHEARD * float(size @ struck.weight) * rate_hz
     last = others[-1] if tenth and others[-1].energy > silent_below else None
-    return [
-        DrumError(
-            number,
-            name,
-            struck.kind,
-            struck.pitch_hz,
-            struck.resonator.modes,
-            struck.tension_rise,
-            "blow" if struck.speeds_m_s.any() else "pressed",
-            first.rel_mse[name],
-            None if last is None else last.rel_mse[name],
-            first.processor_s[name],
-            SLOWER if tenth else 1.0,
-        )
-        for name in players
-    ]
+    blow = "blow" if struck.speeds_m_s.any() else "pressed"
+    drum = struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise, blow
+    errors = []
+    for name in players:
+        late = None if last is None else last.rel_mse[name]
+        slower = SLOWER if tenth else 1.0
+        errors.append(DrumError(number, name, *drum, first.rel_mse[name], late, first.processor_s[name], slower))
+    return errors
 
 
 @dataclass(frozen=True)
@@ -321,16 +313,13 @@ def motion_errors(
 
     def window(first: int, stop: int, of: slice) -> Window:
         whole = float(energy[of].sum())
-        errors = [_finite(sums / whole) if whole else math.nan for sums in wrong[of].sum(0)]
+        errors = [sums / whole if whole else math.nan for sums in wrong[of].sum(0).tolist()]
+        errors = [math.inf if whole and not math.isfinite(error) else error for error in errors]
         by_player = (dict(zip(players, sums, strict=True)) for sums in (errors, spent[of].sum(0).tolist()))
         return Window(first / rate_hz, stop / rate_hz, whole, *by_player)
 
     parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
     return [window(0, frames, slice(None)), *parts]
-
-
-def _finite(error: float) -> float:
-    return float(error) if math.isfinite(error) else math.inf
 
 
 def measure_drums(

@@ -126,10 +126,6 @@ def _noise_power(samples: Array, rate_hz: int, onset: int) -> float:
     block = max(1, round(0.05 * rate_hz))
     blocks = [samples[first : first + block] for first in range(0, max(0, onset - block // 2 - block), block)]
     count = min(6, (len(samples) - onset) // (2 * block))
-    blocks += [
-        samples[len(samples) - (block_samples + 1) * block : len(samples) - block_samples * block]
-        for block_samples in range(count)
-    ]
-    powers = [float(np.mean(block_samples**2)) for block_samples in blocks if len(block_samples)]
-    positive = [power for power in powers if power > 0]
-    return min(positive, default=1e-14)
+    blocks += [samples[end - block : end] for end in range(len(samples), len(samples) - count * block, -block)]
+    powers = [float(np.mean(of_block**2)) for of_block in blocks if len(of_block)]
+    return min((power for power in powers if power > 0), default=1e-14)

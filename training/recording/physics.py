@@ -280,18 +280,13 @@ def corrections(physics: LearnedPhysics, string: StringParameters) -> dict[str, 
     sigma = decay_rates(string, count)
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
     smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
-    smooth = sigma * np.exp(
-        np.interp(np.log(omega), np.log(2 * math.pi * np.array(physics.smooth_hz)), np.log(smooth_ratio))
-    )
-    shared = [partial for partial in physics.partials if len(partial.poles) == 2]
-    split = float(np.median([_split(partial.poles) for partial in shared])) if shared else 0.0
-    slower = (
-        float(np.median([partial.poles[1].decay / partial.poles[0].decay for partial in shared])) if shared else 1.0
-    )
-    cents, ratio = np.zeros(count), np.ones(count)
-    second_cents = np.full(count, split)
-    second_ratio = np.full(count, slower)
-    share = np.zeros(count)
+    nodes = np.log(2 * math.pi * np.array(physics.smooth_hz))
+    smooth = sigma * np.exp(np.interp(np.log(omega), nodes, np.log(smooth_ratio)))
+    pairs = [partial.poles for partial in physics.partials if len(partial.poles) == 2]
+    split = float(np.median([_split(pair) for pair in pairs])) if pairs else 0.0
+    slower = float(np.median([second.decay / first.decay for first, second in pairs])) if pairs else 1.0
+    cents, ratio, share = np.zeros(count), np.ones(count), np.zeros(count)
+    second_cents, second_ratio = np.full(count, split), np.full(count, slower)
     for partial in physics.partials:
         place = partial.number - 1
         first = partial.poles[0]

@@ -136,12 +136,9 @@ class Fit:
         total = np.zeros(self.highest, complex)
         loudest = max((abs(pole.a) for pole in chosen), default=0.0)
         for pole in chosen:
-            if pole.a == 0:
-                continue
-            where = self.reach(pole, loudest)
-            value, _ = self.spectra(pole, where, slope=False)
-            a = pole.a * pole.s if derivative else pole.a
-            total[where] += 0.5 * (a * value[0] + a.conjugate() * value[1])
+            if pole.a:
+                where = self.reach(pole, loudest)
+                total[where] += self.part([replace(pole, a=pole.a * pole.s) if derivative else pole], where)
         return total
 
     def gliding(self) -> list[Pole]:
@@ -154,12 +151,6 @@ class Fit:
         """The bins in which the poles that do not glide are fitted."""
         reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.free), default=0.0)
         return slice(1, min(self.highest, max(2, round(reach / self.step_hz))))
-
-    def left(self) -> float:
-        """The share of the energy that the poles leave."""
-        residual = self.data - self.model()
-        above = self.energy - float(np.vdot(self.data, self.data).real)
-        return (float(np.vdot(residual, residual).real) + max(0.0, above)) / self.energy
 
     # Steps
 

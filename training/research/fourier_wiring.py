@@ -51,9 +51,8 @@ def store_in_frnn(model: FRNN, modes: StringModes) -> None:
         ValueError: see `wire_frnn`.
     """
     c = model.configuration
-    _store(
-        model, wire_frnn(modes, c.width, c.depth), [m for m in model.modules() if isinstance(m, FourierConvolution)]
-    )
+    layers = [module for module in model.modules() if isinstance(module, FourierConvolution)]
+    _store(model, wire_frnn(modes, c.width, c.depth), layers)
     with torch.no_grad():
         for parameter in model.pointwise_layers.parameters():
             parameter.zero_()
@@ -156,9 +155,7 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
         raise ValueError(f"{count} modes need a width of {1 + 2 * pairs} and a depth of 3, not {width} and {depth}")
-    field = 0
-    now = 1
-    rate = 1 + pairs
+    field, now, rate = 0, 1, 1 + pairs  # first channels
     last = points - 1
     analyse, turn, synthesise = layers = tuple(Kernels(points, width) for _ in range(3))
     for layer in layers:
