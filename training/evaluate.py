@@ -62,6 +62,11 @@ def _predicted(model: StringModel[Any], initial: Tensor, kept: int, stride: int)
     return model(initial, kept * stride)[:, stride - 1 :: stride]
 
 
+def figures(error: RelativeError, form: str = "{}") -> dict[str, float]:
+    """The errors by name; in `form`, {} stands for rel_mse and rel_mae."""
+    return {form.format("rel_mse"): error.rel_mse, form.format("rel_mae"): error.rel_mae}
+
+
 @dataclass(frozen=True)
 class MotionErrors:
     """The errors of a split's motions, an infinite one where the model's output is not finite.

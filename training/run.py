@@ -31,7 +31,7 @@ from training.data.draws import (
     PLUCK_WIDTH_RANGE,
     WIDTH_RANGE,
 )
-from training.evaluate import evaluate_model
+from training.evaluate import evaluate_model, figures
 from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, SHORT_HORIZON, Row
@@ -88,12 +88,12 @@ def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitRe
     """
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
-    figures = row_errors(model, dataset, sums, configuration.steps)
-    save_preset(output, preset_info(configuration, dataset, result, figures), model)
+    errors = row_errors(model, dataset, sums, configuration.steps)
+    save_preset(output, preset_info(configuration, dataset, result, errors), model)
     weights = load_preset(output).model.state_dict()
     if not all(torch.equal(weights[name], weight) for name, weight in model.state_dict().items()):
         raise RuntimeError(f"{output}: holds other weights than the trained model; train it again")
-    return figures | _figures(configuration, result, sums["validation"])
+    return errors | _cost_and_spread(configuration, result, sums["validation"])
 
 
 def run_rows(
@@ -166,8 +166,8 @@ def _row(
     }
     if isinstance(outcome, Diverged):
         return Row(**facts, status="diverged", message=str(outcome), finished=provenance.now())
-    figures = _saved(configuration, dataset, outcome, run.output(runs))
-    row = Row(**facts, status="done", finished=provenance.now(), **figures)
+    columns = _saved(configuration, dataset, outcome, run.output(runs))
+    row = Row(**facts, status="done", finished=provenance.now(), **columns)
     if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
         return known  # the preset alone was missing: where and when it was trained stays
     with whole_file(runs / run.name / "row.json") as unfinished:
@@ -219,22 +219,16 @@ def row_errors(
     """
     columns: dict[str, float | None] = {}
     for split, prefix in PREFIXES.items():
-        columns |= _columns(prefix, "", whole[split])
+        columns |= _columns(f"{prefix}{{}}", whole[split])
         if steps >= SHORT_HORIZON and dataset.configuration.stride == 1:
             same = steps == SHORT_HORIZON
             short = whole[split] if same else evaluate_model(model, dataset, split, SHORT_HORIZON)
-            columns |= _columns(prefix, f"_{SHORT_HORIZON}", short)
+            columns |= _columns(f"{prefix}{{}}_{SHORT_HORIZON}", short)
     return columns
 
 
-def _columns(prefix: str, suffix: str, sums: ErrorSums) -> dict[str, float | None]:
-    total, deviation = sums.total(), sums.standard_error()
-    values = {
-        f"{prefix}rel_mse{suffix}": total.rel_mse,
-        f"{prefix}rel_mae{suffix}": total.rel_mae,
-        f"{prefix}rel_mse{suffix}_se": deviation.rel_mse,
-        f"{prefix}rel_mae{suffix}_se": deviation.rel_mae,
-    }
+def _columns(form: str, sums: ErrorSums) -> dict[str, float | None]:
+    values = figures(sums.total(), form) | figures(sums.standard_error(), f"{form}_se")
     return {name: value if math.isfinite(value) else None for name, value in values.items()}
 
 
@@ -266,24 +260,31 @@ def data_of(preset: Preset) -> DatasetConfiguration:
     return data
 
 
-def _figures(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
+def _cost_and_spread(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
     """The figures of a run: its cost, and how validation errors spread over trajectories and time, as in a row."""
-    spread, data = sums.spread(), configuration.data
-    figures: dict[str, Any] = {
-        "rel_mse_spread": spread.rel_mse,
-        "rel_mae_spread": spread.rel_mae,
+    data = configuration.data
+    columns: dict[str, Any] = {
+        **figures(sums.spread(), "{}_spread"),
+        **(figures(result.start, "start_{}") if result.start else {}),
         "parameters": count_parameters(result.model),
         "epochs": result.epochs,
-        "start_rel_mse": result.start.rel_mse if result.start else None,
-        "start_rel_mae": result.start.rel_mae if result.start else None,
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }
     horizon_s = configuration.steps / data.rate_hz
     edges_s = [horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
     for number, window in enumerate(sums.windows(data.rate_hz / data.stride, edges_s), 1):
-        figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
-    return figures
+        columns |= figures(window, f"{{}}_q{number}")
+    return columns
+
+
+def device_of(wanted: str) -> str:
+    """ "cpu" or "cuda", which "auto" takes where it can be used. Raises ValueError: it cannot, though it is wanted."""
+    if wanted != "cpu" and torch.cuda.is_available():
+        return "cuda"
+    if wanted == "cuda":
+        raise ValueError("no CUDA device can be used here; choose --device cpu")
+    return "cpu"
 
 
 def default_runs() -> Path:

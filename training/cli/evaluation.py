@@ -17,10 +17,11 @@ from training.cli.console import Shares, number, print_json, print_table, progre
 from training.cli.training import Known, known_errors, load_data, print_known
 
 if TYPE_CHECKING:
-    from engine.compare.relative import ErrorSums
+    from engine.compare.relative import RelativeError
     from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
+    from training.evaluate import SpectralDistance
 
 Split = Literal["validation", "test", "both"]
 WINDOWS = 4  # of the horizon
@@ -209,7 +210,7 @@ class _Measurement:
 
     def of(self, split: str) -> dict[str, Any]:
         """The figures of a split, all by name."""
-        from training.evaluate import errors_by_rise, evaluate_past_horizon
+        from training.evaluate import errors_by_rise, evaluate_past_horizon, figures
         from training.results import SHORT_HORIZON
 
         info = self.preset.info
@@ -224,46 +225,39 @@ class _Measurement:
             trajectories=slice(self.trajectories),
             report=self.report.next(),
         )
-        whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
         facts: dict[str, Any] = {
             "trajectories": len(motion.string.per_trajectory()[0]),
-            "rel_mse": whole.rel_mse,
-            "rel_mae": whole.rel_mae,
-            **_with_se(motion.string, 0, info.horizon_steps),
+            **figures(motion.string.total(info.horizon_steps)),
+            **figures(motion.string.standard_error(first=0, last=info.horizon_steps), "{}_se"),
             **self._stored(split),
-            "null_depth_db": sound.null_depth_db,
-            "spectral_convergence": motion.spectra[0].convergence,
-            "log_spectrum_db": motion.spectra[0].log_db,
+            **_sound(motion.sound.total(info.horizon_steps), motion.spectra[0]),
         }
         if not self.past_s:  # a trajectory's own error is over all that was measured
-            spread = motion.string.spread()
-            facts |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
-            batches = motion.string.mean_of_batches(SCRIPT_BATCH)
-            facts |= {"rel_mse_batches": batches.rel_mse, "rel_mae_batches": batches.rel_mae}
+            facts |= figures(motion.string.spread(), "{}_spread")
+            facts |= figures(motion.string.mean_of_batches(SCRIPT_BATCH), "{}_batches")
             if info.tension_modulated:
                 groups = errors_by_rise(motion.string, self.data.configuration, split)
                 facts["by_rise"] = [asdict(group) for group in groups]
         if info.horizon_steps > SHORT_HORIZON:
-            short = motion.string.total(SHORT_HORIZON)
-            facts |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
+            facts |= figures(motion.string.total(SHORT_HORIZON), f"{{}}_{SHORT_HORIZON}")
         edges = [0.0, *(stop_s for _, stop_s in windows)]
         sums = (motion.string.windows(info.rate_hz, edges), motion.sound.windows(info.rate_hz, edges))
-        facts["windows"] = [
-            {
-                **asdict(window),
-                **self._label(window.start_s, window.stop_s),
-                **_with_se(motion.string, *(round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))),
-                "null_depth_db": of_window.null_depth_db,
-                "spectral_convergence": spectrum.convergence,
-                "log_spectrum_db": spectrum.log_db,
-            }
-            for window, of_window, spectrum in zip(*sums, motion.spectra[1:], strict=True)
-        ]
+        facts["windows"] = []
+        for window, of_window, spectrum in zip(*sums, motion.spectra[1:], strict=True):
+            first, last = (round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))
+            facts["windows"].append(
+                {
+                    **asdict(window),
+                    **self._label(window.start_s, window.stop_s),
+                    **figures(motion.string.standard_error(first=first, last=last), "{}_se"),
+                    **_sound(of_window, spectrum),
+                }
+            )
         end_s = windows[-1][1]
         if self.past_s and end_s >= 2:  # whether it rings true: the question of every long run
             for name, start_s in (("first_second", 0.0), ("last_second", end_s - 1)):
                 (second,) = motion.string.windows(info.rate_hz, [start_s, start_s + 1])
-                facts[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
+                facts[name] = figures(second)
         if self.partials:
             facts["partials"] = self._partials(split, windows)
         return facts
@@ -311,10 +305,12 @@ class _Measurement:
         return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
 
 
-def _with_se(sums: ErrorSums, first: int, last: int) -> dict[str, float]:
-    """The standard errors of the errors of some frames, over trajectories."""
-    deviation = sums.standard_error(first=first, last=last)
-    return {"rel_mse_se": deviation.rel_mse, "rel_mae_se": deviation.rel_mae}
+def _sound(errors: RelativeError, distance: SpectralDistance) -> dict[str, float]:
+    return {
+        "null_depth_db": errors.null_depth_db,
+        "spectral_convergence": distance.convergence,
+        "log_spectrum_db": distance.log_db,
+    }
 
 
 def _on(preset: Preset, run: str) -> Preset:
@@ -391,8 +387,8 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: K
     columns = ("from s", "to s", "rel. MSE", "± se", "rel. MAE", "± se", "null dB", "convergence", "spectra dB", "")
     figures = ("rel_mse", "rel_mse_se", "rel_mae", "rel_mae_se", "null_depth_db", "spectral_convergence")
     keys = ("start_s", "stop_s", *figures, "log_spectrum_db")
-    words = {True: "past the training horizon", False: ""}
-    print_table(columns, [[*(w[key] for key in keys), words[w["past_horizon"]]] for w in errors["windows"]])
+    past = {True: "past the training horizon", False: ""}
+    print_table(columns, [[*(w[key] for key in keys), past[w["past_horizon"]]] for w in errors["windows"]])
 
 
 def _by_rise(group: dict[str, Any]) -> list[object]:

@@ -66,7 +66,7 @@ def train(
     """
     import torch
 
-    from training.run import default_runs, run_rows
+    from training.run import default_runs, device_of, run_rows
 
     if seeds > 1 and output is not None:
         raise typer.BadParameter(
@@ -91,7 +91,7 @@ def train(
                 named,
                 folder,
                 cache=cache,
-                device=_device(device),
+                device=device_of(device),
                 waits=lambda: say(f"{folder / named[0].name}: another process trains there; waiting for its end"),
             )
     except KeyboardInterrupt:
@@ -208,16 +208,6 @@ def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Datase
 
     with progress("data set") as report:
         return load_dataset(configuration, cache, report)
-
-
-def _device(wanted: Device) -> str:
-    import torch
-
-    if wanted != "cpu" and torch.cuda.is_available():
-        return "cuda"
-    if wanted == "cuda":
-        raise Failure("no CUDA device can be used here; choose --device cpu")
-    return "cpu"
 
 
 def training_report(report: ProgressReport) -> Callable[[FitProgress], None]:

@@ -51,8 +51,9 @@ class TrainingLog:
         """Add the epoch that has ended; later ones of an earlier run are dropped."""
         p, measured = progress, progress.validation
         figures = (p.loss, measured.rel_mse, measured.rel_mae) if measured else (p.loss, None, None)
+        loss, rel_mse, rel_mae = map(_rounded, figures)
         rate = _rounded(p.learning_rate) or 0.0
-        ended = Epoch(p.epoch, p.horizon, rate, *map(_rounded, figures), round(p.seconds, 2))
+        ended = Epoch(p.epoch, p.horizon, rate, loss, rel_mse, rel_mae, round(p.seconds, 2))
         if not self._trimmed:
             kept = [line for line in read_log(self.path) if line.epoch < ended.epoch] if self.path.exists() else []
             self.path.parent.mkdir(parents=True, exist_ok=True)

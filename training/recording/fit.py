@@ -230,8 +230,8 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[Complex]) -> None:
     bins = sum(2 * (where.stop - where.start) for where in wheres)
     more = 2 + 2 * len(takes.fits)  # numbers
     if bins * math.log(left / max(best, 1e-300)) > WORTH * more * math.log(bins):
-        for fit, two in zip(takes.fits, chosen, strict=True):
-            fit.poles[number] = two
+        for fit, own in zip(takes.fits, chosen, strict=True):
+            fit.poles[number] = own
         takes.damping[number] = FIRST_DAMPING
 
 

@@ -272,7 +272,7 @@ def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Arr
             break
         off = np.abs((hz / k) ** 2 - rows @ law) * k / hz
         scale = weight * k / hz / np.maximum(1.0, off / (2 * np.median(off) + 1e-9))
-    return law, rows, scale
+    return np.asarray(law, np.float64), rows, scale
 
 
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:

@@ -96,7 +96,8 @@ class Takes:
     ) -> tuple[float, list[list[Pole]], list[Complex]]:
         """The weighted energy that is left with the best amplitudes, the poles with them, and the residuals."""
         parts = zip(self.fits, poles, targets, wheres, strict=True)
-        energies, solved, rests = zip(*(fit.solve(*of_take) for fit, *of_take in parts), strict=True)
+        by_take = [fit.solve(take_poles, target, where) for fit, take_poles, target, where in parts]
+        energies, solved, rests = zip(*by_take, strict=True)
         total = sum(weight * left for weight, left in zip(self.weights, energies, strict=True))
         return total, list(solved), list(rests)
 
