@@ -279,7 +279,7 @@ def _cost_and_spread(configuration: TrainingConfiguration, result: FitResult, su
 
 
 def device_of(wanted: str) -> str:
-    """ "cpu" or "cuda", which "auto" takes where it can be used. Raises ValueError: it cannot, though it is wanted."""
+    """The device, cpu or cuda; "auto" takes CUDA where it can be used. Raises ValueError: CUDA cannot be used."""
     if wanted != "cpu" and torch.cuda.is_available():
         return "cuda"
     if wanted == "cuda":

@@ -102,14 +102,15 @@ def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
 
 def _seen_grid(motions: Tensor, steps: int) -> Tensor:
     """Exponentials where the motions (count, steps) of one shape have their energy."""
-    window = torch.hann_window(steps, periodic=False, dtype=motions.dtype)
-    power = torch.fft.rfft(motions * window).abs().square().mean(0)
+    power = (
+        torch.fft.rfft(motions * torch.hann_window(steps, periodic=False, dtype=motions.dtype)).abs().square().mean(0)
+    )
     share = power.cumsum(0) / power.sum()
     bin_width = 2 * math.pi / steps
     first, last = (share < OUTSIDE).sum(), (share < 1 - OUTSIDE).sum()
     reach = float(first - 2) * bin_width, float(last + 2) * bin_width
-    halves = [float(half.square().mean()) for half in motions.tensor_split(2, dim=1)]
-    decay = max(SLOWEST, math.log(halves[0] / halves[1])) / steps
+    early, late = (float(half.square().mean()) for half in motions.tensor_split(2, dim=1))
+    decay = max(SLOWEST, math.log(early / late)) / steps
     spacing = max(math.pi / 2 / steps, (reach[1] - reach[0]) / FREQUENCIES)
     return _grid(float(power.argmax()) * bin_width, reach, spacing, decay, steps)
 

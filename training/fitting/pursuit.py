@@ -77,8 +77,7 @@ class LatentFit:
         assert isinstance(model, Koopman)
         initial, targets = self.initial, self.targets
         if recipe.flip:
-            initial = torch.cat([initial, initial.flip(1)])
-            targets = torch.cat([targets, targets * self.mirror])
+            initial, targets = torch.cat([initial, initial.flip(1)]), torch.cat([targets, targets * self.mirror])
             initial, targets = torch.cat([initial, -initial]), torch.cat([targets, -targets])
         weights = [weight for weight in model.encoder.parameters() if weight.ndim > 1]
         optimiser = torch.optim.LBFGS(
