@@ -60,11 +60,7 @@ class NamedRun:
 
 
 def _logged(run: NamedRun, runs: Path) -> Seed:
-    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported.
-
-    Raises:
-        OSError: the preset's folder cannot be written.
-    """
+    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported."""
     output = run.output(runs)
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=output.parent):
@@ -80,12 +76,7 @@ def _logged(run: NamedRun, runs: Path) -> Seed:
 
 
 def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, output: Path) -> dict[str, Any]:
-    """Write the preset `output` of a finished fit; its errors and what it took, as in a row.
-
-    Raises:
-        RuntimeError: the preset that was written is not the model that was trained.
-        OSError: the folder cannot be written.
-    """
+    """Write the preset `output` of a finished fit; its errors and what it took, as in a row."""
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     errors = row_errors(model, dataset, sums, configuration.steps)
@@ -115,7 +106,9 @@ def run_rows(
         waits: is called where another process trains in such a folder, whose end is awaited.
 
     Raises:
-        ValueError, RuntimeError, OSError: see `fit_seeds`, `_logged` and `_saved`.
+        ValueError: see `fit_seeds`.
+        RuntimeError: a preset that was written is not the model that was trained.
+        OSError: a folder cannot be written.
     """
     with ExitStack() as locks:
         # never two in one folder, even where a worker that was taken for dead still trains

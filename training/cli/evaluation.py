@@ -327,10 +327,7 @@ def _on(preset: Preset, run: str) -> Preset:
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set of a preset, or of a run.
-
-    For a string of many, its plucks are as hard as the family's.
-    """
+    """The data set of a preset, or of a run; of a string of many, its plucks are as hard as the family's."""
     from training.cell import load
     from training.configuration import DatasetConfiguration
     from training.run import data_of

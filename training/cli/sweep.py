@@ -184,25 +184,24 @@ class Shown:
         self._begin = begin
         self._left = left
         self._at_once = at_once
-        self._reports: dict[str, ProgressReport] = {}
-        self._shown: dict[str, Callable[[FitProgress], None]] = {}
+        self._reports: dict[str, tuple[ProgressReport, Callable[[FitProgress], None]]] = {}
         self._last: dict[str, FitProgress] = {}  # of each run that is under way
         self._seconds: list[float] = []  # that finished runs took
         self._ended: Counter[str] = Counter(done=0)
 
     def started(self, run: PlannedRun) -> None:
-        self._reports[run.name] = self._begin(run.name)
-        self._shown[run.name] = training_report(self._reports[run.name])
+        report = self._begin(run.name)
+        self._reports[run.name] = report, training_report(report)
 
     def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
         self._last[run.name] = progress
-        self._shown[run.name](progress)
+        self._reports[run.name][1](progress)
 
     def failed(self, run: PlannedRun, error: str) -> None:
         say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:
-        self._reports.pop(row.name)(1.0)
+        self._reports.pop(row.name)[0](1.0)
         self._last.pop(row.name, None)
         self._left -= 1
         self._ended[row.status] += 1

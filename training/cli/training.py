@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from training.data.dataset import Dataset
     from training.fitting.fit import FitProgress
     from training.results import Row
-    from training.run import NamedRun
 
 Configuration = Annotated[
     str,
@@ -66,7 +65,8 @@ def train(
     """
     import torch
 
-    from training.run import default_runs, device_of, run_rows
+    from training.cell import Cell
+    from training.run import NamedRun, default_runs, device_of, run_rows
 
     if seeds > 1 and output is not None:
         raise typer.BadParameter(
@@ -86,7 +86,10 @@ def train(
                 begun.append(latest)
                 shown(latest)
 
-            named = [_named(name, configuration, output, follow) for name, configuration in with_seeds]
+            named = []
+            for name, configuration in with_seeds:
+                cell = Cell.parse(name)
+                named.append(NamedRun(name, cell.recipe if cell else "", configuration, output, follow))
             rows = run_rows(
                 named,
                 folder,
@@ -111,11 +114,7 @@ def train(
 
 
 def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, TrainingConfiguration]:
-    """Name and configuration of a run with its own seed or `seed`, plus `number`.
-
-    Raises:
-        typer.BadParameter: the name has a seed, and another is asked for.
-    """
+    """Name and configuration of a run with its own seed or `seed`, plus `number`."""
     from training.cell import Cell, load
 
     configuration, name = load(config), name_text(Path(config).stem)
@@ -132,16 +131,6 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
     return name, replace(configuration, title=title, recipe=recipe)
 
 
-def _named(
-    name: str, configuration: TrainingConfiguration, output: Path | None, report: Callable[[FitProgress], None]
-) -> NamedRun:
-    from training.cell import Cell
-    from training.run import NamedRun
-
-    cell = Cell.parse(name)
-    return NamedRun(name, cell.recipe if cell else "", configuration, output, report)
-
-
 def _tell_row(file: Path, row: Row) -> None:
     print(file)
     _print_errors("validation", row.rel_mse, row.rel_mae)
@@ -155,9 +144,7 @@ def _tell_row(file: Path, row: Row) -> None:
 def _tell_mean(rows: Sequence[Row]) -> None:
     """Print mean and standard deviation of the validation errors, as the paper's tables state them."""
     errors = {"MSE": [row.rel_mse or 0.0 for row in rows], "MAE": [row.rel_mae or 0.0 for row in rows]}
-    words = ", ".join(
-        f"rel. {name} {number(mean(values))} ± {number(stdev(values))}" for name, values in errors.items()
-    )
+    words = ", ".join(f"rel. {name} {number(mean(of))} ± {number(stdev(of))}" for name, of in errors.items())
     print(f"{len(rows)} seeds{'':<4} {words} (validation)")
 
 

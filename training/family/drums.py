@@ -31,7 +31,7 @@ from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
 from training.family.errors import SCALE_M, UNHEARD, geometric_mean, of_many, untrained
-from training.family.strings import substeps_of
+from training.family.strings import log_uniform, substeps_of
 from training.provenance import now
 
 T = TypeVar("T")
@@ -166,8 +166,7 @@ def _place(random: np.random.Generator, circle: bool) -> tuple[float, float]:
 
 
 def _between(random: np.random.Generator, ends: tuple[float, float]) -> float:
-    low, high = ends
-    return low if low == high else math.exp(random.uniform(math.log(low), math.log(high)))
+    return ends[0] if ends[0] == ends[1] else log_uniform(random, ends)
 
 
 # What plays them: each call gives the next frames, (frames, modes) in m

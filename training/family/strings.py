@@ -72,13 +72,13 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
     """A string and a pluck of it within any ranges; the shape is drawn where none is given."""
     while True:
         pitch_hz, inharmonicity = (_either(random, r) for r in (ranges.pitch_hz, ranges.inharmonicity))
-        t60_s, bright_t60_s = _log_uniform(random, ranges.t60_s), _log_uniform(random, ranges.bright_t60_s)
+        t60_s, bright_t60_s = log_uniform(random, ranges.t60_s), log_uniform(random, ranges.bright_t60_s)
         if bright_t60_s < t60_s:
             break
     string = string_of(pitch_hz, inharmonicity, t60_s, bright_t60_s)
     resonator = resonator_of(string, min(MOST_MODES, string.modes_below(HIGHEST_HZ)), grid_points=GRID_POINTS)
     drawn, place = DRAWN_SHAPES[int(random.integers(3))], float(random.uniform(*ranges.position))
-    half_width, rise = _log_uniform(random, ranges.half_width), _log_uniform(random, ranges.tension_rise)
+    half_width, rise = log_uniform(random, ranges.half_width), log_uniform(random, ranges.tension_rise)
     shape = shape or drawn
     width = 2 * half_width if shape == "raised_cosine" else half_width
     amplitudes = resonator.to_modes(displacement(shape, place, width, 1e-3, GRID_POINTS))
@@ -126,9 +126,9 @@ def displacement_m(plucked: PluckedString) -> Tensor:
     return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m.numpy()))
 
 
-def _log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
     return math.exp(random.uniform(math.log(bounds[0]), math.log(bounds[1])))
 
 
 def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]) -> float:
-    return _log_uniform(random, bounds[int(random.integers(len(bounds)))])
+    return log_uniform(random, bounds[int(random.integers(len(bounds)))])

@@ -102,9 +102,8 @@ def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
 
 def _seen_grid(motions: Tensor, steps: int) -> Tensor:
     """Exponentials where the motions (count, steps) of one shape have their energy."""
-    power = (
-        torch.fft.rfft(motions * torch.hann_window(steps, periodic=False, dtype=motions.dtype)).abs().square().mean(0)
-    )
+    window = torch.hann_window(steps, periodic=False, dtype=motions.dtype)
+    power = torch.fft.rfft(motions * window).abs().square().mean(0)
     share = power.cumsum(0) / power.sum()
     bin_width = 2 * math.pi / steps
     first, last = (share < OUTSIDE).sum(), (share < 1 - OUTSIDE).sum()

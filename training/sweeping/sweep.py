@@ -162,22 +162,17 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
 
 
 def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
-    """The rows of a task that has ended; or none, and why it failed.
-
-    Raises:
-        WorkersError: see `sweep`.
-    """
+    """The rows of a task that has ended; or none, and why it failed."""
     if future.cancelled():
         raise WorkersError("the scheduler has given up its tasks; is it still there? The same command continues")
     if died := future.exception():
-        return [], one_line(
-            f"its worker died: {type(died).__name__}: {died}; too little memory, or a fault in a library"
-        )
+        error = f"{type(died).__name__}: {died}"
+        return [], one_line(f"its worker died: {error}; too little memory, or a fault in a library")
     try:
         outcome = future.result()
         return [read(Row, row, "row") for row in outcome["rows"]], one_line(outcome["error"])
-    except SchemaError as error:
-        return [], f"its result makes no sense: {error}"
+    except SchemaError as refused:
+        return [], f"its result makes no sense: {refused}"
 
 
 def _failed(run: PlannedRun, error: str) -> Row:
