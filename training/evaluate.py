@@ -35,17 +35,13 @@ RISE_PARTS = (0.0, 0.5, 0.75, 0.9, 0.95, 1.0)  # of the trajectories, from the s
 Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
 
 
-def _silent(done: float) -> None:
-    pass
-
-
 @torch.no_grad()
 def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps: int | None = None) -> ErrorSums:
     """Error sums of the kept ones of frames 1 … steps (default: all) over every trajectory of the split."""
     c = dataset.configuration
     kept = (steps or c.steps) // c.stride
     device = next(model.parameters()).device
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m).float().to(device)
+    synthesis = dataset.synthesis.float().to(device)
     sums = ErrorSums(kept)
     with _in_evaluation(model):
         for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
@@ -101,7 +97,7 @@ def evaluate_past_horizon(
     windows_s: Windows = (),
     trajectories: slice = ALL,
     frames_at_once: int = FRAMES_AT_ONCE,
-    report: Callable[[float], None] = _silent,
+    report: Callable[[float], None] = lambda share: None,
 ) -> MotionErrors:
     """The errors of the frames 1 … horizon and of `seconds` more.
 
@@ -117,7 +113,7 @@ def evaluate_past_horizon(
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
+    synthesis = dataset.synthesis
     ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     edges = [edge for span in spans for edge in (span.start, span.stop)]
@@ -158,7 +154,7 @@ def evaluate_partials(
     *,
     trajectories: slice = ALL,
     frames_at_once: int = FRAMES_AT_ONCE,
-    report: Callable[[float], None] = _silent,
+    report: Callable[[float], None] = lambda share: None,
 ) -> PartialErrors:
     """The errors of the partials in windows of time, which may lie past the horizon; the other arguments as above.
 
@@ -169,7 +165,7 @@ def evaluate_partials(
         raise ValueError("windows_s must hold at least one window")
     c = dataset.configuration
     device = next(model.parameters()).device
-    synthesis = c.resonator.shapes / dataset.scale_m
+    synthesis = dataset.synthesis.numpy()
     analysis = torch.from_numpy(c.resonator.analysis).float().to(device)
     linear_hz = (c.resonator.eigenvalues().imag / (2 * math.pi)).tolist()
     length = segment_frames(c.rate_hz, linear_hz[0])

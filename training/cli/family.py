@@ -61,8 +61,7 @@ def evaluate(
     preset: PresetName,
     strings: Strings = 200,
     tenth: Annotated[
-        int,
-        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays."),
+        int, typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays.")
     ] = 0,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")

@@ -48,6 +48,11 @@ class Dataset:
     amplitudes: Tensor
     scale_m: float
 
+    @property
+    def synthesis(self) -> Tensor:
+        """From amplitudes to displacement in normalised units, float64 (modes, grid_points)."""
+        return torch.from_numpy(self.configuration.resonator.shapes / self.scale_m)
+
     def split(self, name: str) -> Tensor:
         """The amplitudes of "train", "validation" or "test"."""
         return self.amplitudes[split_rows(self.configuration.count, name)]

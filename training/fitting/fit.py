@@ -243,11 +243,10 @@ class TrainingState:
 
     @property
     def ended(self) -> bool:
-        patience = self.recipe.patience
         # while the latents are learned there is no prediction, and so none that is no better
         since = max(self._best_epoch, self._latent_steps // self._per_epoch)
-        patience_exhausted = patience > 0 and self.epoch - since >= patience
-        return self.ends_epoch and (self.epoch >= self.recipe.epochs or patience_exhausted)
+        gave_up = 0 < self.recipe.patience <= self.epoch - since
+        return self.ends_epoch and (self.epoch >= self.recipe.epochs or gave_up)
 
     @property
     def _latent_steps(self) -> int:
@@ -275,9 +274,9 @@ class TrainingState:
         recipe, steps = self.recipe, self._configuration.steps
         same_frames = recipe.first_horizon >= steps and keeps_every_frame(recipe, steps)
         same_sizes = self._data.count % recipe.batch_size == 0
-        same_work = same_frames and same_sizes and not (recipe.flip or recipe.latent_epochs or recipe.average_decay)
         same_layers = recipe.batch_statistics_until == 1 and recipe.optimiser == "adamw"
-        return same_work and same_layers
+        more_work = recipe.flip or recipe.latent_epochs or recipe.average_decay
+        return same_frames and same_sizes and same_layers and not more_work
 
     def begin_step(self) -> None:
         """Set the next step's rates and trajectories, where a recorded step reads them."""
@@ -481,8 +480,7 @@ def _fit_at_once(
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
-    synthesis = torch.from_numpy(dataset.configuration.resonator.shapes / dataset.scale_m).float()
-    truth = dataset.split("train")[:100, : configuration.steps + 1] @ synthesis
+    truth = dataset.split("train")[:100, : configuration.steps + 1] @ dataset.synthesis.float()
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
     report(FitProgress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))

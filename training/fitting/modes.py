@@ -94,10 +94,8 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
 
 def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
     """The training split on the grid, float64 (AT_ONCE, steps + 1, grid_points) at a time."""
-    c = dataset.configuration
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
     for part in dataset.split("train")[:, : steps + 1].split(AT_ONCE):
-        yield part.double() @ synthesis
+        yield part.double() @ dataset.synthesis
 
 
 def _seen_grid(motions: Tensor, steps: int) -> Tensor:

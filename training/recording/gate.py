@@ -276,13 +276,10 @@ def _two_in(peaks: Peaks, series: PartialSeries) -> tuple[float, float] | None:
 
 
 def _hum_db(note: Note, part: Array) -> float:
-    """The level of a peak that holds all that sounds before the attack, as a hum may.
-
-    The median over short blocks that are no digital silence, well before the onset, for an attack may be slow.
-    """
+    """The level of a peak that holds all that sounds before the attack, as a hum may: the median of short blocks."""
     block = round(HUM_BLOCK_S * note.rate_hz)
     count = max(0, note.onset - round(ATTACK_S * note.rate_hz)) // block
     powers = np.var(note.samples[: count * block].reshape(count, block), axis=1)
-    positive = powers[powers > 0]
+    positive = powers[powers > 0]  # no digital silence
     power = float(np.median(positive)) if len(positive) else 0.0
     return float(10 * np.log10(power / 2 * np.sum(np.hanning(len(part) + 2)) ** 2 + 1e-30))

@@ -108,10 +108,7 @@ def _mono(samples: Array) -> Array:
 
 
 def _without_silence(sound: Array) -> Array:
-    """The sound around zero, up to where it stops: one value, again and again, is silence, whatever the value.
-
-    Its beginning stays in its place, for times count from there.
-    """
+    """The sound around zero, up to where it stops: one value, again and again, is silence. Times stay as they are."""
     moves = np.flatnonzero(np.diff(sound))
     if len(moves) == 0:
         return np.zeros(len(sound))
