@@ -50,7 +50,7 @@ class Dataset:
 
     @property
     def synthesis(self) -> Tensor:
-        """From amplitudes to displacement in normalised units, float64 (modes, grid_points)."""
+        """The map from amplitudes to displacement in normalised units, float64 (modes, grid_points)."""
         return torch.from_numpy(self.configuration.resonator.shapes / self.scale_m)
 
     def split(self, name: str) -> Tensor:

@@ -278,7 +278,7 @@ def polarisations(poles: list[Pole], most_decays_apart: float = MOST_DECAYS_APAR
 def subspace_poles(envelope: Complex, count: int) -> Complex:
     """`count` factors z a step with envelope ≈ Σ a z^m, fewer where it is too short, (poles,).
 
-    By the shift invariance of their subspace (ESPRIT; Roy, Kailath 1989). A start only: on real notes they err.
+    By the shift invariance of their subspace (ESPRIT; Roy, Kailath 1989): erratic on real notes, so a start only.
     """
     length = min(len(envelope) // 2, LONGEST_WINDOW)
     if length <= count:

@@ -174,7 +174,7 @@ def bands_of(truth: Array, model: Array, rate_hz: int, noise_power: float) -> tu
 
 
 def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
-    """From the slope of the backward integral (Schroeder 1965), from -2 to -22 dB or as far as its noise lets."""
+    """The T60 by the slope of the backward integral (Schroeder 1965), from -2 to -22 dB or as its noise lets."""
     power = np.maximum(sound**2 - noise_power, -noise_power)
     left = np.cumsum(power[::-1])[::-1]
     if left[0] <= 0 or left[0] < 30 * noise_power * rate_hz * 0.05:

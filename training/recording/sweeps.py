@@ -42,7 +42,7 @@ class Takes:
         self.weights = [self.fits[0].energy / fit.energy for fit in self.fits]
 
     def residuals(self) -> list[Complex]:
-        """What all poles leave of each take's spectrum."""
+        """The part of each take's spectrum that all poles leave."""
         return [fit.data - fit.model() for fit in self.fits]
 
     def bands(self, number: int) -> list[slice]:
@@ -51,7 +51,7 @@ class Takes:
     def targets(
         self, poles: Sequence[list[Pole]], residuals: Sequence[Complex], wheres: Sequence[slice]
     ) -> list[Complex]:
-        """What the poles of each take have to explain: all that the others leave."""
+        """The part of each take's spectrum that its poles have to explain: all that the others leave."""
         parts = zip(self.fits, poles, residuals, wheres, strict=True)
         return [rest[where] + fit.part(take_poles, where) for fit, take_poles, rest, where in parts]
 
