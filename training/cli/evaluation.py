@@ -317,14 +317,13 @@ def _on(preset: Preset, run: str) -> Preset:
     """A preset of many strings with the string, rate, modes and horizon of a run's data."""
     from engine.presets import of_string
     from training.cell import load
-    from training.run import REPEATED
 
     data = load(run).data
     reported = replace(preset.info, tension_modulated=data.tension_modulated)
     described = of_string(replace(preset, info=reported), data.string, data.rate_hz, data.modes)
     # the errors that it reports are those of the family
-    info = replace(described.info, horizon_steps=data.steps, **dict.fromkeys(REPEATED))
-    return replace(described, info=info)
+    info = replace(described.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
+    return replace(described, info=replace(info, horizon_steps=data.steps))
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
