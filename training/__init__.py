@@ -9,6 +9,5 @@
 `sweeping`       many runs: the plan, its order, the workers
 `tables`         the paper's tables with our results
 `cli`            its commands, which the app adds to its own
-`figures`        pictures of presets and of runs
 `research`       what models are compared with, and starts that no preset needs to sound
 """

@@ -153,14 +153,11 @@ class RecipeCase:
             bounds.check_choice("model", model, MODELS)
 
     def matches(self, cell: Cell) -> bool:
-        wanted = (
-            (self.model, cell.model),
-            (self.initial, cell.initial),
-            (self.rate_hz, cell.rate_hz),
-            (self.horizon, cell.horizon),
-        )
-        kind = self.tension_modulated in (None, cell.tension_modulated)
-        return kind and all(not choice or value in choice for choice, value in wanted)
+        for name in ("model", "initial", "rate_hz", "horizon"):
+            choice = getattr(self, name)
+            if choice and getattr(cell, name) not in choice:
+                return False
+        return self.tension_modulated in (None, cell.tension_modulated)
 
 
 @dataclass(frozen=True)
@@ -218,16 +215,17 @@ def configuration_of(
             settings |= case.set
             sizes |= case.model_configuration
     protocol = _protocol(cell.initial, cell.rate_hz, cell.tension_modulated)
-    plain = {**write(protocol), **(data or {})}
-    dataset = read(DatasetConfiguration, plain, "data")
+    dataset = read(DatasetConfiguration, {**write(protocol), **(data or {})}, "data")
     fitted = read(Recipe, {**settings, "seed": cell.seed, **(recipe or {})}, str(path))
+    string = "tension-modulated" if cell.tension_modulated else "linear"
+    start = "Gaussian plucks" if cell.initial == "gaussian" else "noise as first displacement"
     try:
         return TrainingConfiguration(
             title=cell.title,
             model=cell.model,
             data=dataset,
             recipe=fitted,
-            description=_description(cell),
+            description=f"The paper's {string} nylon string after {start}, learned over {cell.horizon} frames.",
             model_configuration=sizes,
             horizon=cell.horizon,
         )
@@ -242,9 +240,3 @@ def follows_protocol(data: DatasetConfiguration) -> bool:
 
 def _protocol(initial: Literal["gaussian", "noise", "pluck"], rate_hz: int, modulated: bool) -> DatasetConfiguration:
     return DatasetConfiguration(initial, rate_hz, MODES[rate_hz], modulated)
-
-
-def _description(cell: Cell) -> str:
-    string = "tension-modulated" if cell.tension_modulated else "linear"
-    start = "Gaussian plucks" if cell.initial == "gaussian" else "noise as first displacement"
-    return f"The paper's {string} nylon string after {start}, learned over {cell.horizon} frames."

@@ -21,6 +21,12 @@ DIGEST_VERSION = 3  # of the rule that distinguishes runs
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
+def _check_least(value: object, least: int, *names: str) -> None:
+    for name in names:
+        if getattr(value, name) < least:
+            raise ValueError(f"{name} must be at least {least}, not {getattr(value, name)}")
+
+
 @dataclass(frozen=True)
 class DatasetConfiguration:
     """A set of simulated trajectories; the defaults are the paper's protocol (§4.1)."""
@@ -44,9 +50,7 @@ class DatasetConfiguration:
             raise ValueError(f"largest_tension_rise must be above 0, not {self.largest_tension_rise}")
         if self.count < 10:
             raise ValueError(f"count must be at least 10 for a split 80/10/10, not {self.count}")
-        for name in ("rate_hz", "modes", "steps", "stride"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
+        _check_least(self, 1, "rate_hz", "modes", "steps", "stride")
         if self.steps % self.stride:
             raise ValueError(f"steps must be a multiple of stride, {self.stride}, not {self.steps}")
         self.string.check_motion(self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
@@ -58,6 +62,11 @@ class DatasetConfiguration:
                 f"count {self.count}, steps {self.steps} and modes {self.modes} would be {size_bytes / 2**30:.3g} GiB"
                 " of data; ask for less"
             )
+
+    @property
+    def string_kind(self) -> str:
+        """The word of names and tables: "linear" or "nonlinear"."""
+        return "nonlinear" if self.tension_modulated else "linear"
 
     @cached_property
     def resonator(self) -> Resonator:
@@ -104,12 +113,8 @@ class Recipe:
     optimiser: Literal["adamw", "soap"] = "adamw"  # soap: Adam in the eigenbasis of the gradients' covariances
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
+        _check_least(self, 1, "epochs", "batch_size", "first_horizon", "validate_every")
+        _check_least(self, 0, "steps_per_batch", "patience", "latent_epochs", "latent_polish")
         if self.latent_polish and not self.latent_epochs:
             raise ValueError("latent_polish needs latent_epochs: it is the last of their steps")
         for name in ("warm_up", "grow_until", "average_decay"):

@@ -25,7 +25,7 @@ from engine.compare.partials import (
     true_phasors,
 )
 from engine.compare.relative import ErrorSums, RelativeError
-from engine.compare.spectra import Array, spectral_distances
+from engine.compare.spectra import spectral_distances
 from engine.models.base import KoopmanModel, StringModel
 from engine.pluck import DEFAULT_LISTEN
 from engine.resonators.sine_transform import listening_weights
@@ -41,17 +41,13 @@ RISE_PARTS = (0.0, 0.5, 0.75, 0.9, 0.95, 1.0)  # of the trajectories, from the s
 Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
 
 
-def _silent(done: float) -> None:
-    pass
-
-
 @torch.no_grad()
 def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps: int | None = None) -> ErrorSums:
     """Error sums of the kept ones of frames 1 … steps (default: all) over every trajectory of the split."""
     c = dataset.configuration
     kept = (steps or c.steps) // c.stride
     device = next(model.parameters()).device
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m).float().to(device)
+    synthesis = dataset.synthesis.float().to(device)
     sums = ErrorSums(kept)
     with _in_evaluation(model):
         for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
@@ -66,6 +62,11 @@ def _predicted(model: StringModel[Any], initial: Tensor, kept: int, stride: int)
         frames = stride * torch.arange(1, kept + 1, device=initial.device)
         return model.decode(model.latents(model.encode(initial).origin, frames))
     return model(initial, kept * stride)[:, stride - 1 :: stride]
+
+
+def figures(error: RelativeError, form: str = "{}") -> dict[str, float]:
+    """The errors by name; in `form`, {} stands for rel_mse and rel_mae."""
+    return {form.format("rel_mse"): error.rel_mse, form.format("rel_mae"): error.rel_mae}
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def evaluate_past_horizon(
     windows_s: Windows = (),
     trajectories: slice = ALL,
     frames_at_once: int = FRAMES_AT_ONCE,
-    report: Callable[[float], None] = _silent,
+    report: Callable[[float], None] = lambda share: None,
 ) -> MotionErrors:
     """The errors of the frames 1 … horizon and of `seconds` more.
 
@@ -118,7 +119,7 @@ def evaluate_past_horizon(
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
+    synthesis = dataset.synthesis
     ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     edges = [edge for span in spans for edge in (span.start, span.stop)]
@@ -143,7 +144,10 @@ def evaluate_past_horizon(
                 first = last
                 report((part + first / steps) / len(parts))
             distances.append([spectral_distances(*sounds[..., 1:][..., span].numpy()) for span in spans])
-    spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
+    spectra = []
+    for of_window in zip(*distances, strict=True):
+        means = (float(np.concatenate(values).mean()) for values in zip(*of_window, strict=True))
+        spectra.append(SpectralDistance(*means))
     return MotionErrors(string, sound, spectra)
 
 
@@ -156,7 +160,7 @@ def evaluate_partials(
     *,
     trajectories: slice = ALL,
     frames_at_once: int = FRAMES_AT_ONCE,
-    report: Callable[[float], None] = _silent,
+    report: Callable[[float], None] = lambda share: None,
 ) -> PartialErrors:
     """The errors of the partials in windows of time, which may lie past the horizon; the other arguments as above.
 
@@ -167,7 +171,7 @@ def evaluate_partials(
         raise ValueError("windows_s must hold at least one window")
     c = dataset.configuration
     device = next(model.parameters()).device
-    synthesis = c.resonator.shapes / dataset.scale_m
+    synthesis = dataset.synthesis.numpy()
     analysis = torch.from_numpy(c.resonator.analysis).float().to(device)
     linear_hz = (c.resonator.eigenvalues().imag / (2 * math.pi)).tolist()
     length = segment_frames(c.rate_hz, linear_hz[0])
@@ -178,14 +182,7 @@ def evaluate_partials(
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
             state, tracks = model.encode(torch.from_numpy(initial[rows] @ synthesis).float().to(device)), []
-            true = true_phasors(
-                c.resonator,
-                initial[rows],
-                c.rate_hz,
-                steps,
-                block,
-                substeps=c.substeps,
-            )
+            true = true_phasors(c.resonator, initial[rows], c.rate_hz, steps, block, substeps=c.substeps)
             for first, truth in zip(range(0, steps, block), true, strict=True):
                 predicted, state = model.advance(state, truth.shape[1], analysis)
                 tracks.append(track_partials(predicted.cpu().numpy() * np.float32(dataset.scale_m), truth, length))
@@ -267,20 +264,11 @@ def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple
         stored = dataset.amplitudes[rows, : steps + 1]
         return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
     initial = torch.from_numpy(draw_initial(c)[rows])
-    return initial, _simulated(_solver(c), initial, steps, block)
+    return initial, _simulated(c, initial, steps, block)
 
 
-def _simulated(solver: SplittingSolver, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
-    state = ModalState.at_rest(initial)
+def _simulated(c: DatasetConfiguration, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
+    solver, state = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps), ModalState.at_rest(initial)
     for first in range(0, steps, block):
         frames, state = solver.advance(state, min(block, steps - first))
         yield frames
-
-
-def _solver(c: DatasetConfiguration) -> SplittingSolver:
-    return SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
-
-
-def _mean_distance(of_parts: Sequence[tuple[Array, Array]]) -> SpectralDistance:
-    convergence, log_db = (float(np.concatenate(values).mean()) for values in zip(*of_parts, strict=True))
-    return SpectralDistance(convergence, log_db)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.compare.audible import FLOOR_DB, AudibleErrors, audible_errors, heard_level_db
 from engine.pluck import DEFAULT_LISTEN, Pluck
-from engine.presets import Preset, PresetInfo, preset_digest
+from engine.presets import Preset, PresetInfo, load_preset, preset_digest
 from engine.sources import ModelSource, Runaway
 from engine.values.ear import Ear
 from engine.voices import Program, model_program, render_voice, truth_program, voice_blocks
 from engine.voices.voice import SILENT_DB
-from training.heard_file import Heard
+from training.heard_file import Heard, add_heard
 
 RATE_HZ = 48_000  # of the device: what is above half the preset's rate is heard of the truth
 AMPLITUDES_MM = (1.5, 4.0, 8.0)  # soft, normal, hard
@@ -58,15 +60,8 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
         truth = render_voice(programs[1], None, info, pluck, ear, wanted_s, until_db=UNTIL_DB)[:, 0]
         seconds = max(seconds, len(truth) / RATE_HZ)
         try:
-            model = render_voice(
-                programs[0],
-                source,
-                info,
-                pluck,
-                ear,
-                len(truth) / RATE_HZ,
-                lambda share, number=number: report((number + share) / parts),  # type: ignore[misc]
-            )[:, 0]
+            advanced = partial(_advanced, report, number, parts)
+            model = render_voice(programs[0], source, info, pluck, ear, len(truth) / RATE_HZ, advanced)[:, 0]
         except Runaway as error:
             runs_away_s.append(error.time_s)
         else:
@@ -74,11 +69,8 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
             errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
     hum_db = None
     if not runs_away_s:
-
-        def listened(share: float) -> None:
-            report((parts - 1 + share) / parts)
-
-        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, listened)
+        advanced = partial(_advanced, report, parts - 1, parts)
+        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, advanced)
     report(1.0)
     splits = [e.split_cents for e in errors if e.split_cents is not None]
     return Heard(
@@ -95,13 +87,25 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     )
 
 
+def measure(path: Path, write: bool, report: Callable[[float], None] = lambda share: None) -> Heard:
+    """The audible errors of a preset's file; `write`: add them to the table in its folder.
+
+    Raises:
+        PresetError, ValueError: the file cannot be used, or its model cannot start from a displaced string at rest.
+        OSError: the table cannot be written.
+    """
+    row = listen_to(load_preset(path), report)
+    if write:
+        add_heard(path.parent, [row])
+    return row
+
+
+def _advanced(report: Callable[[float], None], done: int, parts: int, share: float) -> None:
+    report((done + share) / parts)
+
+
 def _hum_db(
-    program: Program,
-    source: ModelSource,
-    info: PresetInfo,
-    pluck: Pluck,
-    ear: Ear,
-    advanced: Callable[[float], None],
+    program: Program, source: ModelSource, info: PresetInfo, pluck: Pluck, ear: Ear, advanced: Callable[[float], None]
 ) -> float | None:
     """The level of a model at the end of its voice, in dB of full scale; None: it is silent by then."""
     if program.ends_s > LONGEST_HUM_S:

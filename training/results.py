@@ -9,7 +9,7 @@ of the same run. From a row's `name` follows the command that repeats it: `learn
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -141,9 +141,8 @@ def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
             if old is None or _rank(row) > _rank(old):
                 by_digest[row.digest] = row
             elif _rank(row) == _rank(old):  # the same run, of which one may have been measured again
-                lacking = {name: value for name in COLUMNS if (value := getattr(old, name)) is not None}
                 known = {name: value for name in COLUMNS if (value := getattr(row, name)) is not None}
-                by_digest[row.digest] = Row(**(lacking | known))
+                by_digest[row.digest] = replace(old, **known)
         merged = sorted(by_digest.values(), key=lambda row: (row.name, row.digest))
         write_table(path, Row, merged)
     return merged

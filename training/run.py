@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,12 @@ import torch
 from filelock import FileLock, Timeout
 
 from engine.compare.relative import ErrorSums
-from engine.models.base import count_parameters
-from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
+from engine.models.base import StringModel, count_parameters
+from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write
 from engine.whole_file import whole_file
 from training import provenance
-from training.configuration import DatasetConfiguration, TrainingConfiguration
+from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration
 from training.data.dataset import Dataset, load_dataset
 from training.data.draws import (
     CENTRE_RANGE,
@@ -30,11 +31,13 @@ from training.data.draws import (
     PLUCK_WIDTH_RANGE,
     WIDTH_RANGE,
 )
-from training.evaluate import evaluate_model
+from training.evaluate import evaluate_model, figures
 from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
 from training.fitting.log import TrainingLog
-from training.results import QUARTERS, Row
-from training.row_errors import REPEATED, configuration_of, row_errors
+from training.results import QUARTERS, SHORT_HORIZON, Row
+
+PREFIXES = {"validation": "", "test": "test_"}
+REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
 
 
 @dataclass(frozen=True)
@@ -57,11 +60,7 @@ class NamedRun:
 
 
 def _logged(run: NamedRun, runs: Path) -> Seed:
-    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported.
-
-    Raises:
-        OSError: the preset's folder cannot be written.
-    """
+    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported."""
     output = run.output(runs)
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=output.parent):
@@ -77,20 +76,15 @@ def _logged(run: NamedRun, runs: Path) -> Seed:
 
 
 def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, output: Path) -> dict[str, Any]:
-    """Write the preset `output` of a finished fit; its errors and what it took, as in a row.
-
-    Raises:
-        RuntimeError: the preset that was written is not the model that was trained.
-        OSError: the folder cannot be written.
-    """
+    """Write the preset `output` of a finished fit; its errors and what it took, as in a row."""
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
-    figures = row_errors(model, dataset, sums, configuration.steps)
-    save_preset(output, preset_info(configuration, dataset, result, figures), model)
+    errors = row_errors(model, dataset, sums, configuration.steps)
+    save_preset(output, preset_info(configuration, dataset, result, errors), model)
     weights = load_preset(output).model.state_dict()
     if not all(torch.equal(weights[name], weight) for name, weight in model.state_dict().items()):
         raise RuntimeError(f"{output}: holds other weights than the trained model; train it again")
-    return figures | _figures(configuration, result, sums["validation"])
+    return errors | _cost_and_spread(configuration, result, sums["validation"])
 
 
 def run_rows(
@@ -112,7 +106,9 @@ def run_rows(
         waits: is called where another process trains in such a folder, whose end is awaited.
 
     Raises:
-        ValueError, RuntimeError, OSError: see `fit_seeds`, `_logged` and `_saved`.
+        ValueError: see `fit_seeds`.
+        RuntimeError: a preset that was written is not the model that was trained.
+        OSError: a folder cannot be written.
     """
     with ExitStack() as locks:
         # never two in one folder, even where a worker that was taken for dead still trains
@@ -133,8 +129,13 @@ def run_rows(
 def _known_row(run: NamedRun, runs: Path) -> Row | None:
     """The row that the run left in its folder; None where there is none, or one of another configuration."""
     file = runs / run.name / "row.json"
-    row = _read_row(file) if file.exists() else None
-    return row if row is not None and row.digest == run.configuration.digest else None
+    if not file.exists():
+        return None
+    try:
+        row = read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
+    except ValueError as error:
+        raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
+    return row if row.digest == run.configuration.digest else None
 
 
 def _row(
@@ -148,15 +149,7 @@ def _row(
     """The row of a run that has ended; its preset and row are written."""
     configuration = run.configuration
     facts: dict[str, Any] = {
-        "digest": configuration.digest,
-        "name": run.name,
-        "model": configuration.model,
-        "string": "nonlinear" if configuration.data.tension_modulated else "linear",
-        "initial": configuration.data.initial,
-        "rate_hz": configuration.data.rate_hz,
-        "horizon": configuration.steps,
-        "recipe": run.recipe,
-        "seed": configuration.recipe.seed,
+        **row_facts(run.name, run.recipe, configuration),
         "initialisation": configuration.start,
         "device": torch.device(device).type,
         "threads": torch.get_num_threads(),
@@ -166,13 +159,28 @@ def _row(
     }
     if isinstance(outcome, Diverged):
         return Row(**facts, status="diverged", message=str(outcome), finished=provenance.now())
-    figures = _saved(configuration, dataset, outcome, run.output(runs))
-    row = Row(**facts, status="done", finished=provenance.now(), **figures)
+    columns = _saved(configuration, dataset, outcome, run.output(runs))
+    row = Row(**facts, status="done", finished=provenance.now(), **columns)
     if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
         return known  # the preset alone was missing: where and when it was trained stays
     with whole_file(runs / run.name / "row.json") as unfinished:
         unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
     return row
+
+
+def row_facts(name: str, recipe: str, configuration: TrainingConfiguration) -> dict[str, Any]:
+    """The columns of a row that say which run it is."""
+    return {
+        "digest": configuration.digest,
+        "name": name,
+        "model": configuration.model,
+        "string": configuration.data.string_kind,
+        "initial": configuration.data.initial,
+        "rate_hz": configuration.data.rate_hz,
+        "horizon": configuration.steps,
+        "recipe": recipe,
+        "seed": configuration.recipe.seed,
+    }
 
 
 def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
@@ -183,45 +191,93 @@ def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
         return False
 
 
-@contextmanager
-def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
+def _held(path: Path, waits: Callable[[], None]) -> AbstractContextManager[object]:
     lock = FileLock(path)
     try:
-        lock.acquire(timeout=0)
+        return lock.acquire(timeout=0)
     except Timeout:
         waits()
-        lock.acquire()
+        return lock.acquire()
+
+
+def row_errors(
+    model: StringModel[Any], dataset: Dataset, whole: Mapping[str, ErrorSums], steps: int
+) -> dict[str, float | None]:
+    """The columns of a row by name.
+
+    None for an error that is infinite, and none over 400 frames of a shorter run.
+
+    Args:
+        whole: of "validation" and "test", over `steps` frames.
+    """
+    columns: dict[str, float | None] = {}
+    for split, prefix in PREFIXES.items():
+        columns |= _columns(f"{prefix}{{}}", whole[split])
+        if steps >= SHORT_HORIZON and dataset.configuration.stride == 1:
+            same = steps == SHORT_HORIZON
+            short = whole[split] if same else evaluate_model(model, dataset, split, SHORT_HORIZON)
+            columns |= _columns(f"{prefix}{{}}_{SHORT_HORIZON}", short)
+    return columns
+
+
+def _columns(form: str, sums: ErrorSums) -> dict[str, float | None]:
+    values = figures(sums.total(), form) | figures(sums.standard_error(), f"{form}_se")
+    return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+def configuration_of(info: PresetInfo, where: str) -> TrainingConfiguration:
+    """The run that made a preset.
+
+    Raises:
+        SchemaError: the preset does not tell it.
+    """
+    return read_configuration(info.training, f"{where}: metadata.training")
+
+
+def data_of(preset: Preset) -> DatasetConfiguration:
+    """The data set on which a preset of one string was trained.
+
+    Raises:
+        PresetError: the preset does not name it, or names that of another model.
+    """
     try:
-        yield
-    finally:
-        lock.release()
+        data = configuration_of(preset.info, str(preset.path)).data
+    except SchemaError as error:
+        raise PresetError(f"{error}; without it the preset's data set is not known") from error
+    for name in ("rate_hz", "modes", "grid_points"):
+        mine, its = getattr(data, name), getattr(preset.info, name)
+        if mine != its:
+            raise PresetError(
+                f"{preset.path}: metadata.training.data.{name} is {mine}, the model's is {its}; get the preset again"
+            )
+    return data
 
 
-def _figures(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
+def _cost_and_spread(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
     """The figures of a run: its cost, and how validation errors spread over trajectories and time, as in a row."""
-    spread, data = sums.spread(), configuration.data
-    figures: dict[str, Any] = {
-        "rel_mse_spread": spread.rel_mse,
-        "rel_mae_spread": spread.rel_mae,
+    data = configuration.data
+    columns: dict[str, Any] = {
+        **figures(sums.spread(), "{}_spread"),
+        **(figures(result.start, "start_{}") if result.start else {}),
         "parameters": count_parameters(result.model),
         "epochs": result.epochs,
-        "start_rel_mse": result.start.rel_mse if result.start else None,
-        "start_rel_mae": result.start.rel_mae if result.start else None,
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }
     horizon_s = configuration.steps / data.rate_hz
     edges_s = [horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
     for number, window in enumerate(sums.windows(data.rate_hz / data.stride, edges_s), 1):
-        figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
-    return figures
+        columns |= figures(window, f"{{}}_q{number}")
+    return columns
 
 
-def _read_row(file: Path) -> Row:
-    try:
-        return read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
-    except ValueError as error:
-        raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
+def device_of(wanted: str) -> str:
+    """The device, cpu or cuda; "auto" takes CUDA where it can be used. Raises ValueError: CUDA cannot be used."""
+    if wanted != "cpu" and torch.cuda.is_available():
+        return "cuda"
+    if wanted == "cuda":
+        raise ValueError("no CUDA device can be used here; choose --device cpu")
+    return "cpu"
 
 
 def default_runs() -> Path:
@@ -259,12 +315,10 @@ def preset_info(
 
 def trained_range(data: DatasetConfiguration) -> TrainedRange:
     """The ranges of a data set's random draws; noise has neither a place nor a width."""
+    rise = data.largest_tension_rise
     if data.initial == "pluck":
-        position = PLUCK_POSITION_RANGE
-        width = PLUCK_WIDTH_RANGE
-        peak_m = PLUCK_PEAK_RANGE_M
-        widths = {"gaussian": width, "raised_cosine": width}
-        return TrainedRange(position, widths, peak_m, data.largest_tension_rise)
+        widths = {"gaussian": PLUCK_WIDTH_RANGE, "raised_cosine": PLUCK_WIDTH_RANGE}
+        return TrainedRange(PLUCK_POSITION_RANGE, widths, PLUCK_PEAK_RANGE_M, rise)
     if data.initial == "noise":
-        return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
-    return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
+        return TrainedRange(None, None, PEAK_RANGE_M, rise)
+    return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, rise)

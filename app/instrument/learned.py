@@ -32,8 +32,7 @@ from engine.presets import load_preset
 from engine.result_file import WriteError, explain, whole_file
 from engine.schema import explained
 from training.recording.fit import FREE_POLES
-from training.recording.joint import combined
-from training.recording.learn import Learned, examined, learn
+from training.recording.learn import Learned, combined, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
 from training.recording.physics import Kind
 from training.recording.preset import Source, body_response, listening_point, recorded_note, write_preset

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from engine.presets import find_preset, load_preset
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_past_horizon
-from training.row_errors import data_of
+from training.run import data_of
 
 HERE = Path(__file__).resolve().parent
 DATA = "nylon_nonlinear_gaussian_16k"

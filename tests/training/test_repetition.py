@@ -11,10 +11,10 @@ import pytest
 import torch
 
 from engine.presets import load_preset
+from tests.training.fits import fit
 from training.cell import Cell, configuration_of
 from training.data.dataset import Dataset
 from training.family.preset import FamilyConfiguration, train_preset
-from training.fitting.fit import fit
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
 KINDS = {

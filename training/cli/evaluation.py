@@ -17,10 +17,11 @@ from training.cli.console import Shares, number, print_json, print_table, progre
 from training.cli.training import Known, known_errors, load_data, print_known
 
 if TYPE_CHECKING:
-    from engine.compare.relative import ErrorSums
+    from engine.compare.relative import RelativeError
     from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
+    from training.evaluate import SpectralDistance
 
 Split = Literal["validation", "test", "both"]
 WINDOWS = 4  # of the horizon
@@ -28,6 +29,8 @@ SCRIPT_BATCH, SCRIPT_TOLERANCE = 50, 0.01  # of the authors' script; what differ
 LONGEST_PAST_S = 60.0
 FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
+HEARD_FIGURES = ("distance_db", "level_db", "rise_db", "pitch_cents", "split_cents", "runs_away_s", "hum_db")
+HEARD_HEADS = ("spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s", "hum dB")
 REPORTED = {
     "se": "standard error over trajectories (bootstrap)",
     "spread": "spread over the trajectories",
@@ -82,22 +85,15 @@ def evaluate(
 
     They are printed beside those stored in the preset. A preset of many strings is measured on new plucks of one.
     """
-    of_heard = (("--all", everything), ("--write", write))
-    of_string = (("--string", string), ("--rate", rate), ("--modes", modes))
-    of_data = (
-        ("--past", past),
-        ("--partials", partials),
-        ("--trajectories", trajectories),
-        ("--held-out", fresh),
-        ("--on", on),
-        *of_string,
-    )
-    for option, value in of_data if heard else of_heard:
-        if value:
-            raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)
-    for option, value in of_string if on is not None else ():
-        if value:
-            raise typer.BadParameter("does not go with --on, whose run has a string", param_hint=option)
+    of_heard = {"--all": everything, "--write": write}
+    of_string = {"--string": string, "--rate": rate, "--modes": modes}
+    of_data = {"--past": past, "--partials": partials, "--trajectories": trajectories, "--held-out": fresh}
+    if heard:
+        _refuse({**of_data, "--on": on, **of_string}, "does not go with --heard")
+    else:
+        _refuse(of_heard, "does not go without --heard")
+    if on is not None:
+        _refuse(of_string, "does not go with --on, whose run has a string")
     if heard:
         _evaluate_heard(preset, everything, write, json)
         return
@@ -116,9 +112,13 @@ def evaluate(
     splits: tuple[str, ...] = ("validation", "test") if split == "both" else (split,)
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
-    _check_trajectories(trajectories, configuration, splits)
+    from training.data.dataset import split_rows
     from training.evaluate import held_out
-    from training.row_errors import configuration_of
+    from training.run import configuration_of
+
+    for rows in (split_rows(configuration.count, name) for name in splits):
+        if trajectories is not None:
+            check_range("--trajectories", trajectories, 1, rows.stop - rows.start)
 
     if fresh is None:
         data = replace(load_data(configuration, cache), scale_m=info.scale_m)
@@ -156,15 +156,45 @@ def evaluate(
             _print_partials(name, window_errors)
 
 
+def _refuse(options: dict[str, Any], words: str) -> None:
+    """Raise typer.BadParameter at the first of these options that was given."""
+    for option, value in options.items():
+        if value:
+            raise typer.BadParameter(words, param_hint=option)
+
+
 def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
+    """Compare the sound of presets with the truth and print the differences, the truest preset first.
+
+    Presets that cannot be used are reported and left out.
+    """
     from engine.folders import usable_files
-    from engine.presets import find_preset
-    from training.cli.heard import show_heard
+    from engine.presets import PresetError, find_preset
+    from engine.schema import write as plain
+    from training.heard import measure
+    from training.heard_words import heard_word
 
     if everything == (preset is not None):
         raise typer.BadParameter("give a preset, or --all for all of them", param_hint="PRESET")
-    files = usable_files()
-    show_heard(files if preset is None else [find_preset(preset, files)], write, json)
+    files, rows = list(usable_files()), []
+    if preset is not None:
+        files = [find_preset(preset, files)]
+    with progress("listen") as report:
+        shares = Shares(report, len(files))
+        for path in files:
+            try:
+                rows.append(measure(path, write, shares.next()))
+            except (PresetError, ValueError) as error:
+                say(str(error))
+    rows.sort(key=lambda row: row.distance_db)
+    if json:
+        print_json([{**plain(row), "heard": heard_word(row)} for row in rows])
+        return
+    table = []
+    for row in rows:
+        figures = (getattr(row, name) for name in HEARD_FIGURES)
+        table.append([row.name, heard_word(row), *(None if v is None else round(v, 2) + 0.0 for v in figures)])
+    print_table(("preset", "heard", *HEARD_HEADS), table)
 
 
 @dataclass(frozen=True)
@@ -180,7 +210,7 @@ class _Measurement:
 
     def of(self, split: str) -> dict[str, Any]:
         """The figures of a split, all by name."""
-        from training.evaluate import errors_by_rise, evaluate_past_horizon
+        from training.evaluate import errors_by_rise, evaluate_past_horizon, figures
         from training.results import SHORT_HORIZON
 
         info = self.preset.info
@@ -195,46 +225,39 @@ class _Measurement:
             trajectories=slice(self.trajectories),
             report=self.report.next(),
         )
-        whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
         facts: dict[str, Any] = {
             "trajectories": len(motion.string.per_trajectory()[0]),
-            "rel_mse": whole.rel_mse,
-            "rel_mae": whole.rel_mae,
-            **_with_se(motion.string, 0, info.horizon_steps),
+            **figures(motion.string.total(info.horizon_steps)),
+            **figures(motion.string.standard_error(first=0, last=info.horizon_steps), "{}_se"),
             **self._stored(split),
-            "null_depth_db": sound.null_depth_db,
-            "spectral_convergence": motion.spectra[0].convergence,
-            "log_spectrum_db": motion.spectra[0].log_db,
+            **_sound(motion.sound.total(info.horizon_steps), motion.spectra[0]),
         }
         if not self.past_s:  # a trajectory's own error is over all that was measured
-            spread = motion.string.spread()
-            facts |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
-            batches = motion.string.mean_of_batches(SCRIPT_BATCH)
-            facts |= {"rel_mse_batches": batches.rel_mse, "rel_mae_batches": batches.rel_mae}
+            facts |= figures(motion.string.spread(), "{}_spread")
+            facts |= figures(motion.string.mean_of_batches(SCRIPT_BATCH), "{}_batches")
             if info.tension_modulated:
                 groups = errors_by_rise(motion.string, self.data.configuration, split)
                 facts["by_rise"] = [asdict(group) for group in groups]
         if info.horizon_steps > SHORT_HORIZON:
-            short = motion.string.total(SHORT_HORIZON)
-            facts |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
+            facts |= figures(motion.string.total(SHORT_HORIZON), f"{{}}_{SHORT_HORIZON}")
         edges = [0.0, *(stop_s for _, stop_s in windows)]
         sums = (motion.string.windows(info.rate_hz, edges), motion.sound.windows(info.rate_hz, edges))
-        facts["windows"] = [
-            {
-                **asdict(window),
-                **self._label(window.start_s, window.stop_s),
-                **_with_se(motion.string, *(round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))),
-                "null_depth_db": of_window.null_depth_db,
-                "spectral_convergence": spectrum.convergence,
-                "log_spectrum_db": spectrum.log_db,
-            }
-            for window, of_window, spectrum in zip(*sums, motion.spectra[1:], strict=True)
-        ]
+        facts["windows"] = []
+        for window, of_window, spectrum in zip(*sums, motion.spectra[1:], strict=True):
+            first, last = (round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))
+            facts["windows"].append(
+                {
+                    **asdict(window),
+                    **self._label(window.start_s, window.stop_s),
+                    **figures(motion.string.standard_error(first=first, last=last), "{}_se"),
+                    **_sound(of_window, spectrum),
+                }
+            )
         end_s = windows[-1][1]
         if self.past_s and end_s >= 2:  # whether it rings true: the question of every long run
             for name, start_s in (("first_second", 0.0), ("last_second", end_s - 1)):
                 (second,) = motion.string.windows(info.rate_hz, [start_s, start_s + 1])
-                facts[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
+                facts[name] = figures(second)
         if self.partials:
             facts["partials"] = self._partials(split, windows)
         return facts
@@ -282,10 +305,12 @@ class _Measurement:
         return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
 
 
-def _with_se(sums: ErrorSums, first: int, last: int) -> dict[str, float]:
-    """The standard errors of the errors of some frames, over trajectories."""
-    deviation = sums.standard_error(first=first, last=last)
-    return {"rel_mse_se": deviation.rel_mse, "rel_mae_se": deviation.rel_mae}
+def _sound(errors: RelativeError, distance: SpectralDistance) -> dict[str, float]:
+    return {
+        "null_depth_db": errors.null_depth_db,
+        "spectral_convergence": distance.convergence,
+        "log_spectrum_db": distance.log_db,
+    }
 
 
 def _on(preset: Preset, run: str) -> Preset:
@@ -302,13 +327,10 @@ def _on(preset: Preset, run: str) -> Preset:
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set of a preset, or of a run.
-
-    For a string of many, its plucks are as hard as the family's.
-    """
+    """The data set of a preset, or of a run; of a string of many, its plucks are as hard as the family's."""
     from training.cell import load
     from training.configuration import DatasetConfiguration
-    from training.row_errors import data_of
+    from training.run import data_of
 
     info = preset.info
     if on is not None:
@@ -329,32 +351,23 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     return data_of(preset)
 
 
-def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:
-    from training.data.dataset import split_rows
-
-    for split in splits:
-        rows = split_rows(data.count, split)
-        if wanted is not None:
-            check_range("--trajectories", wanted, 1, rows.stop - rows.start)
-
-
-def _differ(errors: dict[str, Any], name: str) -> bool:
-    """Return True if the mean over batches is not the split's error within a percent."""
-    whole, batches = errors[name], errors[f"{name}_batches"]
-    return not math.isclose(whole, batches, rel_tol=SCRIPT_TOLERANCE)
-
-
 def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: Known) -> None:
+    def pair(form: str) -> list[Any]:
+        return [errors[form.format(name)] for name in ("rel_mse", "rel_mae")]
+
+    def tell(words: str, form: str) -> None:
+        if form.format("rel_mse") in errors:
+            print(f"{words}: {', '.join(map(number, pair(form)))}")
+
     print(f"{split.replace('_', ' ')}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
-    if "rel_mse_batches" in errors and any(_differ(errors, name) for name in ("rel_mse", "rel_mae")):
-        mse, mae = (number(errors[f"{name}_batches"]) for name in ("rel_mse", "rel_mae"))
-        print(f"mean over batches of {SCRIPT_BATCH}, as the authors' script has it: {mse}, {mae}")
-    if "stored_rel_mse" in errors:
-        print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
+    if "rel_mse_batches" in errors:
+        both = zip(pair("{}"), pair("{}_batches"), strict=True)
+        if not all(math.isclose(whole, mean, rel_tol=SCRIPT_TOLERANCE) for whole, mean in both):
+            tell(f"mean over batches of {SCRIPT_BATCH}, as the authors' script has it", "{}_batches")
+    tell("stored in the preset", "stored_{}")
     print_known(known)
-    for key, text in REPORTED.items():
-        if f"rel_mse_{key}" in errors:
-            print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")
+    for key, words in REPORTED.items():
+        tell(words, f"{{}}_{key}")
     print(
         f"{errors['trajectories']} trajectories, trained to {horizon_s:g} s; "
         f"sound at {DEFAULT_LISTEN:g} of the length: null depth {errors['null_depth_db']:.1f} dB, "
@@ -371,20 +384,13 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: K
     columns = ("from s", "to s", "rel. MSE", "± se", "rel. MAE", "± se", "null dB", "convergence", "spectra dB", "")
     figures = ("rel_mse", "rel_mse_se", "rel_mae", "rel_mae_se", "null_depth_db", "spectral_convergence")
     keys = ("start_s", "stop_s", *figures, "log_spectrum_db")
-    print_table(
-        columns,
-        [
-            [*(w[key] for key in keys), "past the training horizon" if w["past_horizon"] else ""]
-            for w in errors["windows"]
-        ],
-    )
+    past = {True: "past the training horizon", False: ""}
+    print_table(columns, [[*(w[key] for key in keys), past[w["past_horizon"]]] for w in errors["windows"]])
 
 
 def _by_rise(group: dict[str, Any]) -> list[object]:
-    rises, shares = (
-        [100 * group[name] for name in names] for names in (("from_rise", "to_rise"), ("share", "largest"))
-    )
-    return [group["trajectories"], *rises, group["rel_mse"], group["rel_mae"], *shares]
+    low, high, share, largest = (100 * group[name] for name in ("from_rise", "to_rise", "share", "largest"))
+    return [group["trajectories"], low, high, group["rel_mse"], group["rel_mae"], share, largest]
 
 
 def _print_partials(split: str, partials: dict[str, Any]) -> None:
@@ -394,16 +400,5 @@ def _print_partials(split: str, partials: dict[str, Any]) -> None:
     columns = ("mode", "trajectories", *figures)
     rows = [list(mode.values()) for mode in partials["modes"]]
     w = partials["weighted"]
-    mean = [
-        "all, by energy",
-        "",
-        "",
-        w["level_db"],
-        w["phase_cycles"],
-        w["cents"],
-        "",
-        "",
-        "",
-        w["glide_error_cents"],
-    ]
-    print_table(columns, [*rows, mean])
+    means = [w["level_db"], w["phase_cycles"], w["cents"], "", "", "", w["glide_error_cents"]]
+    print_table(columns, [*rows, ["all, by energy", "", "", *means]])

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from engine.presets import Preset
     from training.family.errors import FamilyErrors, StringError
-    from training.family.strings import Column
 
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
+FIGURES = ("geometric_mean", "worst", "share_large", "processor_s")
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 Strings = Annotated[
@@ -61,8 +61,7 @@ def evaluate(
     preset: PresetName,
     strings: Strings = 200,
     tenth: Annotated[
-        int,
-        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays."),
+        int, typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays.")
     ] = 0,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
@@ -88,7 +87,8 @@ def evaluate(
     """
     import torch
 
-    from training.family.errors import Player, by_rise, measure, player
+    from training.family.errors import Player, by_rise, knowing_physics, measure, player
+    from training.family.strings import COLUMNS
 
     torch.set_num_threads(1)
     if drums:
@@ -99,31 +99,32 @@ def evaluate(
     loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     if baselines:
-        from training.family.untrained import knowing_physics
-
         players |= knowing_physics()
+    facts_by_column: dict[str, dict[str, Any]] = {}
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
-        measured = measured_errors(players, strings, rate, seed, shares)
-        facts_by_column = {
-            column: {name: facts_of(one) for name, one in errors.items()} for column, errors in measured.items()
-        }
-        for column, errors in measured.items():
+        for column in COLUMNS:
+            first_s, tenth_s = (0.0, 1.0), (9.0, 10.0)
+            errors = measure(players, column, "test", strings, rate, first_s, seed=seed, report=shares.next())
+            facts_by_column[column] = {name: _facts(one) for name, one in errors.items()}
             of_preset, facts = errors[loaded.name].strings, facts_by_column[column][loaded.name]
             facts["by_rise"] = [
-                {"from": low, "to": high, "strings": len(part.strings), **facts_of(part)}
+                {"from": low, "to": high, "strings": len(part.strings), **_facts(part)}
                 for (low, high), part in by_rise(of_preset, RISES)
             ]
             if tenth:
-                alone = {loaded.name: players[loaded.name]}
-                span_s, reported = (9.0, 10.0), shares.next()
-                last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=reported)[loaded.name]
+                alone, reported = {loaded.name: players[loaded.name]}, shares.next()
+                last = measure(alone, column, "test", tenth, rate, tenth_s, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     if json:
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **facts_by_column})
         return
     for column_name, of_column in facts_by_column.items():
-        print_column(column_name, of_column, strings, rate)
+        print(f"{column_name}, {strings} strings, first second at {rate} Hz, rel. MSE over the whole string")
+        print_table(
+            ("", *DESCRIBED),
+            [[who, *(number(f[name]) for name in FIGURES), f["worst_at"]] for who, f in of_column.items()],
+        )
         facts = of_column[loaded.name]
         rows = [
             [f"{p['from']:g} … {p['to']:g}", p["strings"], number(p["geometric_mean"]), number(p["worst"])]
@@ -176,29 +177,17 @@ def _evaluate_drums(
         print_json({"drums": drums, "rate_hz": rate_hz, "seed": seed, "players": [asdict(row) for row in rows]})
         return
     print(f"{drums} drums of {rows[0].modes} modes below 4 kHz, first second at {rate_hz} Hz, over the whole surface")
+    first = [(row.geometric_mean, row.worst, row.blows, row.pressed, row.processor_s) for row in rows]
     print_table(
         ("", "geometric mean", "worst", "blows", "pressed", "processor s a second", "worst at"),
-        [
-            [
-                row.player,
-                *map(number, (row.geometric_mean, row.worst, row.blows, row.pressed, row.processor_s)),
-                row.worst_at,
-            ]
-            for row in rows
-        ],
+        [[row.player, *map(number, figures), row.worst_at] for row, figures in zip(rows, first, strict=True)],
     )
     if tenth:
+        late = [(row.tenth_geometric_mean, row.tenth_worst, row.tenth_first) for row in rows]
+        still = f"tenth second, {rows[0].tenth_drums} of {tenth} drums of long decays still sound"
         print_table(
-            (
-                f"tenth second, {rows[0].tenth_drums} of {tenth} drums of long decays still sound",
-                "geometric mean",
-                "worst",
-                "first",
-            ),
-            [
-                [row.player, *map(number, (row.tenth_geometric_mean, row.tenth_worst, row.tenth_first))]
-                for row in rows
-            ],
+            (still, "geometric mean", "worst", "first"),
+            [[row.player, *map(number, figures)] for row, figures in zip(rows, late, strict=True)],
         )
 
 
@@ -209,26 +198,6 @@ def _open_preset_of_many(name_or_path: str) -> Preset:
     return loaded
 
 
-def measured_errors(
-    players: dict[str, Any], strings: int, rate_hz: int, seed: int, shares: Shares
-) -> dict[Column, dict[str, FamilyErrors]]:
-    """Errors of the first second by column and player."""
-    from training.family.errors import measure
-    from training.family.strings import COLUMNS
-
-    return {
-        column: measure(players, column, "test", strings, rate_hz, (0.0, 1.0), seed=seed, report=shares.next())
-        for column in COLUMNS
-    }
-
-
-def print_column(column: str, of_column: dict[str, Any], strings: int, rate_hz: int) -> None:
-    print(f"{column}, {strings} strings, first second at {rate_hz} Hz, rel. MSE over the whole string")
-    figures = ("geometric_mean", "worst", "share_large", "processor_s")
-    rows = [[who, *(number(f[name]) for name in figures), f["worst_at"]] for who, f in of_column.items()]
-    print_table(("", *DESCRIBED), rows)
-
-
 def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) -> dict[str, Any]:
     """The errors in the tenth second, of those strings that still sound then."""
     from training.family.errors import FamilyErrors
@@ -237,19 +206,15 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
     if not pairs:
         return {"strings": 0}
     early, late = (FamilyErrors(tuple(part)) for part in zip(*pairs, strict=True))
-    return {"strings": len(pairs), **facts_of(late), "over_first": late.geometric_mean / early.geometric_mean}
+    return {"strings": len(pairs), **_facts(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
-def _place(string: StringError) -> str:
-    return f"{string.pitch_hz:.0f} Hz, B {string.inharmonicity:.1e}, rise {string.tension_rise:.2f}"
-
-
-def facts_of(errors: FamilyErrors) -> dict[str, Any]:
+def _facts(errors: FamilyErrors) -> dict[str, Any]:
     worst = errors.worst
     return {
         "geometric_mean": errors.geometric_mean,
         "worst": worst.rel_mse,
         "share_large": errors.share_large,
         "processor_s": errors.processor_s,
-        "worst_at": _place(worst),
+        "worst_at": f"{worst.pitch_hz:.0f} Hz, B {worst.inharmonicity:.1e}, rise {worst.tension_rise:.2f}",
     }

@@ -96,19 +96,19 @@ def sweep(
         return
     left = len(unfinished(chosen, known))
     every_s = None if minutes is None else PIECE_CHECKPOINT_S
+    kind: str = device
     if scheduler is None:
         layout = fitted(max(left, 1), device=device, workers=workers, threads=threads, per_device=per_device)
-        seeds_at_once = layout.device == "cuda"
-        options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, seeds_at_once, ends_s)
+        kind, threads = layout.device, layout.threads
         opened = process_workers(layout)
     else:
-        options = Options(file, runs, cache, device, threads, retries, every_s, device == "cuda", ends_s)
         if open_to_anybody(scheduler):
             say(
                 f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"
                 " on its workers; use tls:// with certificates, or a private network"
             )
         opened = cluster_workers(scheduler, workers)
+    options = Options(file, runs, cache, kind, threads, retries, every_s, kind == "cuda", ends_s)
     say(f"{chosen.name}: {left} of {len(chosen.runs)} runs to do; rows go to {file}")
     rows = [row for row in known if row.digest in {run.digest for run in chosen.runs}]
     if left:
@@ -142,11 +142,11 @@ def merge(
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:
-    rows = {row.digest: row for row in known}
+    errors = {row.digest: (row.status, row.rel_mae) for row in known}
     facts = []
     for run in plan.runs:
-        row = rows.get(run.digest)
-        facts.append({"name": run.name, "status": row.status if row else "", "rel_mae": row.rel_mae if row else None})
+        status, rel_mae = errors.get(run.digest, ("", None))
+        facts.append({"name": run.name, "status": status, "rel_mae": rel_mae})
     if json:
         print_json(facts)
         return
@@ -155,11 +155,7 @@ def _list(plan: Plan, known: list[Row], json: bool) -> None:
 
 
 def _tell(rows: list[Row], json: bool) -> None:
-    """Print the rows.
-
-    Raises:
-        Failure: one has failed.
-    """
+    """Print the rows. Raises Failure: one has failed."""
     from engine.schema import write
 
     if json:
@@ -188,25 +184,24 @@ class Shown:
         self._begin = begin
         self._left = left
         self._at_once = at_once
-        self._reports: dict[str, ProgressReport] = {}
-        self._shown: dict[str, Callable[[FitProgress], None]] = {}
+        self._reports: dict[str, tuple[ProgressReport, Callable[[FitProgress], None]]] = {}
         self._last: dict[str, FitProgress] = {}  # of each run that is under way
         self._seconds: list[float] = []  # that finished runs took
         self._ended: Counter[str] = Counter(done=0)
 
     def started(self, run: PlannedRun) -> None:
-        self._reports[run.name] = self._begin(run.name)
-        self._shown[run.name] = training_report(self._reports[run.name])
+        report = self._begin(run.name)
+        self._reports[run.name] = report, training_report(report)
 
     def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
         self._last[run.name] = progress
-        self._shown[run.name](progress)
+        self._reports[run.name][1](progress)
 
     def failed(self, run: PlannedRun, error: str) -> None:
         say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:
-        self._reports.pop(row.name)(1.0)
+        self._reports.pop(row.name)[0](1.0)
         self._last.pop(row.name, None)
         self._left -= 1
         self._ended[row.status] += 1

@@ -27,8 +27,7 @@ def table(
     ] = "mse",
     output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file."),
+        Path | None, typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file.")
     ] = None,
 ) -> None:
     """Print the paper's two tables with our results."""

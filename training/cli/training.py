@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from training.data.dataset import Dataset
     from training.fitting.fit import FitProgress
     from training.results import Row
-    from training.run import NamedRun
 
 Configuration = Annotated[
     str,
@@ -66,7 +65,8 @@ def train(
     """
     import torch
 
-    from training.run import default_runs, run_rows
+    from training.cell import Cell
+    from training.run import NamedRun, default_runs, device_of, run_rows
 
     if seeds > 1 and output is not None:
         raise typer.BadParameter(
@@ -86,12 +86,15 @@ def train(
                 begun.append(latest)
                 shown(latest)
 
-            named = [_named(name, configuration, output, follow) for name, configuration in with_seeds]
+            named = []
+            for name, configuration in with_seeds:
+                cell = Cell.parse(name)
+                named.append(NamedRun(name, cell.recipe if cell else "", configuration, output, follow))
             rows = run_rows(
                 named,
                 folder,
                 cache=cache,
-                device=_device(device),
+                device=device_of(device),
                 waits=lambda: say(f"{folder / named[0].name}: another process trains there; waiting for its end"),
             )
     except KeyboardInterrupt:
@@ -111,11 +114,7 @@ def train(
 
 
 def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, TrainingConfiguration]:
-    """Name and configuration of a run with its own seed or `seed`, plus `number`.
-
-    Raises:
-        typer.BadParameter: the name has a seed, and another is asked for.
-    """
+    """Name and configuration of a run with its own seed or `seed`, plus `number`."""
     from training.cell import Cell, load
 
     configuration, name = load(config), name_text(Path(config).stem)
@@ -132,25 +131,12 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
     return name, replace(configuration, title=title, recipe=recipe)
 
 
-def _named(
-    name: str, configuration: TrainingConfiguration, output: Path | None, report: Callable[[FitProgress], None]
-) -> NamedRun:
-    from training.cell import Cell
-    from training.run import NamedRun
-
-    cell = Cell.parse(name)
-    return NamedRun(name, cell.recipe if cell else "", configuration, output, report)
-
-
 def _tell_row(file: Path, row: Row) -> None:
     print(file)
-    for split, mse, mae in (
-        ("validation", row.rel_mse, row.rel_mae),
-        ("test", row.test_rel_mse, row.test_rel_mae),
-    ):
-        print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
+    _print_errors("validation", row.rel_mse, row.rel_mae)
+    _print_errors("test", row.test_rel_mse, row.test_rel_mae)
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
-        print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
+        _print_errors("untrained", row.start_rel_mse, row.start_rel_mae, " (validation)")
     epoch = "" if row.epochs == 1 else f", best epoch {row.best_epoch}"  # a closed form has one
     print(f"trained in  {duration(row.seconds or 0.0)}{epoch}")
 
@@ -158,9 +144,7 @@ def _tell_row(file: Path, row: Row) -> None:
 def _tell_mean(rows: Sequence[Row]) -> None:
     """Print mean and standard deviation of the validation errors, as the paper's tables state them."""
     errors = {"MSE": [row.rel_mse or 0.0 for row in rows], "MAE": [row.rel_mae or 0.0 for row in rows]}
-    words = ", ".join(
-        f"rel. {name} {number(mean(values))} ± {number(stdev(values))}" for name, values in errors.items()
-    )
+    words = ", ".join(f"rel. {name} {number(mean(of))} ± {number(stdev(of))}" for name, of in errors.items())
     print(f"{len(rows)} seeds{'':<4} {words} (validation)")
 
 
@@ -174,8 +158,7 @@ def known_errors(run: TrainingConfiguration) -> Known:
     from training.tables.paper import DatasetColumn, paper_errors
 
     known_by_source: Known = {}
-    kind = "nonlinear" if run.data.tension_modulated else "linear"
-    place = (kind, run.steps, run.model, DatasetColumn(run.data.initial, run.data.rate_hz))
+    place = (run.data.string_kind, run.steps, run.model, DatasetColumn(run.data.initial, run.data.rate_hz))
     paper = paper_errors().get(place) if follows_protocol(run.data) else None
     if paper is not None and paper.rel_mse and paper.rel_mae:
         known_by_source["paper"] = paper.rel_mse.mean, paper.rel_mae.mean
@@ -187,12 +170,16 @@ def known_errors(run: TrainingConfiguration) -> Known:
 
 def print_known(known: Known) -> None:
     for whose, (mse, mae) in known.items():
-        print(f"{whose:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)} (validation)")
+        _print_errors(whose, mse, mae, " (validation)")
+
+
+def _print_errors(what: str, mse: float | None, mae: float | None, note: str = "") -> None:
+    print(f"{what:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}{note}")
 
 
 def _tell_heard(file: Path) -> None:
     """Compare the sound of the preset with the truth, and add the result to the table beside it."""
-    from training.cli.heard import measure
+    from training.heard import measure
     from training.heard_words import heard_sentence
 
     try:
@@ -208,18 +195,6 @@ def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Datase
 
     with progress("data set") as report:
         return load_dataset(configuration, cache, report)
-
-
-def _device(wanted: Device) -> str:
-    import torch
-
-    if wanted == "cpu":
-        return "cpu"
-    if torch.cuda.is_available():
-        return "cuda"
-    if wanted == "cuda":
-        raise Failure("no CUDA device can be used here; choose --device cpu")
-    return "cpu"
 
 
 def training_report(report: ProgressReport) -> Callable[[FitProgress], None]:

@@ -50,7 +50,7 @@ class TrainingData:
         c = dataset.configuration
         self._stride = c.stride
         self._amplitudes = dataset.split("train").to(device)
-        self._synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m).float().to(device)
+        self._synthesis = dataset.synthesis.float().to(device)
         mirror = c.resonator.mirror
         self._mirror = (torch.ones(c.modes) if mirror is None else torch.from_numpy(mirror).float()).to(device)
         self.count = len(self._amplitudes)

@@ -9,7 +9,6 @@ import hashlib
 import json
 import math
 import os
-import shutil
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from engine import bounds
 from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
-from engine.whole_file import naming
+from engine.whole_file import naming, whole_folder
 from training.configuration import DATA_VERSION, DatasetConfiguration, non_default
 from training.data.draws import DRAWS
 
@@ -49,6 +48,11 @@ class Dataset:
     amplitudes: Tensor
     scale_m: float
 
+    @property
+    def synthesis(self) -> Tensor:
+        """The map from amplitudes to displacement in normalised units, float64 (modes, grid_points)."""
+        return torch.from_numpy(self.configuration.resonator.shapes / self.scale_m)
+
     def split(self, name: str) -> Tensor:
         """The amplitudes of "train", "validation" or "test"."""
         return self.amplitudes[split_rows(self.configuration.count, name)]
@@ -57,9 +61,9 @@ class Dataset:
 def split_rows(count: int, name: str) -> slice:
     """The trajectories of a split: 80/10/10 in order, or all."""
     bounds.check_choice("split", name, SPLITS)
-    train, validation = count * 8 // 10, count // 10
-    first = {"train": 0, "validation": train, "test": train + validation, "all": 0}[name]
-    return slice(first, {"train": train, "validation": train + validation, "test": count, "all": count}[name])
+    train, validation = count * 8 // 10, count * 8 // 10 + count // 10
+    ends = {"train": (0, train), "validation": (train, validation), "test": (validation, count), "all": (0, count)}
+    return slice(*ends[name])
 
 
 def default_cache() -> Path:
@@ -138,22 +142,15 @@ def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[A
 
 
 def _generate(configuration: DatasetConfiguration, folder: Path, report: Callable[[float], None]) -> None:
-    """Write into another folder that is renamed when it is whole; the caller holds the lock."""
-    unfinished = folder.with_suffix(".unfinished")
-    shutil.rmtree(unfinished, ignore_errors=True)
-    try:
-        with naming(folder):
-            unfinished.mkdir()
-            facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
-            facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", report)
-            values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
-            facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
-            del values  # an open mapping would hold the folder on Windows
-            (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
-            unfinished.rename(folder)
-        report(1.0)
-    finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
+    """Write the files of a data set; the caller holds the lock."""
+    with whole_folder(folder) as unfinished, naming(folder):
+        facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
+        facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", report)
+        values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
+        facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
+        del values  # an open mapping would hold the folder on Windows
+        (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
+    report(1.0)
 
 
 def _simulate(c: DatasetConfiguration, file: Path, report: Callable[[float], None]) -> int:

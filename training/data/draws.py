@@ -27,9 +27,7 @@ PLUCK_PEAK_RANGE_M = (5e-4, 1e-2)
 
 def draw_gaussians(count: int, grid_points: int, generator: torch.Generator) -> Array:
     """`count` random Gaussians of the paper's protocol, float64 (count, grid_points)."""
-    centre, width, peak = (
-        _uniform(count, low, high, generator) for low, high in (CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M)
-    )
+    centre, width, peak = (_uniform(count, *ends, generator) for ends in (CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M))
     return held(peak * gaussian((grid_positions(grid_points) - centre) / width))
 
 
@@ -52,9 +50,8 @@ def draw_plucks(count: int, grid_points: int, generator: torch.Generator) -> Arr
         for low, high in (PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
     )
     shapes = itertools.cycle(("gaussian", "triangular", "raised_cosine"))
-    return np.stack(
-        [displacement(*pluck, grid_points) for pluck in zip(shapes, position, width, peak_m, strict=False)]
-    )
+    plucks = zip(shapes, position, width, peak_m, strict=False)
+    return np.stack([displacement(*pluck, grid_points) for pluck in plucks])
 
 
 DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 import torch
@@ -23,18 +23,18 @@ from torch import Tensor
 
 from engine.kernels.drum_modes import AIR_KG_M3
 from engine.kernels.pulses import spectrum
-from engine.models import build_model
 from engine.models.base import Physics, StringModel
-from engine.models.koopman_tension import KoopmanTension
 from engine.resonators.base import Array, Resonator
 from engine.resonators.drum import DrumModes, bending_nm, modes_of
 from engine.strike import Strike
 from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
-from training.family.errors import SCALE_M, UNHEARD
-from training.family.motions import substeps_of
+from training.family.errors import SCALE_M, UNHEARD, geometric_mean, of_many, untrained
+from training.family.strings import log_uniform, substeps_of
+from training.provenance import now
 
+T = TypeVar("T")
 Kind = Literal["tom", "frame drum", "small head", "rectangular membrane", "steel plate", "narrow plate"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 DRUMS_VERSION = 1  # of what a seed means
@@ -166,8 +166,7 @@ def _place(random: np.random.Generator, circle: bool) -> tuple[float, float]:
 
 
 def _between(random: np.random.Generator, ends: tuple[float, float]) -> float:
-    low, high = ends
-    return low if low == high else math.exp(random.uniform(math.log(low), math.log(high)))
+    return ends[0] if ends[0] == ends[1] else log_uniform(random, ends)
 
 
 # What plays them: each call gives the next frames, (frames, modes) in m
@@ -199,15 +198,11 @@ def _solved(resonator: Resonator, struck: StruckDrum, rate_hz: int) -> Blocks:
 
 
 def model_player(model: StringModel[Any]) -> DrumPlayer:
-    """The player of drums by what was learned of strings.
-
-    Raises ValueError: it learned one string, which its weights are.
-    """
-    if not isinstance(model, KoopmanTension):
-        raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
+    """The player of drums by what was learned of strings. Raises ValueError: see `of_many`."""
+    of_any = of_many(model)
 
     def play(struck: StruckDrum, rate_hz: int) -> Blocks:
-        of_drum = model.for_resonator(Physics(struck.resonator, rate_hz, SCALE_M))
+        of_drum = of_any.for_resonator(Physics(struck.resonator, rate_hz, SCALE_M))
         q, v = (torch.from_numpy(part)[None] / SCALE_M for part in (struck.amplitudes_m, struck.speeds_m_s))
         state = of_drum.encode_modes(q, v / rate_hz)
 
@@ -222,15 +217,8 @@ def model_player(model: StringModel[Any]) -> DrumPlayer:
 
 
 def untrained_player(how: str) -> DrumPlayer:
-    """`koopman_tension` as its start of this name leaves it."""
-    model = build_model("koopman_tension", {"modes": 1, "grid_points": 1})
-    assert isinstance(model, KoopmanTension)
-    if how == "series":
-        from engine.models.koopman_tension import SERIES
-
-        with torch.no_grad():
-            model.r[0] = model.p[0] = SERIES
-    return model_player(model)
+    """The player of drums by `koopman_tension` as its start of this name leaves it."""
+    return model_player(untrained(how))
 
 
 # How well
@@ -275,22 +263,14 @@ def measure_drum(
     size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
     silent_below = UNHEARD * float(size @ struck.weight) * rate_hz
     last = others[-1] if tenth and others[-1].energy > silent_below else None
-    return [
-        DrumError(
-            number,
-            name,
-            struck.kind,
-            struck.pitch_hz,
-            struck.resonator.modes,
-            struck.tension_rise,
-            "blow" if struck.speeds_m_s.any() else "pressed",
-            first.rel_mse[name],
-            None if last is None else last.rel_mse[name],
-            first.processor_s[name],
-            SLOWER if tenth else 1.0,
-        )
-        for name in players
-    ]
+    blow = "blow" if struck.speeds_m_s.any() else "pressed"
+    drum = struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise, blow
+    errors = []
+    for name in players:
+        late = None if last is None else last.rel_mse[name]
+        slower = SLOWER if tenth else 1.0
+        errors.append(DrumError(number, name, *drum, first.rel_mse[name], late, first.processor_s[name], slower))
+    return errors
 
 
 @dataclass(frozen=True)
@@ -332,16 +312,13 @@ def motion_errors(
 
     def window(first: int, stop: int, of: slice) -> Window:
         whole = float(energy[of].sum())
-        errors = [_finite(sums / whole) if whole else math.nan for sums in wrong[of].sum(0)]
+        errors = [sums / whole if whole else math.nan for sums in wrong[of].sum(0).tolist()]
+        errors = [math.inf if whole and not math.isfinite(error) else error for error in errors]
         by_player = (dict(zip(players, sums, strict=True)) for sums in (errors, spent[of].sum(0).tolist()))
         return Window(first / rate_hz, stop / rate_hz, whole, *by_player)
 
     parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
     return [window(0, frames, slice(None)), *parts]
-
-
-def _finite(error: float) -> float:
-    return float(error) if math.isfinite(error) else math.inf
 
 
 def measure_drums(
@@ -350,7 +327,7 @@ def measure_drums(
     tenth: int,
     rate_hz: int,
     seed: int,
-    checkpoint: Path | None,
+    checkpoint: Path,
     report: Callable[[float], None] = lambda share: None,
 ) -> list[DrumError]:
     """The errors of players on so many drums; those that a checkpoint holds are not measured again.
@@ -358,18 +335,15 @@ def measure_drums(
     Raises:
         SchemaError: the checkpoint is no table of errors.
     """
-    errors: list[DrumError] = []
-    if checkpoint is not None and checkpoint.exists():
-        errors = list(checked(read_table(DrumError, checkpoint, "table of drums", LARGEST_BYTES)))
+    errors = _read(DrumError, checkpoint)
+    checkpoint.parent.mkdir(parents=True, exist_ok=True)
     wanted = [(number, False) for number in range(count)] + [(number, True) for number in range(tenth)]
     for done, (number, slow) in enumerate(wanted, 1):
         known = {one.player for one in errors if (one.number, one.slow) == (number, slow)}
         lacking = {name: play for name, play in players.items() if name not in known}
         if lacking:
             errors += measure_drum(number, lacking, rate_hz, slow, seed)
-            if checkpoint is not None:
-                checkpoint.parent.mkdir(parents=True, exist_ok=True)
-                write_table(checkpoint, DrumError, errors)
+            write_table(checkpoint, DrumError, errors)
         report(done / len(wanted))
     return [one for one in errors if (one.number, one.slow) in wanted and one.player in players]
 
@@ -426,18 +400,21 @@ def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -
         max((one.tenth for one in late if one.tenth is not None), default=None),
         _mean(one.first for one in late),
         float(np.median([one.processor_s for one in of_kind])),
-        time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        now(),
     )
 
 
 def _mean(errors: Iterable[float | None]) -> float | None:
-    known = [max(error, 1e-300) for error in errors if error is not None]
-    return math.exp(sum(map(math.log, known)) / len(known)) if known else None
+    known = [error for error in errors if error is not None]
+    return geometric_mean(known) if known else None
 
 
 def store(rows: Iterable[DrumsRow], path: Path = ROWS) -> None:
     """Add rows to the table of results; a row of the same player, drums, rate and seed is replaced."""
     with FileLock(f"{path}.lock"):
-        present = list(checked(read_table(DrumsRow, path, "table of drums", LARGEST_BYTES))) if path.exists() else []
-        by_key = {(row.player, row.drums, row.rate_hz, row.seed): row for row in (*present, *rows)}
+        by_key = {(row.player, row.drums, row.rate_hz, row.seed): row for row in (*_read(DrumsRow, path), *rows)}
         write_table(path, DrumsRow, [by_key[key] for key in sorted(by_key)])
+
+
+def _read(kind: type[T], path: Path) -> list[T]:
+    return list(checked(read_table(kind, path, "table of drums", LARGEST_BYTES))) if path.exists() else []

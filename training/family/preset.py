@@ -19,10 +19,9 @@ from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, read_toml, write
 from engine.values.string import StringParameters
-from training.family.errors import SCALE_M, player
+from training.family.errors import SCALE_M, of_many, player
 from training.family.fit import FitCase, fit_curves
-from training.family.motions import solve
-from training.family.strings import FAMILY, GRID_POINTS, draw_string
+from training.family.strings import FAMILY, GRID_POINTS, draw_string, solve
 
 CONFIGURATION = Path(__file__).parent / "studio_any_string.toml"
 
@@ -89,8 +88,7 @@ def train_preset(
             cases[split].append(FitCase(plucked, solve(plucked, c.rate_hz, steps).float().double()))
             report(0.5 * sum(map(len, cases.values())) / sum(counts.values()), "true motions", None)
     sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
-    model = build_model("koopman_tension", sizes)
-    assert isinstance(model, KoopmanTension)
+    model = of_many(build_model("koopman_tension", sizes))
     resonator = resonator_of(c.string, c.modes, grid_points=GRID_POINTS)
     model.initialise(c.initialisation, Physics(resonator, c.rate_hz, SCALE_M), torch.Generator().manual_seed(c.seed))
     model.eval()

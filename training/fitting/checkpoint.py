@@ -37,13 +37,14 @@ class Checkpoint:
 
     def save(self, path: Path) -> None:
         """Write whole or not at all. Raises OSError."""
-        tensors = {f"model/{name}": t for name, t in self.model.items()}
-        tensors |= {f"best/{name}": t for name, t in self.best_model.items()}
-        tensors |= {f"average/{name}": t for name, t in self.average.items()}
-        for index, moments in self.optimiser.items():
-            tensors |= {f"optimiser/{index}/{name}": t for name, t in moments.items()}
+        parts = {"model": self.model, "best": self.best_model, "average": self.average}
+        parts |= {f"optimiser/{index}": moments for index, moments in self.optimiser.items()}
         # clones: safetensors refuses tensors that share memory
-        whole = {name: t.detach().to("cpu", copy=True).contiguous() for name, t in tensors.items()}
+        whole = {
+            f"{part}/{name}": t.detach().to("cpu", copy=True).contiguous()
+            for part, tensors in parts.items()
+            for name, t in tensors.items()
+        }
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as unfinished:
             try:
@@ -56,9 +57,7 @@ class Checkpoint:
     @classmethod
     def load(cls, path: Path) -> Checkpoint:
         """Raise ValueError, naming the file and the remedy, where it is damaged, or no file of ours."""
-        model: dict[str, Tensor] = {}
-        best: dict[str, Tensor] = {}
-        average: dict[str, Tensor] = {}
+        parts: dict[str, dict[str, Tensor]] = {"model": {}, "best": {}, "average": {}}
         optimiser: dict[str, dict[str, Tensor]] = {}
         try:
             if path.exists() and (not path.is_file() or path.stat().st_size > LARGEST_BYTES):
@@ -72,11 +71,11 @@ class Checkpoint:
                         index, _, moment = name.partition("/")
                         optimiser.setdefault(index, {})[moment] = file.get_tensor(key)
                     else:
-                        {"model": model, "best": best, "average": average}[part][name] = file.get_tensor(key)
+                        parts[part][name] = file.get_tensor(key)
         except (SafetensorError, KeyError, TypeError, ValueError) as error:
             message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
             raise ValueError(message) from error
-        return cls(model, best, average, optimiser, facts)
+        return cls(parts["model"], parts["best"], parts["average"], optimiser, facts)
 
 
 def optimiser_moments(optimiser: torch.optim.Optimizer) -> dict[str, dict[str, Tensor]]:

@@ -42,7 +42,7 @@ TELL_EVERY_S = 5.0  # within an epoch
 
 
 class Diverged(RuntimeError):
-    """The loss is no longer finite."""
+    """The loss is no longer finite, or no validation error was ever a number."""
 
 
 @dataclass(frozen=True)
@@ -91,35 +91,14 @@ class FitResult:
     start: RelativeError | None = None
 
 
-def fit(
-    configuration: TrainingConfiguration,
-    dataset: Dataset,
-    run_folder: Path,
-    *,
-    device: torch.device | str = "cpu",
-    report: Callable[[FitProgress], None] = lambda progress: None,
-    checkpoint_every_s: float | None = None,
-) -> FitResult:
-    """Train, or continue the run in `run_folder`; what has a closed form (DMD) is computed at once.
-
-    Args:
-        report: called after every epoch, and every few seconds within.
-        checkpoint_every_s: None: CHECKPOINT_EVERY_S.
-
-    Raises:
-        Diverged: the loss became infinite or not a number, or no validation error was ever a number.
-        ValueError: the checkpoint there is damaged or of another configuration.
-    """
-    seed = Seed(configuration, run_folder, report)
-    (outcome,) = fit_seeds([seed], dataset, device=device, checkpoint_every_s=checkpoint_every_s)
-    if isinstance(outcome, Diverged):
-        raise outcome
-    return outcome
-
-
 @dataclass(frozen=True)
 class Seed:
-    """A training of `fit_seeds`; the arguments are those of `fit`."""
+    """A training of `fit_seeds`.
+
+    Attributes:
+        run_folder: with its checkpoint, from which it continues.
+        report: called after every epoch, and every few seconds within.
+    """
 
     configuration: TrainingConfiguration
     run_folder: Path
@@ -133,7 +112,7 @@ def fit_seeds(
     device: torch.device | str = "cpu",
     checkpoint_every_s: float | None = None,
 ) -> list[FitResult | Diverged]:
-    """Train or continue runs that differ in their seeds alone, step by step together; see `fit`.
+    """Train or continue runs that differ in their seeds alone, step by step together; a DMD is computed at once.
 
     On a GPU, runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two
     checkpoints, catch up first. A run that diverges leaves the others.
@@ -145,12 +124,10 @@ def fit_seeds(
         ValueError: a checkpoint is damaged or of another configuration, or the runs differ in more than their seeds.
     """
     first = seeds[0].configuration
-    if any(replace(seed.configuration.recipe, seed=first.recipe.seed) != first.recipe for seed in seeds) or any(
-        (seed.configuration.model, seed.configuration.data, seed.configuration.steps)
-        != (first.model, first.data, first.steps)
-        for seed in seeds
-    ):
-        raise ValueError("runs that are trained together must differ in their seeds alone")
+    for other in (seed.configuration for seed in seeds):
+        same_recipe = replace(other.recipe, seed=first.recipe.seed) == first.recipe
+        if not same_recipe or (other.model, other.data, other.steps) != (first.model, first.data, first.steps):
+            raise ValueError("runs that are trained together must differ in their seeds alone")
     if first.start == LEAST_SQUARES:
         return [_fit_at_once(seed.configuration, dataset, seed.report) for seed in seeds]
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
@@ -158,58 +135,16 @@ def fit_seeds(
     steps = Steps()
     started = before = time.monotonic()
     iterations = 0
-    while left := [seed for seed in under_way if not seed.ended]:
-        step = min(seed.run.step for seed in left)
-        group = [seed for seed in left if seed.run.step == step]
-        steps.take([seed.run for seed in group])
+    while left := [run for run in under_way if not run.ended]:
+        step = min(run.step for run in left)
+        group = [run for run in left if run.step == step]
+        steps.take(group)
         now, iterations = time.monotonic(), iterations + 1
-        for seed in group:
-            seed.run.seconds += (now - before) / len(group)
-            seed.follow_step((now - started) / iterations, every_s)
+        for run in group:
+            run.seconds += (now - before) / len(group)
+            run.follow_step((now - started) / iterations, every_s)
         before = now
-    return [seed.outcome() for seed in under_way]
-
-
-class _UnderWay:
-    """A run of several, with its checkpoint's file and what was last saved and reported."""
-
-    def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
-        begun = time.monotonic()
-        self.run = TrainingState(seed.configuration, dataset, device)
-        self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
-        self.diverged: Diverged | None = None
-        if self._path.exists():
-            self.run.restore(Checkpoint.load(self._path), self._path)
-        else:
-            self.run.measure_start()
-            self.run.seconds = time.monotonic() - begun
-        self._saved = self._reported = time.monotonic()
-
-    @property
-    def ended(self) -> bool:
-        return self.diverged is not None or self.run.ended
-
-    def outcome(self) -> FitResult | Diverged:
-        try:
-            return self.diverged or self.run.result()
-        except Diverged as error:
-            return error
-
-    def follow_step(self, step_s: float, every_s: float) -> None:
-        """Validate, report and save what is due after a step that took about `step_s`."""
-        run, validation = self.run, None
-        if run.ends_epoch:
-            if not math.isfinite(run.loss):
-                self.diverged = Diverged(f"the loss is {run.loss} in epoch {run.epoch}; lower peak_learning_rate")
-                return
-            validation = run.validate() if run.validation_is_due else None
-        now = time.monotonic()
-        if run.ends_epoch or now - self._reported > TELL_EVERY_S:
-            self._report(run.progress(validation, step_s))
-            self._reported = now
-        if now - self._saved + step_s > every_s or run.ended:
-            run.checkpoint().save(self._path)
-            self._saved = now
+    return [run.outcome() for run in under_way]
 
 
 def learning_rate_at(recipe: Recipe, share: float) -> float:
@@ -237,10 +172,10 @@ class Steps:
     """The steps of runs that are at the same one: in one pass where their model allows it, recorded on a GPU."""
 
     def __init__(self) -> None:
-        self._runs: list[TrainingState] = []
+        self._runs: Sequence[TrainingState] = []
         self._work: Callable[[], None] = lambda: None
 
-    def take(self, runs: list[TrainingState]) -> None:
+    def take(self, runs: Sequence[TrainingState]) -> None:
         """Take the next step of `runs`."""
         if runs != self._runs:
             self._runs = runs
@@ -308,11 +243,10 @@ class TrainingState:
 
     @property
     def ended(self) -> bool:
-        patience = self.recipe.patience
         # while the latents are learned there is no prediction, and so none that is no better
         since = max(self._best_epoch, self._latent_steps // self._per_epoch)
-        patience_exhausted = patience > 0 and self.epoch - since >= patience
-        return self.ends_epoch and (self.epoch >= self.recipe.epochs or patience_exhausted)
+        gave_up = 0 < self.recipe.patience <= self.epoch - since
+        return self.ends_epoch and (self.epoch >= self.recipe.epochs or gave_up)
 
     @property
     def _latent_steps(self) -> int:
@@ -340,9 +274,9 @@ class TrainingState:
         recipe, steps = self.recipe, self._configuration.steps
         same_frames = recipe.first_horizon >= steps and keeps_every_frame(recipe, steps)
         same_sizes = self._data.count % recipe.batch_size == 0
-        same_work = same_frames and same_sizes and not (recipe.flip or recipe.latent_epochs or recipe.average_decay)
         same_layers = recipe.batch_statistics_until == 1 and recipe.optimiser == "adamw"
-        return same_work and same_layers
+        more_work = recipe.flip or recipe.latent_epochs or recipe.average_decay
+        return same_frames and same_sizes and same_layers and not more_work
 
     def begin_step(self) -> None:
         """Set the next step's rates and trajectories, where a recorded step reads them."""
@@ -493,6 +427,48 @@ class TrainingState:
         return self.model if self._average is None else cast("StringModel[Any]", self._average.module)
 
 
+class _UnderWay(TrainingState):
+    """A run of several, with its checkpoint's file and what was last saved and reported."""
+
+    def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
+        begun = time.monotonic()
+        super().__init__(seed.configuration, dataset, device)
+        self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
+        self._diverged: Diverged | None = None
+        if self._path.exists():
+            self.restore(Checkpoint.load(self._path), self._path)
+        else:
+            self.measure_start()
+            self.seconds = time.monotonic() - begun
+        self._saved = self._reported = time.monotonic()
+
+    @property
+    def ended(self) -> bool:
+        return self._diverged is not None or super().ended
+
+    def outcome(self) -> FitResult | Diverged:
+        try:
+            return self._diverged or self.result()
+        except Diverged as error:
+            return error
+
+    def follow_step(self, step_s: float, every_s: float) -> None:
+        """Validate, report and save what is due after a step that took about `step_s`."""
+        validation = None
+        if self.ends_epoch:
+            if not math.isfinite(self.loss):
+                self._diverged = Diverged(f"the loss is {self.loss} in epoch {self.epoch}; lower peak_learning_rate")
+                return
+            validation = self.validate() if self.validation_is_due else None
+        now = time.monotonic()
+        if self.ends_epoch or now - self._reported > TELL_EVERY_S:
+            self._report(self.progress(validation, step_s))
+            self._reported = now
+        if now - self._saved + step_s > every_s or self.ended:
+            self.checkpoint().save(self._path)
+            self._saved = now
+
+
 def _fit_at_once(
     configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[FitProgress], None]
 ) -> FitResult:
@@ -504,8 +480,7 @@ def _fit_at_once(
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
-    synthesis = torch.from_numpy(dataset.configuration.resonator.shapes / dataset.scale_m).float()
-    truth = dataset.split("train")[:100, : configuration.steps + 1] @ synthesis
+    truth = dataset.split("train")[:100, : configuration.steps + 1] @ dataset.synthesis.float()
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
     report(FitProgress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))

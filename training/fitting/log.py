@@ -49,16 +49,11 @@ class TrainingLog:
 
     def add(self, progress: FitProgress) -> None:
         """Add the epoch that has ended; later ones of an earlier run are dropped."""
-        validation = progress.validation
-        ended = Epoch(
-            progress.epoch,
-            progress.horizon,
-            _rounded(progress.learning_rate) or 0.0,
-            _rounded(progress.loss),
-            _rounded(validation.rel_mse) if validation else None,
-            _rounded(validation.rel_mae) if validation else None,
-            round(progress.seconds, 2),
-        )
+        p, measured = progress, progress.validation
+        figures = (p.loss, measured.rel_mse, measured.rel_mae) if measured else (p.loss, None, None)
+        loss, rel_mse, rel_mae = map(_rounded, figures)
+        rate = _rounded(p.learning_rate) or 0.0
+        ended = Epoch(p.epoch, p.horizon, rate, loss, rel_mse, rel_mae, round(p.seconds, 2))
         if not self._trimmed:
             kept = [line for line in read_log(self.path) if line.epoch < ended.epoch] if self.path.exists() else []
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,5 +62,5 @@ class TrainingLog:
         append_record(self.path, ended)
 
 
-def _rounded(value: float) -> float | None:
-    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+def _rounded(value: float | None) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if value is not None and math.isfinite(value) else None

@@ -104,7 +104,7 @@ def _text_loss(
 ) -> tuple[Tensor, Tensor]:
     """The loss of the paper's text, of the frames `found`: encoding on the first frame, consistency of latents."""
     loss, prediction = _prediction(predicted, batch.target, recipe)
-    loss = loss + _mean_square(model.decode(origin), batch.initial)
+    loss = loss + functional.mse_loss(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
         loss = loss + recipe.consistency_weight * _consistency(latents, encoded)
@@ -118,12 +118,12 @@ def _published_loss(model: ObservedModel, batch: Batch, recipe: Recipe, powers: 
     origin, others = encoded.split([1, len(batch.frames)], dim=1)
     states = model.states(origin * powers, origin[:, 0], powers)
     loss, prediction = _prediction(model.read(states), batch.target, recipe)
-    loss = loss + _mean_square(model.read(encoded), frames)
+    loss = loss + functional.mse_loss(model.read(encoded), frames)
     return loss + recipe.consistency_weight * _consistency(states, others), prediction
 
 
 def _consistency(states: Tensor, encoded: Tensor) -> Tensor:
-    return 2 * _mean_square(torch.view_as_real(states), torch.view_as_real(encoded))
+    return 2 * functional.mse_loss(torch.view_as_real(states), torch.view_as_real(encoded))
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
@@ -131,13 +131,9 @@ def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
     return frames if batch.every else frames[:, batch.frames - 1]
 
 
-def _mean_square(predicted: Tensor, wanted: Tensor) -> Tensor:
-    return functional.mse_loss(predicted, wanted)
-
-
 def _prediction(predicted: Tensor, wanted: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
     """The prediction's loss, and the mean square of its error."""
-    error = _mean_square(predicted, wanted)
+    error = functional.mse_loss(predicted, wanted)
     if recipe.loss == "log10_mse":
         return error.log10(), error.detach()
     if recipe.loss == "relative_mse":

@@ -94,10 +94,8 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
 
 def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
     """The training split on the grid, float64 (AT_ONCE, steps + 1, grid_points) at a time."""
-    c = dataset.configuration
-    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
     for part in dataset.split("train")[:, : steps + 1].split(AT_ONCE):
-        yield part.double() @ synthesis
+        yield part.double() @ dataset.synthesis
 
 
 def _seen_grid(motions: Tensor, steps: int) -> Tensor:
@@ -108,8 +106,8 @@ def _seen_grid(motions: Tensor, steps: int) -> Tensor:
     bin_width = 2 * math.pi / steps
     first, last = (share < OUTSIDE).sum(), (share < 1 - OUTSIDE).sum()
     reach = float(first - 2) * bin_width, float(last + 2) * bin_width
-    halves = [float(half.square().mean()) for half in motions.tensor_split(2, dim=1)]
-    decay = max(SLOWEST, math.log(halves[0] / halves[1])) / steps
+    early, late = (float(half.square().mean()) for half in motions.tensor_split(2, dim=1))
+    decay = max(SLOWEST, math.log(early / late)) / steps
     spacing = max(math.pi / 2 / steps, (reach[1] - reach[0]) / FREQUENCIES)
     return _grid(float(power.argmax()) * bin_width, reach, spacing, decay, steps)
 

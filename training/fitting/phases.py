@@ -14,7 +14,7 @@ while it is known to less than half a turn. So the first fit sees a dozen frames
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,19 +50,24 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
     generator = np.random.default_rng(seed)
     energies = motions[:, 0] ** 2
     guesses = [first_guess(motions[..., mode], count) for mode in range(count)]
-    last = min(FIRST_FRAMES, frames - 1)
-    while True:
+    slowest = SLOWEST / (frames - 1)  # of energies: a fit to a few frames may find them growing
+    for last in horizons(frames):
         rows, times = generator.integers(trajectories, size=SAMPLES), generator.integers(1, last + 1, size=SAMPLES)
-        slowest = SLOWEST / (frames - 1)  # of energies: a fit to a few frames may find them growing
         sigma = np.array([max(guess[1], slowest) for guess in guesses])
         integrals = energies[rows] * -np.expm1(-2 * sigma * times[:, None]) / (2 * sigma)
         for mode, guess in enumerate(guesses):
             motion = ModeMotion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
             guesses[mode] = motion.fitted(guess)
-        if last == frames - 1:
-            break
-        last = min(frames - 1, int(MORE_FRAMES * last) + 1)
     return string_modes([upright(guess) for guess in guesses], slowest, modes)
+
+
+def horizons(frames: int) -> Iterator[int]:
+    """The last frame of each fit, up to the last of all."""
+    last = min(FIRST_FRAMES, frames - 1)
+    yield last
+    while last < frames - 1:
+        last = min(frames - 1, int(MORE_FRAMES * last) + 1)
+        yield last
 
 
 def string_modes(motions: list[Floats], slowest: float, modes: Modes) -> StringModes:

@@ -77,8 +77,7 @@ class LatentFit:
         assert isinstance(model, Koopman)
         initial, targets = self.initial, self.targets
         if recipe.flip:
-            initial = torch.cat([initial, initial.flip(1)])
-            targets = torch.cat([targets, targets * self.mirror])
+            initial, targets = torch.cat([initial, initial.flip(1)]), torch.cat([targets, targets * self.mirror])
             initial, targets = torch.cat([initial, -initial]), torch.cat([targets, -targets])
         weights = [weight for weight in model.encoder.parameters() if weight.ndim > 1]
         optimiser = torch.optim.LBFGS(
@@ -104,10 +103,7 @@ class LatentFit:
         return self._of_prediction(errors[0])
 
     def _of_prediction(self, error: Tensor) -> Tensor:
-        """The prediction's error, from the coordinates' mean square error.
-
-        A mode's error over the string is half its amplitude's.
-        """
+        """The prediction's error from the coordinates': a mode's over the string is half its amplitude's."""
         return (error * self.targets.shape[1] * self.unit**2 / 2).detach()
 
     @torch.no_grad()

@@ -54,8 +54,7 @@ def _own(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
 
 
 def _least_squares(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    synthesis = torch.from_numpy(dataset.configuration.resonator.shapes / dataset.scale_m).float()
-    truth = dataset.split("train")[:, : configuration.steps + 1] @ synthesis
+    truth = dataset.split("train")[:, : configuration.steps + 1] @ dataset.synthesis.float()
     sizes = read_model_configuration("dmd", configuration.model_configuration, "model_configuration")
     return DMD.fit(truth, sizes), None
 

@@ -1,7 +1,7 @@
 """The way from a recording of one plucked note to its string: gate, partials, poles, physics, preset, report.
 
     samples ─► Note (note) ─► reasons (gate) ─► Series (numbering) ─► Glide (glide)
-            ─► LearnedNote (fit: poles, refine) ─► string and preset (physics, preset)
+            ─► LearnedNote (fit: refine, sweeps) ─► string and preset (physics, preset)
             ─► errors (report) ─► string found or not (verdict)
 
 A note is a sum of decaying partials that share one glide of pitch, and of a few poles that do not glide:

@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from engine.effects.responses import resampled
+from engine.resonators.base import Array
 from engine.resonators.recorded import RecordedNote
 from training.recording.note import Note
-
-Array = NDArray[np.float64]
 
 WHOLE_S, FADED_S = 0.05, 0.1  # it is whole until the first, and fades until the second
 FIRST_S, FIRST_FLOOR_DB = 0.03, -60.0

@@ -79,13 +79,8 @@ def checkpoint_of(folder: Path, notes: Sequence[tuple[Note, PartialSeries]]) -> 
 
 def save(path: Path, takes: Takes, steps: int) -> None:
     """Write whole or not at all. Raises WriteError."""
-    state = State(
-        steps,
-        tuple(takes.damping.tolist()),
-        tuple(takes.rests.tolist()),
-        float(takes.free_damping),
-        tuple(_take(fit) for fit in takes.fits),
-    )
+    damping, rests = tuple(takes.damping.tolist()), tuple(takes.rests.tolist())
+    state = State(steps, damping, rests, float(takes.free_damping), tuple(map(_take, takes.fits)))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -118,12 +113,11 @@ def restore(path: Path, takes: Takes, steps: int) -> int:
     takes.damping, takes.rests = np.array(state.damping), np.array(state.rests, int)
     takes.free_damping = state.free_damping
     for fit, take in zip(takes.fits, state.takes, strict=True):
-        poles = [
-            Pole(complex(p.real, p.imaginary), complex(p.amplitude_real, p.amplitude_imaginary), p.partial)
-            for p in take.poles
-        ]
-        fit.poles = [[pole for pole in poles if pole.partial == number + 1] for number in range(bands)]
-        fit.free = [pole for pole in poles if pole.partial == 0]
+        poles: list[list[Pole]] = [[] for _ in range(bands + 1)]
+        for p in take.poles:
+            s, a = complex(p.real, p.imaginary), complex(p.amplitude_real, p.amplitude_imaginary)
+            poles[p.partial].append(Pole(s, a, p.partial))
+        fit.free, *fit.poles = poles
         fit.set_glide(Glide(np.array(take.glide), take.pitch))
     return state.steps
 

@@ -9,19 +9,17 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
+from engine.resonators.base import Array
 from training.recording.checkpoint import restore, save
 from training.recording.glide import Glide, glide_of_phases
 from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
 from training.recording.numbering import PartialSeries
-from training.recording.refine import Fit, Pole
+from training.recording.refine import Complex, Fit, Pole
 from training.recording.slow import settle_slow
 from training.recording.sweeps import FIRST_DAMPING, Takes
-
-Array = NDArray[np.float64]
 
 MOST_PARTIALS = 80
 HIGHEST_HZ = 10_000.0
@@ -62,25 +60,9 @@ def fit_note(
     poles_a_partial: int = 2,
     free: int = FREE_POLES,
     glides: bool = True,
-    progress: Progress = lambda share: None,
 ) -> LearnedNote:
-    """The note's poles.
-
-    Args:
-        poles_a_partial: at most.
-        free: how many poles do not glide.
-        glides: False: a linear string, as a baseline.
-        progress: is called with the share that is done; may raise, to cancel.
-    """
-    (learned,) = fit_takes(
-        [(note, series)],
-        seconds=seconds,
-        poles_a_partial=poles_a_partial,
-        free=free,
-        glides=glides,
-        progress=progress,
-    )
-    return learned
+    """The poles of one note; see `fit_takes`."""
+    return fit_takes([(note, series)], seconds=seconds, poles_a_partial=poles_a_partial, free=free, glides=glides)[0]
 
 
 def fit_takes(
@@ -97,7 +79,11 @@ def fit_takes(
 
     Amplitudes and glide are each take's own, and a pitch within some cents of the first.
 
-    Args: as `fit_note`, and
+    Args:
+        poles_a_partial: at most.
+        free: how many poles do not glide.
+        glides: False: a linear string, as a baseline.
+        progress: is called with the share that is done; may raise, to cancel.
         checkpoint: the file that the fit writes after each step and continues from; None: there is none.
 
     Raises:
@@ -117,7 +103,7 @@ def fit_takes(
         progress(share)
     intervals = [spreads(fit) for fit in takes.fits]
     if glides:
-        settle_slow(takes.fits)
+        settle_slow(takes)
     return [
         _learned(note, series, fit, of_take)
         for (note, series), fit, of_take in zip(notes, takes.fits, intervals, strict=True)
@@ -129,49 +115,39 @@ def _steps(
 ) -> list[tuple[float, Callable[[], None]]]:
     """The steps of a fit in order, each with the share that is done after it."""
 
-    def glide(when: bool = True) -> None:
-        if glides and when:
-            takes.step_glides()
-
     def start() -> None:
         for number in range(len(hz)):
-            first = _loudest(takes, number).start(number, 1) or [_plain(hz[number], number + 1)]
+            plain = Pole(complex(-3.0, 2 * math.pi * hz[number]), partial=number + 1)
+            first = _loudest(takes, number).start(number, 1) or [plain]
             for fit in takes.fits:
                 fit.poles[number] = first
 
-    def first_sweep() -> None:
-        takes.sweep(2)
-        glide()
-
     def second_poles() -> None:
-        residuals = [fit.data - fit.model() for fit in takes.fits]
+        residuals = takes.residuals()
         for number in range(len(hz)):
             _add_pole(takes, number, residuals)
 
-    def sweep() -> None:
+    def sweep(with_glide: bool = glides) -> None:
         takes.sweep(2)
         takes.sweep_free(2)
-        glide()
+        if with_glide:
+            takes.step_glides()
 
-    def add_free(number: int) -> None:
+    def add_free(with_glide: bool) -> None:
         _add_free(takes)
         takes.sweep_free(3)
         takes.sweep(1)
-        glide(number % 2 == 1)
-
-    def last_sweep(round_: int) -> None:
-        takes.sweep(2)
-        takes.sweep_free(2)
-        glide(round_ < LAST_SWEEPS - 1)
+        if with_glide:
+            takes.step_glides()
 
     steps: list[tuple[float, Callable[[], None]]] = [(0.1, start)]
-    steps += [(0.1 + 0.2 * (turn + 1) / FIRST_SWEEPS, first_sweep) for turn in range(FIRST_SWEEPS)]
+    steps += [(0.1 + 0.2 * (turn + 1) / FIRST_SWEEPS, sweep) for turn in range(FIRST_SWEEPS)]
     if poles_a_partial > 1:
         steps.append((0.3, second_poles))
     steps += [(0.3 + 0.3 * (turn + 1) / SWEEPS, sweep) for turn in range(SWEEPS)]
-    steps += [(0.6 + 0.3 * (turn + 1) / free, partial(add_free, turn)) for turn in range(free)]
-    steps += [(0.9 + 0.1 * (turn + 1) / LAST_SWEEPS, partial(last_sweep, turn)) for turn in range(LAST_SWEEPS)]
-    return [*steps, (1.0, takes.sweep)]
+    steps += [(0.6 + 0.3 * (turn + 1) / free, partial(add_free, glides and turn % 2 == 1)) for turn in range(free)]
+    steps += [(0.9 + 0.1 * (turn + 1) / LAST_SWEEPS, sweep) for turn in range(LAST_SWEEPS - 1)]
+    return [*steps, (1.0, partial(sweep, False)), (1.0, takes.sweep)]
 
 
 def _fit_of(
@@ -202,10 +178,6 @@ def _loudest(takes: Takes, number: int) -> Fit:
     )
 
 
-def _plain(hz: float, number: int) -> Pole:
-    return Pole(complex(-3.0, 2 * math.pi * hz), partial=number)
-
-
 def _partials(note: Note, series: PartialSeries) -> int:
     last = max(series.present, default=1) + 2
     hz = series.partials_hz(MOST_PARTIALS)
@@ -234,14 +206,11 @@ def _first_glide(samples: Array, rate: int, hz: Array, edges: Array) -> Glide:
     return glide_of_phases(loud)
 
 
-def _add_pole(takes: Takes, number: int, residuals: Sequence[NDArray[np.complex128]]) -> None:
+def _add_pole(takes: Takes, number: int, residuals: Sequence[Complex]) -> None:
     """A second pole of a band, from the subspace or else close to the first, where it leaves much less."""
-    wheres = [fit.bands[number] for fit in takes.fits]
+    wheres = takes.bands(number)
     before = [fit.poles[number] for fit in takes.fits]
-    targets = [
-        rest[where] + fit.part(earlier, where)
-        for fit, rest, earlier, where in zip(takes.fits, residuals, before, wheres, strict=True)
-    ]
+    targets = takes.targets(before, residuals, wheres)
     one, left, _ = takes.improved(before, targets, wheres, FIRST_DAMPING, number)
     first = one[0][0]
     beside = Pole(complex(2.5 * first.s.real, first.s.imag + 2.0), partial=first.partial)
@@ -249,21 +218,20 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[NDArray[np.complex1
     start_poles = _loudest(takes, number).start(number, 2)
     if len(start_poles) == 2:
         tried.append(start_poles)
-    best = None
+    best, chosen = math.inf, before
     for poles in tried:
         two = [list(poles) for _ in takes.fits]
         after = left
         damping = FIRST_DAMPING
         for _ in range(5):
             two, after, damping = takes.improved(two, targets, wheres, damping, number)
-        if best is None or after < best[0]:
-            best = after, two
-    assert best is not None
+        if after < best:
+            best, chosen = after, two
     bins = sum(2 * (where.stop - where.start) for where in wheres)
     more = 2 + 2 * len(takes.fits)  # numbers
-    if bins * math.log(left / max(best[0], 1e-300)) > WORTH * more * math.log(bins):
-        for fit, chosen in zip(takes.fits, best[1], strict=True):
-            fit.poles[number] = chosen
+    if bins * math.log(left / max(best, 1e-300)) > WORTH * more * math.log(bins):
+        for fit, own in zip(takes.fits, chosen, strict=True):
+            fit.poles[number] = own
         takes.damping[number] = FIRST_DAMPING
 
 

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, signal
 
+from engine.resonators.base import Array
 from training.recording.note import Note, envelope
 from training.recording.numbering import SPECTRUM_S, PartialSeries, Peaks, followed, number, peaks_of
-
-Array = NDArray[np.float64]
 
 CLIPPED_RUNS = 3  # of so many equal samples at the peak
 CLIPPED_SAMPLES = 4
@@ -97,12 +95,8 @@ def clipped(samples: Array, note: Note) -> Finding | None:
         return None
     # the recording may have a higher rate than its note
     first_half_second = min(len(note.part(0, 0.5)) / len(note.samples), 1.0) * len(sound)
-    return Finding(
-        "clipped",
-        f"it is clipped ({count} samples at the limit)",
-        "lower the input gain and record it again",
-        refused=count > MOST_CLIPPED * first_half_second,
-    )
+    words, refused = f"it is clipped ({count} samples at the limit)", count > MOST_CLIPPED * first_half_second
+    return Finding("clipped", words, "lower the input gain and record it again", refused)
 
 
 def already_playing(note: Note) -> Finding | None:
@@ -112,9 +106,8 @@ def already_playing(note: Note) -> Finding | None:
     loudest = float(np.abs(note.samples[: round(0.3 * note.rate_hz)]).max())
     if float(np.abs(note.samples[:3]).max()) < 0.2 * loudest:
         return None
-    return Finding(
-        "playing", "the note is already playing where the file begins", "keep the silence before the attack"
-    )
+    words = "the note is already playing where the file begins"
+    return Finding("playing", words, "keep the silence before the attack")
 
 
 def slow_attack(note: Note) -> Finding | None:
@@ -127,12 +120,8 @@ def slow_attack(note: Note) -> Finding | None:
     is_reversed = rise_s > PLUCKED_S and before > MOST_BEFORE_PEAK
     if rise_s < SLOWEST_ATTACK_S and not is_reversed:
         return None
-    return Finding(
-        "edited",
-        f"its level rises for {rise_s:.2f} s: reversed, faded in, bowed, or in a large room",
-        "give a plucked note as it was recorded",
-        refused=is_reversed,
-    )
+    words = f"its level rises for {rise_s:.2f} s: reversed, faded in, bowed, or in a large room"
+    return Finding("edited", words, "give a plucked note as it was recorded", is_reversed)
 
 
 def reverberant(note: Note, series: PartialSeries | None) -> Finding | None:
@@ -164,9 +153,8 @@ def too_short(note: Note, series: PartialSeries | None) -> Finding | None:
     above = np.flatnonzero(level > max(2 * noise, 1e-3 * float(level.max())))
     seconds = min(note.seconds, float(above[-1]) / note.rate_hz if len(above) else 0.0)
     if series is not None and note.seconds * series.f0_hz < LEAST_PERIODS:
-        return Finding(
-            "short", f"it lasts {note.seconds:.2f} s, fewer than {LEAST_PERIODS} periods", remedy, refused=True
-        )
+        words = f"it lasts {note.seconds:.2f} s, fewer than {LEAST_PERIODS} periods"
+        return Finding("short", words, remedy, refused=True)
     snr_db = 20 * np.log10(float(level.max()) / max(noise, 1e-12))
     if snr_db < LEAST_SNR_DB:
         return Finding("noisy", f"it stands only {snr_db:.0f} dB above its noise", "record it closer, or louder")
@@ -193,12 +181,8 @@ def looped(note: Note) -> Finding | None:
     equal = 1 - (squares + energy - 2 * products) / energy
     if float(equal.max()) < 0.999:
         return None
-    return Finding(
-        "looped",
-        "a stretch of it comes back sample by sample",
-        "give the recording itself, not a sample loop",
-        refused=True,
-    )
+    words = "a stretch of it comes back sample by sample"
+    return Finding("looped", words, "give the recording itself, not a sample loop", refused=True)
 
 
 def more_onsets(note: Note, series: PartialSeries | None) -> Finding | None:
@@ -292,13 +276,10 @@ def _two_in(peaks: Peaks, series: PartialSeries) -> tuple[float, float] | None:
 
 
 def _hum_db(note: Note, part: Array) -> float:
-    """The level of a peak that holds all that sounds before the attack, as a hum may.
-
-    The median over short blocks that are no digital silence, well before the onset, for an attack may be slow.
-    """
+    """The level of a peak that holds all that sounds before the attack, as a hum may: the median of short blocks."""
     block = round(HUM_BLOCK_S * note.rate_hz)
     count = max(0, note.onset - round(ATTACK_S * note.rate_hz)) // block
     powers = np.var(note.samples[: count * block].reshape(count, block), axis=1)
-    positive = powers[powers > 0]
+    positive = powers[powers > 0]  # no digital silence
     power = float(np.median(positive)) if len(positive) else 0.0
     return float(10 * np.log10(power / 2 * np.sum(np.hanning(len(part) + 2)) ** 2 + 1e-30))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate
 
-Array = NDArray[np.float64]
+from engine.resonators.base import Array
 
 TIMES_S = np.array([0.08, 0.3, 1.0])
 CENTS = math.log(2) / 1200

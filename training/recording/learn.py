@@ -1,27 +1,34 @@
-"""Notes, from samples to all that is learned of them: what a window's dialog and the command call."""
+"""Notes, from samples to all that is learned of them: what a window's dialog and the command call.
+
+Of several recordings of one instrument the first gives the string and the recorded note. Takes of its pitch share
+their poles (`fit.fit_takes`), and the medians of their partials' levels. Notes of every pitch share the smooth decay.
+So one take's accident does not become the instrument's.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from engine.resonators.base import Array
+from engine.resonators.recorded import OF_PARTIALS, RecordedString
 from training.recording.checkpoint import checkpoint_of
 from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
 from training.recording.note import Note, RecordingError, note_of
 from training.recording.numbering import PartialSeries, apart_cents, number_note
-from training.recording.physics import Kind, LearnedPhysics, Strung, physics_of, strung
-from training.recording.preset import Source
-from training.recording.report import FitReport, report_of
+from training.recording.physics import Kind, LearnedPhysics, Strung, corrections, physics_of, strung
+from training.recording.preset import Source, recorded_note, recorded_string
+from training.recording.report import FitReport, figures, report_of
 from training.recording.verdict import Verdict, verdict_of
 
-Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 SAME_PITCH_CENTS = 60.0
@@ -115,41 +122,54 @@ def learn(
     lead = notes[0][1]
     takes = [place for place, (_, series) in enumerate(notes) if apart_cents(lead, series) < SAME_PITCH_CENTS]
     others = [place for place in range(len(notes)) if place not in takes]
-    jobs = [takes, *([place] for place in others)]
     fitted: dict[int, LearnedNote] = {}
     unfinished: list[Path] = []
-    for job in jobs:
+    for job in (takes, *([place] for place in others)):
         part = partial(_part, progress, len(fitted) / len(notes), len(job) / len(notes))
         chosen = [notes[place] for place in job]
         path = None if checkpoints is None else checkpoint_of(checkpoints, chosen)
-        fits = fit_takes(chosen, progress=part, checkpoint=path)
+        fitted |= dict(zip(job, fit_takes(chosen, progress=part, checkpoint=path), strict=True))
         unfinished += [path] if path is not None else []
-        fitted |= dict(zip(job, fits, strict=True))
     learned = []
-    for place, ((examined, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
-        physics = physics_of(fitted[place])
-        strung_string = strung(physics, kind, length_m, gauge_mm)
-        report = report_of(note, fitted[place], physics)
-        verdict = verdict_of(note, series, fitted[place], report)
+    for place, (examined, source) in enumerate(recordings):
+        (note, series), fit = notes[place], fitted[place]
+        physics = physics_of(fit)
+        string = strung(physics, kind, length_m, gauge_mm)
+        report = report_of(note, fit, physics)
+        verdict = verdict_of(note, series, fit, report)
         seconds = time.monotonic() - started
         learned.append(
-            Learned(
-                source,
-                note,
-                series,
-                fitted[place],
-                physics,
-                strung_string,
-                report,
-                verdict,
-                examined.findings,
-                seconds,
-            )
+            Learned(source, note, series, fit, physics, string, report, verdict, examined.findings, seconds)
         )
     progress(1.0)
     for path in unfinished:
         path.unlink(missing_ok=True)
     return learned
+
+
+def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:
+    """The additions of all recordings to the string of the first."""
+    first = learned[0]
+    note = recorded_note(first.note, first.fitted, first.source)
+    first_string = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
+    if len(learned) == 1:
+        return first_string
+    hz, smooth, same = np.log(first_string.smooth_hz), [np.log(first_string.smooth_ratio)], []
+    for take in learned[1:]:
+        lower = first.physics.f0_hz / take.physics.f0_hz
+        string = first.strung.string
+        own = corrections(take.physics, replace(string, length_m=string.length_m * lower))
+        smooth.append(np.interp(hz, np.log(own["smooth_hz"]), np.log(own["smooth_ratio"])))
+        if abs(1200 * math.log2(lower)) < SAME_PITCH_CENTS:
+            same.append(own)
+    shared: dict[str, Any] = {
+        name: tuple(
+            float(np.median([own_value, *(take[name][place] for take in same if place < len(take[name]))]))
+            for place, own_value in enumerate(getattr(first_string, name))
+        )
+        for name in OF_PARTIALS
+    }
+    return replace(first_string, smooth_ratio=tuple(np.exp(np.mean(smooth, axis=0)).tolist()), **shared)
 
 
 def _part(progress: Progress, done: float, share: float, of_part: float) -> None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from engine.effects.responses import resampled
-
-Array = NDArray[np.float64]
+from engine.resonators.base import Array
 
 HIGHEST_RATE_HZ = 48_000  # recordings of higher rates are converted: nothing above 24 kHz is fitted
 LOWEST_RATE_HZ = 8_000
@@ -110,10 +108,7 @@ def _mono(samples: Array) -> Array:
 
 
 def _without_silence(sound: Array) -> Array:
-    """The sound around zero, up to where it stops: one value, again and again, is silence, whatever the value.
-
-    Its beginning stays in its place, for times count from there.
-    """
+    """The sound around zero, up to where it stops: one value, again and again, is silence. Times stay as they are."""
     moves = np.flatnonzero(np.diff(sound))
     if len(moves) == 0:
         return np.zeros(len(sound))
@@ -128,10 +123,6 @@ def _noise_power(samples: Array, rate_hz: int, onset: int) -> float:
     block = max(1, round(0.05 * rate_hz))
     blocks = [samples[first : first + block] for first in range(0, max(0, onset - block // 2 - block), block)]
     count = min(6, (len(samples) - onset) // (2 * block))
-    blocks += [
-        samples[len(samples) - (block_samples + 1) * block : len(samples) - block_samples * block]
-        for block_samples in range(count)
-    ]
-    powers = [float(np.mean(block_samples**2)) for block_samples in blocks if len(block_samples)]
-    positive = [power for power in powers if power > 0]
-    return min(positive, default=1e-14)
+    blocks += [samples[end - block : end] for end in range(len(samples), len(samples) - count * block, -block)]
+    powers = [float(np.mean(of_block**2)) for of_block in blocks if len(of_block)]
+    return min((power for power in powers if power > 0), default=1e-14)

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
+from engine.resonators.base import Array
 from training.recording.note import Note
-
-Array = NDArray[np.float64]
 
 F0_RANGE_HZ = (26.0, 4_300.0)
 STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])
@@ -57,7 +56,7 @@ class PartialSeries:
 
     def numbers_of(self, hz: Array) -> NDArray[np.int_]:
         """The number of the partial that is nearest to each frequency."""
-        return np.maximum(1, np.round(_number(hz, self.f0_hz, self.stiffness))).astype(int)
+        return nearest(hz, self.f0_hz, self.stiffness).astype(int)
 
 
 def apart_cents(first: PartialSeries, other: PartialSeries) -> float:
@@ -114,16 +113,15 @@ class Peaks:
 
 def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
     """The distances from each frequency to the nearest partial, in Hz."""
-    k = np.maximum(1, np.round(_number(hz, f0_hz, stiffness)))
-    return hz - partial_hz(k, f0_hz, stiffness)
+    return hz - partial_hz(nearest(hz, f0_hz, stiffness), f0_hz, stiffness)
 
 
-def _number(hz: Array, f0_hz: float, stiffness: float) -> Array:
-    """k as a real number with f_k = hz."""
-    ratio = (hz / f0_hz) ** 2
-    if stiffness < 1e-12:
-        return np.sqrt(ratio)
-    return np.sqrt((np.sqrt(1 + 4 * stiffness * ratio) - 1) / (2 * stiffness))
+def nearest(hz: Array, f0_hz: float, stiffness: float) -> Array:
+    """The number, as a float, of the partial that is nearest to each frequency."""
+    square = (hz / f0_hz) ** 2
+    if stiffness >= 1e-12:
+        square = (np.sqrt(1 + 4 * stiffness * square) - 1) / (2 * stiffness)
+    return np.maximum(1, np.round(np.sqrt(square)))
 
 
 def tolerance(hz: Array, f0_hz: float, width_hz: float) -> Array:
@@ -157,9 +155,7 @@ def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
     bins = bins[(bins > 1) & (bins < len(level) - 2) & (bins * step > 20.0)]
     above = level[bins] - floor[bins]
     bins = bins[(above > PRESENT_DB) & (level[bins] > level.max() - 75)]
-    before = level[bins - 1]
-    at = level[bins]
-    after = level[bins + 1]
+    before, at, after = level[bins - 1], level[bins], level[bins + 1]
     shift = 0.5 * (before - after) / np.minimum(before - 2 * at + after, -1e-9)
     return Peaks((bins + shift) * step, at - floor[bins], at, width_hz, highest_hz)
 
@@ -170,12 +166,8 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Part
         return None
     candidates = _candidates(peaks, f0_range_hz)
     scored = sorted(((max(_score(peaks, f0, b)[0] for b in COARSE), f0) for f0 in candidates), reverse=True)
-    best: PartialSeries | None = None
-    for _, f0 in scored[:40]:
-        for stiffness in STIFFNESSES:
-            tried = series_at(peaks, f0, float(stiffness))
-            if best is None or tried.score > best.score:
-                best = tried
+    tried = (series_at(peaks, f0, float(stiffness)) for _, f0 in scored[:40] for stiffness in STIFFNESSES)
+    best = max(tried, key=lambda series: series.score, default=None)
     return None if best is None else _best_refined(peaks, best)
 
 
@@ -207,17 +199,15 @@ def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
     every = np.concatenate([by_peak, apart])
     low, high = f0_range_hz
     every = np.sort(every[(every >= low) & (every <= high)])
-    if len(every) == 0:
-        return every
-    kept = [every[0]]
-    for candidate_hz in every[1:]:
-        if candidate_hz > kept[-1] * 1.002:
+    kept: list[float] = []
+    for candidate_hz in every:
+        if not kept or candidate_hz > kept[-1] * 1.002:
             kept.append(candidate_hz)
     return np.array(kept)
 
 
 def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, float, tuple[int, ...]]:
-    k_of = np.maximum(1, np.round(_number(peaks.hz, f0_hz, stiffness))).astype(int)
+    k_of = nearest(peaks.hz, f0_hz, stiffness).astype(int)
     target = partial_hz(k_of, f0_hz, stiffness)
     allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
     near = np.clip(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0, 1.0)
@@ -239,8 +229,8 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     if len(peaks.hidden_hz):
         # near a partial of the other series nothing would be seen
         expected = partials_hz(f0_hz, stiffness, count)
-        nearest = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
-        absent &= nearest > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
+        apart = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
+        absent &= apart > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
     missing = float(absent.sum() / count)
     first = 0.12 * float(absent[0])
     score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
@@ -249,24 +239,31 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
 
 def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     """f0 and B by least squares on the peaks that it has, weighted by strength, outliers left out."""
-    k = np.maximum(1, np.round(_number(peaks.hz, series.f0_hz, series.stiffness)))
+    k = nearest(peaks.hz, series.f0_hz, series.stiffness)
     off = np.abs(distances(peaks.hz, series.f0_hz, series.stiffness))
     used = (off < tolerance(peaks.hz, series.f0_hz, peaks.width_hz)) & (k <= MOST_PARTIALS)
     if len(np.unique(k[used])) < 3:
         return series
-    k = k[used]
-    hz = peaks.hz[used]
-    weight = peaks.strength[used] + 0.05
-    # (f/k)² = f0² + f0² B k²
+    (square, slope), *_ = fit_law(k[used], peaks.hz[used], peaks.strength[used] + 0.05, 3)
+    if square <= 0:
+        return series
+    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+
+
+def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Array, Array]:
+    """f0² and f0² B of (f/k)² = f0² + f0² B k² by least squares; outliers lose weight from round to round.
+
+    Beside them the rows and the weights of the equations.
+    """
     rows = np.stack([np.ones_like(k), k**2], 1)
     scale = weight * k / hz  # errors in Hz are alike
-    for _ in range(3):
-        (square, slope), *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
-        if square <= 0:
-            return series
-        residual = np.abs((hz / k) ** 2 - rows @ np.array([square, slope])) * k / hz
-        scale = weight * k / hz / np.maximum(1.0, residual / (2 * np.median(residual) + 1e-9))
-    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+    for _ in range(rounds):
+        law, *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
+        if law[0] <= 0:
+            break
+        off = np.abs((hz / k) ** 2 - rows @ law) * k / hz
+        scale = weight * k / hz / np.maximum(1.0, off / (2 * np.median(off) + 1e-9))
+    return np.asarray(law, np.float64), rows, scale
 
 
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:

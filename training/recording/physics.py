@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize
 
+from engine.resonators.base import Array
 from engine.resonators.recorded import MOST_CENTS, RATIOS
 from engine.resonators.string import decay_rates, undamped_frequencies
 from engine.values.string import StringParameters
 from training.recording.fit import LearnedNote
-from training.recording.numbering import partial_hz
-from training.recording.refine import Pole, polarisations
+from training.recording.numbering import fit_law, partial_hz
+from training.recording.refine import Pole, moments, polarisations
 
-Array = NDArray[np.float64]
 Kind = Literal["guitar", "bass", "harp", "piano"]
 
 SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
@@ -122,13 +121,10 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
             higher = 2 ** (learned.spreads[number].rest_cents / 1200)
             poles = [replace(pole, s=complex(pole.s.real, higher * pole.s.imag)) for pole in poles]
         s, a = np.array([pole.s for pole in poles]), np.array([pole.a for pole in poles])
-        sums = s[:, None] + s[None].conj()
-        pairs = a[:, None] * a[None].conj()
-        energy = float((-pairs / sums).sum().real)
-        moment = float((pairs / sums**2).sum().real)
+        energy, moment, turn = map(float, moments(a, s))
         if energy <= 0 or moment <= 0:
             continue
-        hz = float((-pairs * s[:, None] / sums).sum().imag / energy / (2 * math.pi))
+        hz = turn / energy / (2 * math.pi)
         partials.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
     loudest = max((partial.energy for partial in partials), default=0.0)
     return tuple(partial for partial in partials if partial.energy > LEAST_SHARE * loudest)
@@ -163,13 +159,8 @@ def physics_of(learned: LearnedNote) -> LearnedPhysics:
     hz = np.array([partial.hz for partial in partials])
     loudest = max(partial.energy for partial in partials)
     weight = np.array([(partial.energy / loudest) ** 0.15 for partial in partials])
-    rows = np.stack([np.ones_like(k), k**2], 1)
     if len(k) >= 3:
-        scale = weight * k / hz
-        for _ in range(8):
-            solution, *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
-            off = np.abs((hz / k) ** 2 - rows @ solution) * k / hz
-            scale = weight * k / hz / np.maximum(1.0, off / (2 * np.median(off) + 1e-9))
+        solution, rows, scale = fit_law(k, hz, weight, 8)
         if solution[1] < 0:
             solution = np.array([np.average((hz / k) ** 2, weights=scale**2), 0.0])
         residual = ((hz / k) ** 2 - rows @ solution) * scale
@@ -289,18 +280,13 @@ def corrections(physics: LearnedPhysics, string: StringParameters) -> dict[str, 
     sigma = decay_rates(string, count)
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
     smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
-    smooth = sigma * np.exp(
-        np.interp(np.log(omega), np.log(2 * math.pi * np.array(physics.smooth_hz)), np.log(smooth_ratio))
-    )
-    shared = [partial for partial in physics.partials if len(partial.poles) == 2]
-    split = float(np.median([_split(partial.poles) for partial in shared])) if shared else 0.0
-    slower = (
-        float(np.median([partial.poles[1].decay / partial.poles[0].decay for partial in shared])) if shared else 1.0
-    )
-    cents, ratio = np.zeros(count), np.ones(count)
-    second_cents = np.full(count, split)
-    second_ratio = np.full(count, slower)
-    share = np.zeros(count)
+    nodes = np.log(2 * math.pi * np.array(physics.smooth_hz))
+    smooth = sigma * np.exp(np.interp(np.log(omega), nodes, np.log(smooth_ratio)))
+    pairs = [partial.poles for partial in physics.partials if len(partial.poles) == 2]
+    split = float(np.median([_split(pair) for pair in pairs])) if pairs else 0.0
+    slower = float(np.median([second.decay / first.decay for first, second in pairs])) if pairs else 1.0
+    cents, ratio, share = np.zeros(count), np.ones(count), np.zeros(count)
+    second_cents, second_ratio = np.full(count, split), np.full(count, slower)
     for partial in physics.partials:
         place = partial.number - 1
         first = partial.poles[0]

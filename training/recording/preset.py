@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from engine.presets import Preset, PresetInfo, find_preset, load_preset, save_preset
 from engine.presets.file import arrays_of
+from engine.resonators.base import Array
 from engine.resonators.recorded import RecordedNote, RecordedString
 from training.recording.fit import LearnedNote
 from training.recording.glide import TIMES_S
 from training.recording.note import FIT_BEGINS_S, Note
 from training.recording.physics import COMB_FLOOR, LearnedPhysics, Strung, corrections
-
-Array = NDArray[np.float64]
 
 BASE = "studio_any_string"  # whose curves play every string
 LEAST_GRID = 101

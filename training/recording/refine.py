@@ -16,12 +16,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+from scipy import fft, linalg
 
+from engine.resonators.base import Array
 from training.recording.glide import CENTS, PRIOR_CENTS, PRIOR_PITCH_CENTS, Glide, basis, warped
-from training.recording.poles import subspace_poles
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LEAST_DECAY = 0.05  # σ, in 1/s
@@ -37,6 +36,7 @@ MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
 MOST_DECAYS_APART = 8.0
+LONGEST_WINDOW = 120  # of the subspace
 
 
 @dataclass(frozen=True)
@@ -136,12 +136,9 @@ class Fit:
         total = np.zeros(self.highest, complex)
         loudest = max((abs(pole.a) for pole in chosen), default=0.0)
         for pole in chosen:
-            if pole.a == 0:
-                continue
-            where = self.reach(pole, loudest)
-            value, _ = self.spectra(pole, where, slope=False)
-            a = pole.a * pole.s if derivative else pole.a
-            total[where] += 0.5 * (a * value[0] + a.conjugate() * value[1])
+            if pole.a:
+                where = self.reach(pole, loudest)
+                total[where] += self.part([replace(pole, a=pole.a * pole.s) if derivative else pole], where)
         return total
 
     def gliding(self) -> list[Pole]:
@@ -154,12 +151,6 @@ class Fit:
         """The bins in which the poles that do not glide are fitted."""
         reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.free), default=0.0)
         return slice(1, min(self.highest, max(2, round(reach / self.step_hz))))
-
-    def left(self) -> float:
-        """The share of the energy that the poles leave."""
-        residual = self.data - self.model()
-        above = self.energy - float(np.vdot(self.data, self.data).real)
-        return (float(np.vdot(residual, residual).real) + max(0.0, above)) / self.energy
 
     # Steps
 
@@ -282,6 +273,29 @@ def polarisations(poles: list[Pole], most_decays_apart: float = MOST_DECAYS_APAR
         and 1 / most_decays_apart < pole.decay / main.decay < most_decays_apart
     ]
     return sorted([main, *kept[:1]], key=lambda pole: pole.hz)
+
+
+def subspace_poles(envelope: Complex, count: int) -> Complex:
+    """`count` factors z a step with envelope ≈ Σ a z^m, fewer where it is too short, (poles,).
+
+    By the shift invariance of their subspace (ESPRIT; Roy, Kailath 1989): erratic on real notes, so a start only.
+    """
+    length = min(len(envelope) // 2, LONGEST_WINDOW)
+    if length <= count:
+        return np.zeros(0, complex)
+    rows = linalg.hankel(envelope[: len(envelope) - length + 1], envelope[len(envelope) - length :])
+    _, vectors = linalg.eigh(rows.conj().T @ rows, subset_by_index=(length - count, length - 1))
+    space = vectors.conj()
+    turned, *_ = linalg.lstsq(space[:-1], space[1:])
+    return np.asarray(linalg.eigvals(turned))
+
+
+def moments(a: Complex, s: Complex) -> tuple[Array, Array, Array]:
+    """∫ |z|², its moment in time and ∫ Im z' z̄ of z = Σ a exp(st), for poles (…, poles)."""
+    sums = s[..., :, None] + s[..., None, :].conj()
+    pairs = a[..., :, None] * a[..., None, :].conj()
+    energy, moment, turn = -pairs / sums, pairs / sums**2, -pairs * s[..., :, None] / sums
+    return energy.sum((-2, -1)).real, moment.sum((-2, -1)).real, turn.sum((-2, -1)).imag
 
 
 def real_rows(columns: Complex) -> Array:

@@ -9,17 +9,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, signal
 
 from engine.compare.relative import error_to_signal
 from engine.compare.spectra import log_spectral_distance, spectral_distances
+from engine.resonators.base import Array
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
 from training.recording.numbering import partial_hz
 from training.recording.physics import LearnedPhysics
-
-Array = NDArray[np.float64]
 
 LATE_S = 0.05  # after the onset: the second ESR begins here
 MOST_DELAY_S = 0.002
@@ -48,14 +46,11 @@ class FitErrors:
 
 @dataclass(frozen=True)
 class Band:
-    """The decay of an octave: T60 of the recording and of the learned note, in s.
-
-    It is nan where it does not decay.
-    """
+    """The decay of an octave: T60 of the recording and of the learned note; nan where it does not decay."""
 
     hz: float
-    recorded_s: float
-    learned_s: float
+    recorded_t60_s: float
+    learned_t60_s: float
 
 
 @dataclass(frozen=True)
@@ -63,20 +58,20 @@ class PartialReport:
     """A partial at rest, with 95 % intervals.
 
     Attributes:
-        cents: from the law of f0 and B.
+        cents_from_law: of f0 and B.
         level_db: of its energy, below the loudest partial's.
-        decay: σ in 1/s of the one exponential with the same centre of energy.
+        t60_s: of the one exponential with the same centre of energy.
         poles: that it is made of.
     """
 
     number: int
     hz: float
+    cents_from_law: float
     hz_interval: tuple[float, float]
-    cents: float
     level_db: float
     level_interval_db: tuple[float, float]
-    decay: float
-    decay_interval: tuple[float, float]
+    t60_s: float
+    t60_interval_s: tuple[float, float]
     poles: int
 
 
@@ -94,11 +89,9 @@ def report_of(note: Note, learned: LearnedNote, physics: LearnedPhysics) -> FitR
     """Compare a note with its recording."""
     truth = note.fitted()
     model = learned.render(np.arange(len(truth)) / note.rate_hz)
-    errors = errors_of(truth, model, note.rate_hz, note.noise_power)
+    sounds = truth, model, note.rate_hz, note.noise_power
     noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
-    return FitReport(
-        errors, noise, bands_of(truth, model, note.rate_hz, note.noise_power), partials_in(learned, physics)
-    )
+    return FitReport(errors_of(*sounds), noise, bands_of(*sounds), partials_in(learned, physics))
 
 
 def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialReport, ...]:
@@ -112,13 +105,18 @@ def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialR
         law = partial_hz(number, physics.f0_hz, physics.stiffness)
         hz = sum(spread.hz) / 2
         low, high = spread.level_db
-        decay = math.sqrt(spread.decay[0] * spread.decay[1])
-        poles = sum(pole.partial == number for pole in learned.poles)
-        interval = low - loudest, high - loudest
-        cents = 1200 * math.log2(hz / law)
+        slow, fast = spread.decay
         rows.append(
             PartialReport(
-                number, hz, spread.hz, cents, levels[number] - loudest, interval, decay, spread.decay, poles
+                number,
+                hz,
+                cents_from_law=1200 * math.log2(hz / law),
+                hz_interval=spread.hz,
+                level_db=levels[number] - loudest,
+                level_interval_db=(low - loudest, high - loudest),
+                t60_s=math.log(1000) / math.sqrt(slow * fast),
+                t60_interval_s=(math.log(1000) / fast, math.log(1000) / slow),
+                poles=sum(pole.partial == number for pole in learned.poles),
             )
         )
     return tuple(rows)
@@ -176,10 +174,7 @@ def bands_of(truth: Array, model: Array, rate_hz: int, noise_power: float) -> tu
 
 
 def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
-    """The T60 from the slope of the backward integral (Schroeder 1965).
-
-    It is taken between -2 and -22 dB, or as far as its noise lets.
-    """
+    """The T60 by the slope of the backward integral (Schroeder 1965), from -2 to -22 dB or as its noise lets."""
     power = np.maximum(sound**2 - noise_power, -noise_power)
     left = np.cumsum(power[::-1])[::-1]
     if left[0] <= 0 or left[0] < 30 * noise_power * rate_hz * 0.05:

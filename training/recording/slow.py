@@ -15,53 +15,44 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from engine.resonators.base import Array
 from training.recording.intervals import covariance
-from training.recording.refine import Fit, Pole
-
-Complex = NDArray[np.complex128]
+from training.recording.refine import Complex, Fit, Pole
+from training.recording.sweeps import Takes
 
 FALL = 1.25  # in nepers until the end of the fit, an estimate; faster poles are left alone
 SPREAD = 0.5  # standard deviation of log σ, an estimate
 
 
-def settle_slow(fits: Sequence[Fit]) -> None:
+def settle_slow(takes: Takes) -> None:
     """Settle the slow poles of takes, which share them."""
-    least = FALL / max(len(fit.samples) / fit.rate_hz for fit in fits)
-    residuals = [fit.data - fit.model() for fit in fits]
-    for number in range(len(fits[0].bands)):
-        wheres = [fit.bands[number] for fit in fits]
-        moved = _settled(fits, [fit.poles[number] for fit in fits], residuals, wheres, least)
-        for fit, poles in zip(fits, moved, strict=True):
+    least = FALL / max(len(fit.samples) / fit.rate_hz for fit in takes.fits)
+    residuals = takes.residuals()
+    for number in range(len(takes.damping)):
+        moved = _settled(takes, [fit.poles[number] for fit in takes.fits], residuals, takes.bands(number), least)
+        for fit, poles in zip(takes.fits, moved, strict=True):
             fit.poles[number] = poles
-    moved = _settled(fits, [fit.free for fit in fits], residuals, [fit.free_bins() for fit in fits], least)
-    for fit, poles in zip(fits, moved, strict=True):
+    free_bins = [fit.free_bins() for fit in takes.fits]
+    moved = _settled(takes, [fit.free for fit in takes.fits], residuals, free_bins, least)
+    for fit, poles in zip(takes.fits, moved, strict=True):
         fit.free = poles
 
 
 def _settled(
-    fits: Sequence[Fit],
-    before: list[list[Pole]],
-    residuals: Sequence[Complex],
-    wheres: Sequence[slice],
-    least: float,
+    takes: Takes, before: list[list[Pole]], residuals: Sequence[Complex], wheres: Sequence[slice], least: float
 ) -> list[list[Pole]]:
     if not any(pole.decay < least for pole in before[0]):
         return before
-    known = sum(
-        (
-            _precision(fit, poles, rest[where], where)
-            for fit, poles, rest, where in zip(fits, before, residuals, wheres, strict=True)
-        ),
-        np.zeros(len(before[0])),
-    )
+    known = np.zeros(len(before[0]))
+    for fit, poles, rest, where in zip(takes.fits, before, residuals, wheres, strict=True):
+        known = known + _precision(fit, poles, rest[where], where)
     decays = [_decay(pole.decay, known_decay, least) for pole, known_decay in zip(before[0], known, strict=True)]
-    solved = []
-    for fit, poles, rest, where in zip(fits, before, residuals, wheres, strict=True):
-        slower = [replace(pole, s=complex(-decay, pole.s.imag)) for pole, decay in zip(poles, decays, strict=True)]
-        solved.append(fit.solve(slower, rest[where] + fit.part(poles, where), where)[1])
-    return solved
+    slower = [
+        [replace(pole, s=complex(-decay, pole.s.imag)) for pole, decay in zip(poles, decays, strict=True)]
+        for poles in before
+    ]
+    return takes.solve(slower, takes.targets(before, residuals, wheres), wheres)[1]
 
 
 def _decay(decay: float, known: float, least: float) -> float:
@@ -71,7 +62,7 @@ def _decay(decay: float, known: float, least: float) -> float:
     return math.exp((known * math.log(decay) + prior * math.log(least)) / (known + prior))
 
 
-def _precision(fit: Fit, poles: list[Pole], residual: Complex, where: slice) -> NDArray[np.float64]:
+def _precision(fit: Fit, poles: list[Pole], residual: Complex, where: slice) -> Array:
     """Inverse variance of each pole's log σ, (poles,); 0 of one without amplitude."""
     loud = [place for place, pole in enumerate(poles) if pole.a]
     inverse_variance = np.zeros(len(poles))

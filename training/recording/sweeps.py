@@ -12,10 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from training.recording.refine import Fit, Pole, projector, real_rows
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from engine.resonators.base import Array
+from training.recording.refine import Complex, Fit, Pole, projector, real_rows
 
 SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
 REST = 3  # sweeps, for such a band
@@ -43,6 +41,20 @@ class Takes:
         self.damping, self.rests = np.full(bands, FIRST_DAMPING), np.zeros(bands, int)
         self.weights = [self.fits[0].energy / fit.energy for fit in self.fits]
 
+    def residuals(self) -> list[Complex]:
+        """The part of each take's spectrum that all poles leave."""
+        return [fit.data - fit.model() for fit in self.fits]
+
+    def bands(self, number: int) -> list[slice]:
+        return [fit.bands[number] for fit in self.fits]
+
+    def targets(
+        self, poles: Sequence[list[Pole]], residuals: Sequence[Complex], wheres: Sequence[slice]
+    ) -> list[Complex]:
+        """The part of each take's spectrum that its poles have to explain: all that the others leave."""
+        parts = zip(self.fits, poles, residuals, wheres, strict=True)
+        return [rest[where] + fit.part(take_poles, where) for fit, take_poles, rest, where in parts]
+
     def improved(
         self,
         poles: Sequence[list[Pole]],
@@ -57,7 +69,7 @@ class Takes:
         Args:
             number: of the band; None: poles that do not glide.
         """
-        left, solved, rests = self._solved(poles, targets, wheres)
+        left, solved, rests = self.solve(poles, targets, wheres)
         square: Array = np.zeros((2 * len(poles[0]),) * 2)
         slope: Array = np.zeros(2 * len(poles[0]))
         for fit, take_poles, where, rest, weight in zip(self.fits, solved, wheres, rests, self.weights, strict=True):
@@ -73,31 +85,25 @@ class Takes:
                 [lead.moved(pole, change, number) for pole, change in zip(take_poles, step, strict=True)]
                 for take_poles in solved
             ]
-            after, moved, _ = self._solved(moved, targets, wheres)
+            after, moved, _ = self.solve(moved, targets, wheres)
             if after < left:
                 return moved, after, max(LEAST_DAMPING, 0.3 * damping)
             damping = min(MOST_DAMPING, 6 * damping)
         return solved, left, damping
 
-    def _solved(
+    def solve(
         self, poles: Sequence[list[Pole]], targets: Sequence[Complex], wheres: Sequence[slice]
     ) -> tuple[float, list[list[Pole]], list[Complex]]:
         """The weighted energy that is left with the best amplitudes, the poles with them, and the residuals."""
-        total = 0.0
-        solved = []
-        rests = []
-        for fit, take_poles, target, where, weight in zip(
-            self.fits, poles, targets, wheres, self.weights, strict=True
-        ):
-            left, with_amplitudes, rest = fit.solve(take_poles, target, where)
-            total += weight * left
-            solved.append(with_amplitudes)
-            rests.append(rest)
-        return total, solved, rests
+        parts = zip(self.fits, poles, targets, wheres, strict=True)
+        by_take = [fit.solve(take_poles, target, where) for fit, take_poles, target, where in parts]
+        energies, solved, rests = zip(*by_take, strict=True)
+        total = sum(weight * left for weight, left in zip(self.weights, energies, strict=True))
+        return total, list(solved), list(rests)
 
     def sweep(self, steps: int = 1) -> None:
         """Steps of all bands in turn, each against what all others leave."""
-        residuals = [fit.data - fit.model() for fit in self.fits]
+        residuals = self.residuals()
         loudest = [max((abs(pole.a) for pole in fit.every()), default=0.0) for fit in self.fits]
         for number in range(len(self.damping)):
             before = [fit.poles[number] for fit in self.fits]
@@ -106,13 +112,10 @@ class Takes:
             if self.rests[number]:
                 self.rests[number] -= 1
                 continue
-            wheres = [fit.bands[number] for fit in self.fits]
-            parts = list(zip(self.fits, residuals, before, wheres, strict=True))
-            targets = [rest[where] + fit.part(take_poles, where) for fit, rest, take_poles, where in parts]
-            had = sum(
-                weight * float(np.vdot(rest[where], rest[where]).real)
-                for weight, (_, rest, _, where) in zip(self.weights, parts, strict=True)
-            )
+            wheres = self.bands(number)
+            targets = self.targets(before, residuals, wheres)
+            parts = zip(self.weights, residuals, wheres, strict=True)
+            had = sum(weight * float(np.vdot(rest[where], rest[where]).real) for weight, rest, where in parts)
             after, left = before, had
             for _ in range(steps):
                 after, left, self.damping[number] = self.improved(
@@ -120,12 +123,12 @@ class Takes:
                 )
             if had - left < SETTLED * self.fits[0].energy * len(self.fits):
                 self.rests[number] = REST
-            for place, (fit, rest, take_poles, _) in enumerate(parts):
-                fit.poles[number] = after[place]
-                for sign, poles in ((1, take_poles), (-1, after[place])):
+            for fit, rest, old, new, most in zip(self.fits, residuals, before, after, loudest, strict=True):
+                fit.poles[number] = new
+                for sign, poles in ((1, old), (-1, new)):
                     for pole in poles:
                         if pole.a:
-                            changed = fit.reach(pole, loudest[place])
+                            changed = fit.reach(pole, most)
                             rest[changed] += sign * fit.part([pole], changed)
 
     def sweep_free(self, steps: int = 1) -> None:

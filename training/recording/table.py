@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from training.recording.learn import Learned
@@ -27,24 +28,8 @@ def as_data(learned: Learned) -> dict[str, Any]:
         "glide_cents": 1200 * math.log2(1 + physics.rise),
         "assumed": list(learned.strung.assumed),
         "errors": {name: _finite(value) for name, value in figures(report).items()},
-        "partials": [
-            {
-                "number": row.number,
-                "hz": row.hz,
-                "cents_from_law": row.cents,
-                "hz_interval": row.hz_interval,
-                "level_db": row.level_db,
-                "level_interval_db": row.level_interval_db,
-                "t60_s": math.log(1000) / row.decay,
-                "t60_interval_s": [math.log(1000) / row.decay_interval[1], math.log(1000) / row.decay_interval[0]],
-                "poles": row.poles,
-            }
-            for row in report.partials
-        ],
-        "bands": [
-            {"hz": row.hz, "recorded_t60_s": _finite(row.recorded_s), "learned_t60_s": _finite(row.learned_s)}
-            for row in report.bands
-        ],
+        "partials": [asdict(row) for row in report.partials],
+        "bands": [{name: _finite(value) for name, value in asdict(row).items()} for row in report.bands],
     }
 
 
@@ -59,7 +44,7 @@ def as_text(learned: Learned) -> list[str]:
         f"  {learned.verdict.words}",
         f"  log spectral distance {errors.distance_db:.1f} dB, STFT {errors.stft:.2f}",
     ]
-    bands = [f"{band.hz:g} Hz {band.recorded_s:.2f}/{band.learned_s:.2f}" for band in learned.report.bands]
+    bands = [f"{band.hz:g} Hz {band.recorded_t60_s:.2f}/{band.learned_t60_s:.2f}" for band in learned.report.bands]
     lines.append(f"  decay by 60 dB in s, recorded/learned: {', '.join(bands) or 'no octave decays by 12 dB'}")
     lines += [f"  assumed: {words}" for words in learned.strung.assumed]
     lines += [

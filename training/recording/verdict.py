@@ -6,7 +6,7 @@ partials must lie where it has them, and hold the sound.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,13 +64,9 @@ def verdict_of(note: Note, series: PartialSeries, learned: LearnedNote, report: 
     t = np.arange(len(truth)) / note.rate_hz
     whole = max(float(truth @ truth), 1e-30)
     linear_esr = error_to_signal(fit_note(note, series, free=0, glides=False).render(t), truth)
-    loud = [abs(partial.cents) < NEAR_CENTS for partial in report.partials if partial.level_db > LOUD_DB]
-    of_law = {partial.number for partial in report.partials if abs(partial.cents) < PULLED_CENTS}
-    tau = learned.glide.tau(t)
-    sound = np.zeros(len(t))
-    for pole in learned.poles:
-        if pole.partial in of_law:
-            sound += (pole.a * np.exp(pole.s * tau)).real
+    loud = [abs(partial.cents_from_law) < NEAR_CENTS for partial in report.partials if partial.level_db > LOUD_DB]
+    of_law = {partial.number for partial in report.partials if abs(partial.cents_from_law) < PULLED_CENTS}
+    sound = replace(learned, poles=tuple(pole for pole in learned.poles if pole.partial in of_law)).render(t)
     esr = report.errors.esr
     near, energy = float(np.mean(loud)) if loud else 0.0, float(sound @ sound) / whole
     reasons = []

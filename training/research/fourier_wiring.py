@@ -51,9 +51,8 @@ def store_in_frnn(model: FRNN, modes: StringModes) -> None:
         ValueError: see `wire_frnn`.
     """
     c = model.configuration
-    _store(
-        model, wire_frnn(modes, c.width, c.depth), [m for m in model.modules() if isinstance(m, FourierConvolution)]
-    )
+    layers = [module for module in model.modules() if isinstance(module, FourierConvolution)]
+    _store(model, wire_frnn(modes, c.width, c.depth), layers)
     with torch.no_grad():
         for parameter in model.pointwise_layers.parameters():
             parameter.zero_()
@@ -156,9 +155,7 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
         raise ValueError(f"{count} modes need a width of {1 + 2 * pairs} and a depth of 3, not {width} and {depth}")
-    field = 0
-    now = 1
-    rate = 1 + pairs
+    field, now, rate = 0, 1, 1 + pairs  # first channels
     last = points - 1
     analyse, turn, synthesise = layers = tuple(Kernels(points, width) for _ in range(3))
     for layer in layers:
@@ -383,13 +380,10 @@ def shared_coupling(coupling: Tensor, squares: Tensor) -> tuple[Tensor, Tensor, 
 
 
 def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
-    """The inputs of r for cosine and sine, (2, modes) each: biases, and slopes per radian that a mode turns farther.
-
-    Least squares over drifts, of which larger ones are rarer.
-    """
+    """The inputs of r for cosine and sine, (2, modes) each: biases, and slopes per radian of a further turn."""
     decay, angle = torch.exp(modes.log_eigenvalues.real), modes.log_eigenvalues.imag
     shares = torch.linspace(0, LARGEST_DRIFT, 51, dtype=torch.float64)[:, None]
-    likely = torch.exp(-shares) + RAREST
+    likely = torch.exp(-shares) + RAREST  # larger drifts are rarer
     likely = likely / likely.sum()
     drift = torch.where(modes.drift.abs() < LEAST_DRIFT, LEAST_DRIFT, modes.drift)
     angles = angle + shares * drift
@@ -401,10 +395,7 @@ def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
 
 
 def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at_end: list[tuple[int, int]]) -> None:
-    """Start the states from the initial fields, in the one step that these last.
-
-    r shows these fields through different windows.
-    """
+    """Start the states from the initial fields, in the one step that these last; r shows them through windows."""
     count, points = modes.shapes.shape
     start = slice(channels.start, None)
     generator = torch.Generator().manual_seed(0)  # any windows do that have nothing in common
@@ -453,15 +444,11 @@ def mean_motions(modes: Modes) -> StringModes:
     frames, count = motions.shape[1:]
     mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
     guesses = [phases.first_guess(motions[..., mode], 0) for mode in range(count)]
-    last = min(phases.FIRST_FRAMES, frames - 1)
-    while True:
+    for last in phases.horizons(frames):
         times = np.arange(1.0, last + 1)
         for mode, guess in enumerate(guesses):
             seen = mean[1 : last + 1, mode]
             guesses[mode] = phases.ModeMotion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
-        if last == frames - 1:
-            break
-        last = min(frames - 1, int(phases.MORE_FRAMES * last) + 1)
     return phases.string_modes([phases.upright(guess) for guess in guesses], SLOWEST / (frames - 1), modes)
 
 

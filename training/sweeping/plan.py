@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +19,7 @@ from training.cell import RECIPE, Cell, Initial, configuration_of
 from training.configuration import TrainingConfiguration
 
 PLANS = Path(__file__).parent / "plans"
+LISTS = ("models", "strings", "initials", "rates_hz", "horizons", "seeds")
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class CellBlock:
     recipe: str = RECIPE
 
     def __post_init__(self) -> None:
-        for name in ("models", "strings", "initials", "rates_hz", "horizons", "seeds"):
+        for name in LISTS:
             if not getattr(self, name):
                 raise ValueError(f"{name} is empty; name at least one, or remove the block")
         if self.count > bounds.MOST_RUNS:
@@ -47,18 +49,14 @@ class CellBlock:
     @property
     def count(self) -> int:
         """The number of its cells."""
-        lists = (self.models, self.strings, self.initials, self.rates_hz, self.horizons, self.seeds)
-        return math.prod(map(len, lists))
+        return math.prod(len(getattr(self, name)) for name in LISTS)
 
     def cells(self) -> Iterator[Cell]:
         """The cells in order of value; see the module."""
-        for seed in self.seeds:
-            for string in sorted(self.strings, reverse=True):  # non-linear, linear
-                for horizon in sorted(self.horizons):
-                    for model in self.models:
-                        for initial in self.initials:
-                            for rate_hz in self.rates_hz:
-                                yield Cell(model, string == "nonlinear", initial, rate_hz, horizon, self.recipe, seed)
+        strings, horizons = sorted(self.strings, reverse=True), sorted(self.horizons)  # non-linear, linear
+        places = product(self.seeds, strings, horizons, self.models, self.initials, self.rates_hz)
+        for seed, string, horizon, model, initial, rate_hz in places:
+            yield Cell(model, string == "nonlinear", initial, rate_hz, horizon, self.recipe, seed)
 
 
 @dataclass(frozen=True)

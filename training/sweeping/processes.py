@@ -52,8 +52,10 @@ def fitted(
     """
     import torch
 
+    from training.run import device_of
+
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if device != "cpu" and torch.cuda.is_available():
+    if device_of(device) == "cuda":
         # as they are visible to this process: numbers, or names of parts of a device
         visible = os.environ.get("CUDA_VISIBLE_DEVICES", "")
         gpus = [gpu.strip() for gpu in visible.split(",") if gpu.strip()] or list(
@@ -62,8 +64,6 @@ def fitted(
         count = max(1, min(workers or per_device * len(gpus), tasks))
         threads = threads or max(1, cores // count)
         return Layout("cuda", threads, tuple(_environment(threads, gpus[i % len(gpus)]) for i in range(count)))
-    if device == "cuda":
-        raise ValueError("no CUDA device can be used here; choose --device cpu")
     threads = threads or 1
     count = max(1, min(workers or min(cores // threads, _memory_bytes() // RUN_BYTES), tasks))
     return Layout("cpu", threads, (_environment(threads),) * count)

@@ -21,7 +21,7 @@ from engine.schema import SchemaError, read, write
 from training.cell import Cell
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
-from training.run import default_runs
+from training.run import default_runs, row_facts
 from training.sweeping.plan import Plan, PlannedRun
 from training.sweeping.task import PROGRESS, Task, TaskRun, Workers, WorkersError, read_progress
 
@@ -162,37 +162,19 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
 
 
 def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
-    """The rows of a task that has ended; or none, and why it failed.
-
-    Raises:
-        WorkersError: see `sweep`.
-    """
+    """The rows of a task that has ended; or none, and why it failed."""
     if future.cancelled():
         raise WorkersError("the scheduler has given up its tasks; is it still there? The same command continues")
     if died := future.exception():
-        return [], one_line(
-            f"its worker died: {type(died).__name__}: {died}; too little memory, or a fault in a library"
-        )
+        error = f"{type(died).__name__}: {died}"
+        return [], one_line(f"its worker died: {error}; too little memory, or a fault in a library")
     try:
         outcome = future.result()
         return [read(Row, row, "row") for row in outcome["rows"]], one_line(outcome["error"])
-    except SchemaError as error:
-        return [], f"its result makes no sense: {error}"
+    except SchemaError as refused:
+        return [], f"its result makes no sense: {refused}"
 
 
 def _failed(run: PlannedRun, error: str) -> Row:
-    configuration = run.configuration
-    return Row(
-        digest=run.digest,
-        name=run.name,
-        status="failed",
-        model=run.cell.model,
-        string=run.cell.string_kind,
-        initial=run.cell.initial,
-        rate_hz=run.cell.rate_hz,
-        horizon=configuration.steps,
-        recipe=run.cell.recipe,
-        seed=run.cell.seed,
-        finished=now(),
-        message=error,
-    )
+    facts = row_facts(run.name, run.cell.recipe, run.configuration)
+    return Row(**facts, status="failed", finished=now(), message=error)

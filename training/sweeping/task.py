@@ -123,13 +123,10 @@ def _train(task: Task) -> list[Row]:
     import torch
 
     from training.configuration import TrainingConfiguration
-    from training.run import NamedRun, run_rows
+    from training.run import NamedRun, device_of, run_rows
 
     if task.threads is not None:
         torch.set_num_threads(task.threads)
-    device = task.device
-    if device == "auto":
-        device = "cuda" if torch.cuda.is_available() else "cpu"
     named = []
     for run in task.runs:
         configuration = read(TrainingConfiguration, run.configuration, run.name)
@@ -140,7 +137,7 @@ def _train(task: Task) -> list[Row]:
         named,
         task.folder_of(""),
         cache=Path(task.cache) if task.cache else None,
-        device=device,
+        device=device_of(task.device),
         waits=lambda: print(f"{task.runs[0].name}: waits: another process trains it", file=sys.stderr, flush=True),
         checkpoint_every_s=task.checkpoint_every_s,
     )

@@ -15,11 +15,7 @@ LEGEND = """\
 Each cell is our relative {metric} on the validation split, the paper's in brackets, and their ratio. The paper's are
 means of five seeds (its Table 3). **Bold** is better and *italic* worse than the paper, by more than both deviations
 together; the others are equal. {none}: the paper has no such model."""
-STARTS = {
-    "physics": "linear string",
-    "matching pursuit": "modes of the string",
-    "averaging": "averaged equations",
-}
+STARTS = {"physics": "linear string", "matching pursuit": "modes of the string", "averaging": "averaged equations"}
 RECIPE_WORDS = {"paper": ", paper's recipe", "published": ", authors' script"}
 
 
@@ -64,8 +60,9 @@ def _lines(section: Section, metric: str) -> list[list[str]]:
         name = (section.string, MODEL_NAMES[model])
         lines = [line for line in own_lines(section) if line.model == model]
         for line in lines:
-            cells = (_cell(section, line, column, metric) for column in COLUMNS)
-            table.append([*name, given(line), _seeds(section, line), *cells])
+            counts = sorted({len(entry.done) for entry in section.lines[line].values()})
+            seeds = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+            table.append([*name, given(line), seeds, *(_cell(section, line, column, metric) for column in COLUMNS)])
         if not lines:
             table.append([*name, NONE, "0", *(_not_run(section, model, column, metric) for column in COLUMNS)])
     return table
@@ -74,11 +71,6 @@ def _lines(section: Section, metric: str) -> list[list[str]]:
 def _not_run(section: Section, model: str, column: DatasetColumn, metric: str) -> str:
     paper = section.paper(model, column, metric)
     return f"{NOT_RUN} ({paper.mean:.4f})" if paper else NOT_RUN
-
-
-def _seeds(section: Section, line: TableLine) -> str:
-    counts = sorted({len(entry.done) for entry in section.lines[line].values()})
-    return str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
 def _cell(section: Section, line: TableLine, column: DatasetColumn, metric: str) -> str:

@@ -76,13 +76,10 @@ class Section:
     def models(self) -> list[str]:
         """The models with a line of ours or of the paper, in the paper's order."""
         ours = {line.model for line in self.lines}
-        theirs = {model for string, horizon, model, *_ in paper_errors() if (string, horizon) == self.place}
+        place = self.string, self.horizon
+        theirs = {model for string, horizon, model, *_ in paper_errors() if (string, horizon) == place}
         # the integrated phase is the question: it stands there even where nothing was run
         return [model for model in MODEL_ORDER if model in ours | theirs | {"koopman_integrated"}]
-
-    @property
-    def place(self) -> tuple[str, int]:
-        return self.string, self.horizon
 
     def paper(self, model: str, column: DatasetColumn, metric: str) -> MeanFigure | None:
         """The paper's figure there; None where it has nothing."""
@@ -102,10 +99,8 @@ def sections(rows: Iterable[Row], recipe: str = "all") -> list[Section]:
 
 def rows_of(all_sections: Iterable[Section]) -> list[Row]:
     """Every row behind the figures of these tables, once, by name."""
-    rows = {
-        row for s in all_sections for entries in s.lines.values() for entry in entries.values() for row in entry.rows
-    }
-    return sorted(rows, key=lambda row: (row.name, row.digest))
+    entries = (entry for s in all_sections for columns in s.lines.values() for entry in columns.values())
+    return sorted({row for entry in entries for row in entry.rows}, key=lambda row: (row.name, row.digest))
 
 
 def configuration_of(row: Row) -> TrainingConfiguration | None:
@@ -138,11 +133,8 @@ def _section(rows: Sequence[Row], string: str, horizon: int) -> Section:
 
 
 def _is_measured(row: Row, horizon: int) -> bool:
-    if row.horizon == horizon:
-        return True
-    if horizon != SHORT_HORIZON or row.horizon != HORIZON:
-        return False
-    return row.status != "done" or row.rel_mse_400 is not None
+    of_longer = (row.horizon, horizon) == (HORIZON, SHORT_HORIZON)
+    return row.horizon == horizon or (of_longer and (row.status != "done" or row.rel_mse_400 is not None))
 
 
 def _line(row: Row) -> TableLine:

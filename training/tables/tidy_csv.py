@@ -54,14 +54,12 @@ def _record(section: Section, model: str, line: TableLine | None, column: Datase
     for metric in METRICS:
         paper = section.paper(model, column, metric)
         figures |= {f"paper_{metric}": paper and paper.mean, f"paper_{metric}_std": paper and paper.deviation}
+    of_line = ("recipe", "initialisation", "structured", "trained")
     return {
         "string": section.string,
         "horizon": section.horizon,
         "model": model,
-        "recipe": line.recipe if line else "",
-        "initialisation": line.initialisation if line else "",
-        "structured": line.structured if line else None,
-        "trained": line.trained if line else None,
+        **{name: getattr(line, name, None) for name in of_line},
         "initial": column.initial,
         "rate_hz": column.rate_hz,
         "seeds": len(entry.done),

@@ -15,12 +15,10 @@ from engine.presets import load_preset
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
-from training.family import untrained as players_of_physics
 from training.family.errors import FamilyErrors, StringError
 from training.family.fit import FitCase, errors, fit_curves, geometric_mean
-from training.family.motions import solve
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
-from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
+from training.family.strings import COLUMNS, FAMILY, Column, draw_string, solve, string_of
 
 RATE_HZ, STEPS = 48_000, 1_200
 
@@ -96,10 +94,10 @@ def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
 
 def test_players_are_as_good_as_they_should_be() -> None:
     players = {
-        "series": players_of_physics.untrained("series"),
-        "kicks": players_of_physics.untrained("kicks"),
-        "averaging": players_of_physics.averaging,
-        "linear": players_of_physics.linear_string,
+        "series": family_errors.player(family_errors.untrained("series")),
+        "kicks": family_errors.player(family_errors.untrained("kicks")),
+        "averaging": family_errors.averaging,
+        "linear": family_errors.linear_string,
     }
     found = family_errors.measure(players, "inside", "test", 2, RATE_HZ, (0.0, 0.05))
     means = [found[name].geometric_mean for name in players]
@@ -118,7 +116,7 @@ def test_a_column_reports_its_worst() -> None:
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:
     """Of a geometric mean over strings long after their pluck, zeros of silent ones would be all there is."""
-    players, seed = {"linear": players_of_physics.linear_string}, 176  # of a string that is damped and one that rings
+    players, seed = {"linear": family_errors.linear_string}, 176  # of a string that is damped and one that rings
     early, late = (
         family_errors.measure(players, "beyond", "test", 2, 8_000, seconds, seed=seed)["linear"].strings
         for seconds in ((0.0, 0.05), (1.5, 1.55))

@@ -15,8 +15,7 @@ from engine.presets import find_preset, load_preset
 from engine.resonators.family import StringFamily
 from training.family.errors import player
 from training.family.fit import geometric_mean
-from training.family.motions import solve
-from training.family.strings import FAMILY, draw_from
+from training.family.strings import FAMILY, draw_from, solve
 
 RATE_HZ, STEPS, STRINGS = 48_000, 9_600, 12
 HARD = replace(FAMILY["inside"], tension_rise=(0.2, 0.5))  # where there is an error to be seen

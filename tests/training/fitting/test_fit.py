@@ -12,6 +12,7 @@ import torch
 
 from engine.compare.relative import RelativeError
 from engine.models.dmd import DMD
+from tests.training.fits import fit
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe, TrainingConfiguration
 from training.data.batches import Batch
@@ -19,7 +20,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Diverged, FitProgress, Seed, fit, fit_seeds, horizon_at, learning_rate_at
+from training.fitting.fit import Diverged, FitProgress, Seed, fit_seeds, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
 from training.fitting.start import new_model
 

@@ -13,11 +13,11 @@ from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import IntegratedPhase
 from engine.resonators.string import resonator_of
+from tests.training.fits import fit
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import ModeMotion, fit_phases, upright
 from training.fitting.start import begin

@@ -10,13 +10,12 @@ import pytest
 from tests.training.recording.synthetic import figures_at_rest, synthetic_note
 from training.recording.fit import fit_note
 from training.recording.glide import CENTS, Glide, rate_basis
-from training.recording.intervals import covariance
+from training.recording.intervals import at_rest, covariance, share_of_tension
 from training.recording.note import note_of
 from training.recording.numbering import number_note
 from training.recording.physics import physics_of
 from training.recording.refine import Pole, real_rows
 from training.recording.report import partials_in
-from training.recording.rest import at_rest, share_of_tension
 
 FIGURES = ("hz", "decay", "level_db")
 

@@ -12,8 +12,7 @@ import pytest
 from engine.presets import load_preset
 from engine.resonators.recorded import RecordedString
 from tests.training.recording.synthetic import SyntheticNote
-from training.recording.joint import combined
-from training.recording.learn import Learned, examined, learn
+from training.recording.learn import Learned, combined, examined, learn
 from training.recording.physics import Partial
 from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
 from training.recording.report import figures

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from training.recording.glide import CENTS, Glide
-from training.recording.poles import subspace_poles
-from training.recording.refine import MOST_GLIDE, Fit, Pole, polarisations
+from training.recording.refine import MOST_GLIDE, Fit, Pole, polarisations, subspace_poles
 
 RATE_HZ = 8_000
 GLIDING = Pole(complex(-4, 2 * math.pi * 103), 0.3 + 0.2j, 1)

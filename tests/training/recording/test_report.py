@@ -19,8 +19,8 @@ def test_an_octave_decays_as_its_tone_and_one_that_is_noise_has_no_decay() -> No
     noise = 1e-4 * np.random.default_rng(0).standard_normal(len(T))
     found = {band.hz: band for band in bands_of(np.sum(tones, axis=0) + noise, 0.1 * tones[1], RATE_HZ, 1e-8)}
     for hz, t60 in T60_S.items():
-        assert found[hz].recorded_s == pytest.approx(t60, rel=0.02)
-    assert found[500.0].learned_s == pytest.approx(T60_S[500.0], rel=0.02)
+        assert found[hz].recorded_t60_s == pytest.approx(t60, rel=0.02)
+    assert found[500.0].learned_t60_s == pytest.approx(T60_S[500.0], rel=0.02)
     assert bands_of(noise, noise, RATE_HZ, 1e-8) == ()
 
 

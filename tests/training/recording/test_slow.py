@@ -11,6 +11,7 @@ import pytest
 from training.recording.glide import Glide
 from training.recording.refine import Fit, Pole
 from training.recording.slow import FALL, settle_slow
+from training.recording.sweeps import Takes
 
 RATE_HZ = 8_000
 
@@ -28,7 +29,7 @@ def pole_of(decay: float, hz: float, amplitude: float) -> Pole:
 
 def test_a_decay_that_shows_stays() -> None:
     fit = fit_of([pole_of(0.2, 100.0, 0.5)], 2.5)
-    settle_slow([fit])
+    settle_slow(Takes([fit]))
     assert fit.poles[0][0].decay == pytest.approx(0.2, rel=0.02)
 
 
@@ -36,7 +37,7 @@ def test_a_decay_that_does_not_show_is_settled() -> None:
     loud, beside = pole_of(6.0, 100.0, 0.5), pole_of(0.05, 100.3, 1e-3)
     fit = fit_of([loud], 0.5)
     fit.poles[0] = [loud, beside]
-    settle_slow([fit])
+    settle_slow(Takes([fit]))
     assert fit.poles[0][0].decay == 6.0
     assert 0.5 < fit.poles[0][1].decay <= FALL / 0.5
 
@@ -46,5 +47,5 @@ def test_takes_settle_alike() -> None:
     fits = [fit_of([loud], 0.5), fit_of([replace(loud, a=0.2 + 0j)], 0.5)]
     for fit in fits:
         fit.poles[0] = [loud, beside]
-    settle_slow(fits)
+    settle_slow(Takes(fits))
     assert [pole.s for pole in fits[0].poles[0]] == [pole.s for pole in fits[1].poles[0]]

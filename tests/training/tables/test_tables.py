@@ -129,7 +129,7 @@ def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_
         row(mse=0.4, finished="2025-01-01T00:00:00Z", digest="older"),
         row(other),
     ]
-    (section,) = (s for s in sections(rows) if s.place == ("nonlinear", 4000))
+    (section,) = (s for s in sections(rows) if (s.string, s.horizon) == ("nonlinear", 4000))
     assert [entry[G4].rel_mse for entry in section.lines.values()] == [MeanFigure(0.3)]
     assert "2 of 3 rows of the results file are not shown" in as_compact(rows)
 
