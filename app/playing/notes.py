@@ -20,7 +20,6 @@ from typing import TypeVar
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.dropping import drop
@@ -109,16 +108,15 @@ class Notes:
 
     # What is played
 
-    def set_instrument(self, instrument: Instrument, ear: Ear, patch: Patch | None = None) -> None:
+    def set_instrument(self, patch: Patch | None, ear: Ear, single: str | None = None) -> None:
         """Set what events play from now on, and where all notes are heard.
 
         Args:
-            patch: one that is loaded while a single string is played, so that its keys sound at once when it is.
-                Its notes fade out, so that the string is heard by itself.
+            single: the preset whose string is played by itself: notes of the patch fade out. The patch is loaded all
+                the same, so that its keys sound at once when it is played.
         """
-        single = isinstance(instrument, SingleString)
-        entry = self._find(instrument.preset) if single else None
-        reach = PluckRange.of(entry.info if entry is not None else None) if single else None
+        entry = None if single is None else self._find(single)
+        reach = None if single is None else PluckRange.of(entry.info if entry is not None else None)
         with self._lock:
             plucked_before = self._reach is not None
             self._reach = reach
@@ -126,9 +124,9 @@ class Notes:
             request = self._chosen
             if request is not None and entry is not None and path_of(request.preset) != entry.path:
                 self._chosen = replace(request, preset=entry.path)
-        if single and not plucked_before:
+        if single is not None and not plucked_before:
             self.keys.stop(REPLACED_S)
-        self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
+        self.keys.set_patch(patch, ear)
         self._hear_effects()
 
     def listen(self, ear: Ear) -> None:

@@ -17,7 +17,7 @@ from app.session.listener import Listener
 from app.session.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset({"instrument", "kept", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
+RECORDED = frozenset({"patch", "single", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
@@ -116,6 +116,7 @@ class History:
         if self._open_fields is None or not (self._held or soon):
             self._undo.append({})
         step = self._undo[-1]
+        fields |= {"patch"} if "single" in fields else set()  # for the step's words
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()

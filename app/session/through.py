@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from app.instrument.effects import added_words
-from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.session.slots import other_preset
 from app.shared.vocabulary import DIFFERENCE
@@ -15,7 +14,7 @@ def through_words(choices: Choices) -> tuple[str, ...]:
     A string that sounds alone has one empty text.
     """
     patch = choices.instrument
-    if not isinstance(patch, Patch):
+    if patch is None:
         return ("",)
     name = f"heard through {patch.name}"
     if any(other_preset(voice) for voice in choices.voices):

@@ -483,7 +483,7 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
-        if names & {"instrument", "patch"}:
+        if names & {"patch", "single"}:
             self._show_kind()
         window.show_solo(choices.solo)
         window.show_through(*through_words(choices))

@@ -14,7 +14,6 @@ from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, RecipeError, SoundRecipe, changed_notices, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
-from app.patches.instrument import SingleString
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
@@ -96,13 +95,15 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
-        instrument = (
-            SingleString(preset=name_text(path.stem)) if recipe.struck is None else recipe.struck.found()[0].patch
+        played: dict[str, Any] = (
+            {"single": name_text(path.stem)}
+            if recipe.struck is None
+            else {"instrument": recipe.struck.found()[0].patch}
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")
-    choices = {"instrument": instrument, **restored_choices(recipe)}
+    choices = {**played, **restored_choices(recipe)}
     if recipe.through is not None:
         notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:

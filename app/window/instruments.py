@@ -17,7 +17,6 @@ from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
-from app.patches.instrument import SingleString
 from app.patches.patch import Patch, StringSet
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
@@ -116,7 +115,7 @@ class Instruments(QObject):
     def choices_changed(self, names: frozenset[str]) -> None:
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
-        if "instrument" in names:
+        if names & {"patch", "single"}:
             self._chosen |= names & ShownString.model_fields.keys()
             self._own_timer.start()
 
@@ -260,7 +259,7 @@ class Instruments(QObject):
             pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
             self._play_preset(name)
             with self._lock:
-                self._reported |= {"instrument": SingleString(preset=name)}
+                self._reported |= {"single": name}
             self.play(PluckAt(pluck))
             return
         self.play(self._by_hand(pluck))

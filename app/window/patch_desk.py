@@ -406,15 +406,15 @@ class PatchDesk(QObject):
             self._panel.bar.show_comparing(False)
         if names & {"octave", "patch"}:
             self._keep_octave_in_range("octave" in names)
-        if names & {"octave", "velocity", "instrument", "patch"}:
+        if names & {"octave", "velocity", "patch", "single"}:
             choices, pitches = self._session.choices, self._session.choices.plays_patch
             self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
-        if names & {"instrument", "patch"}:
+        if names & {"patch", "single"}:
             self._judge_again()
-        if names & {"instrument", "patch", *Monitor.model_fields}:
+        if names & {"patch", "single", *Monitor.model_fields}:
             self._show_source()
 
     @property

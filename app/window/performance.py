@@ -14,7 +14,6 @@ from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.instrument.events import NoteOn, PluckAt
-from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import PluckRange
@@ -39,7 +38,7 @@ from app.window.render_signals import RenderSignals
 from engine.plain_text import name_text
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"instrument", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
+PLACED = {"single", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 class Performance(QObject):
@@ -192,14 +191,14 @@ class Performance(QObject):
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
             self.hear_dry(False)
-        if names & {"instrument", "patch"}:  # ends a comparison
-            self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+        if names & {"patch", "single"}:  # ends a comparison
+            self.notes.set_instrument(choices.patch, choices.ear, choices.single)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         request = None if self._plays_drums else request_of(choices, self._library)
         if self._plays_drums:
             self._blows.listen()
-        elif names & {"instrument", "patch"}:
+        elif names & {"patch", "single"}:
             self._blows.forget()
         if names & PLACED and not (choices.plays_patch or entry is None or request is None):
             plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
@@ -222,7 +221,7 @@ class Performance(QObject):
     def play_preset(self, name: str) -> None:
         """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
         choices = self._session.choices
-        self.notes.set_instrument(SingleString(preset=name), choices.ear, choices.patch)
+        self.notes.set_instrument(choices.patch, choices.ear, name)
 
     def hear_dry(self, dry: bool) -> None:
         """Leave body and room out where `dry` is True; else only while the difference is heard."""
@@ -233,7 +232,7 @@ class Performance(QObject):
         choices = self._session.choices
         if patch is not None:
             choices = choices.changed({"patch": patch})
-        self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+        self.notes.set_instrument(choices.patch, choices.ear, choices.single)
 
     def close(self) -> None:
         """End the threads; may be called again."""

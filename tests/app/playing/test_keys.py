@@ -32,7 +32,6 @@ from app.instrument.events import (
     NoteOn,
     PatchTurned,
 )
-from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import BodyChoice, Patch
@@ -72,10 +71,10 @@ class Played:
         self.keys, self.handle = self.notes.keys, self.notes.handle
         self.choose(PATCH)
 
-    def choose(self, patch: Patch | SingleString, beside: Patch | None = None) -> None:
+    def choose(self, patch: Patch, single: str | None = None) -> None:
         """Another instrument, and wait until its keys sound and its effects are set."""
-        self.notes.set_instrument(patch, EAR, beside)
-        if isinstance(patch, Patch):
+        self.notes.set_instrument(patch, EAR, single)
+        if single is None:
             self.wait(lambda: self.keys.player is not None and self.keys.player.patch == patch)
         self.settle()
 
@@ -267,10 +266,10 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
 
 def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
     held = Event()
-    played.notes.set_instrument(SingleString(), EAR)
+    played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)
     played.notes.set_instrument(PATCH, EAR)
-    played.notes.set_instrument(SingleString(), EAR)
+    played.notes.set_instrument(None, EAR, "")
     held.set()
     played.settle()
     assert played.keys.player is None
@@ -297,7 +296,7 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
 
 
 def test_a_patch_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(played: Played) -> None:
-    played.choose(SingleString(preset="gone"), PATCH)
+    played.choose(PATCH, "gone")
     assert played.handle(NoteOn(45, 60)) is None and played.handle(NoteOff(45)) is None
     played.notes.set_instrument(PATCH, EAR)
     played.strike(NoteOn(45, 60))
@@ -346,7 +345,7 @@ def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are
         played.notes.hear_dry(dry)
         played.settle()
         assert (played.effects[-1] is None) == dry
-    played.choose(SingleString(), WOODEN)
+    played.choose(WOODEN, "")
     assert played.effects[-1] is None
     played.choose(WOODEN)
     assert played.effects[-1] is not None

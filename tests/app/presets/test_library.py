@@ -16,7 +16,6 @@ from app.export.choices import ExportChoices
 from app.export.files import export_sound
 from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
-from app.patches.instrument import SingleString
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
 from app.shared.parameters import PARAMETERS
@@ -127,7 +126,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     dropped = receive(tmp_path / "b.WAV", library)
     assert dropped.notice == ""
     assert dropped.choices == {
-        "instrument": SingleString(preset="second"),
+        "single": "second",
         "string": None,
         "position": 0.61,
         "amplitude_mm": 2.5,
