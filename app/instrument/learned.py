@@ -25,11 +25,12 @@ from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import Name
 from app.patches.library import SHIPPED, SUFFIX, PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import BodyChoice, Category, Fretted, Patch, Pickup, PluckChoices
+from app.shared.user_files import make_folder
 from engine.effects.responses import resampled
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
 from engine.presets import load_preset
-from engine.result_file import WriteError, explain, whole_file
+from engine.result_file import whole_file
 from engine.schema import explained
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
@@ -173,10 +174,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     body = own_bodies() / f"{stem}.wav"
     preset = user_folder() / f"{stem}.safetensors"
     report = user_folder() / f"{stem}.report.json"
-    try:
-        body.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WriteError(explain(body.parent, error)) from error
+    make_folder(body.parent)
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     encoded = io.BytesIO()  # libsndfile cannot pass on the error of a full disk
     soundfile.write(encoded, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")

@@ -33,7 +33,7 @@ class StringKeys:
         self.polarisations, self.recorded = polarisations_of(patch, preset), preset.recorded
         self.body: Array | None = body_curves(patch) if near is None else near.body
 
-    def string_of(self, key: int, string: int | None = None) -> KeyString | None:
+    def of_key(self, key: int, string: int | None = None) -> KeyString | None:
         """The string of a key; None for a silent key.
 
         `string`: on which of a set it is played, as in `Strings.of_key`.

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import NoteOn
 from app.patches.drums import Drums
+from app.playing.note import PluckVoices
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf
+from app.shared.log import log_fault
 from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
@@ -17,6 +20,8 @@ from engine.voices import Mixer
 from engine.voices.player import NoteReport, Playing
 
 SOURCES = ("model", "truth")
+DROPPED = "A note was dropped because of an internal error. All others play on; please report the details."
+DROPPED_S = 0.03  # of its fade
 AS_THEY_ARE: Mapping[str, float] = dict.fromkeys(SOURCES, 1.0)
 
 
@@ -152,3 +157,12 @@ class KeyNote:
     def end(self) -> None:
         """Mark the note as cut, where no device plays its voices any more."""
         self.cut = True
+
+
+def drop(note: PluckVoices | KeyNote | None, error: Exception, report: Callable[[str, str], None]) -> None:
+    """End a note whose handling failed, as far as it was made. Its report is always the same, to be shown once."""
+    report(DROPPED, log_fault(error, "while a note was played"))
+    if note is not None:
+        note.cut = True
+        with contextlib.suppress(Exception):  # what has failed may be this
+            note.release(DROPPED_S)

@@ -15,16 +15,14 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
-from app.playing.dropping import drop
 from app.playing.due import Due
-from app.playing.key_note import SOURCES, KeyNote
+from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
 from app.playing.levels import Levels
@@ -102,7 +100,7 @@ class Notes:
         self._levels = Levels(sources, self.in_background)
         self._closed = False
         self._wished_plucks: object = None
-        self.keys = Keys(sources, self._path_of, lambda: sound.mixer, self.in_background, report, set_effects)
+        self.keys = Keys(sources, find, lambda: sound.mixer, self.in_background, report, set_effects)
         self._set_gains_of_keys()
         sound.watch(self._bound_load)
 
@@ -396,10 +394,6 @@ class Notes:
                 if request is None or chosen_request is None or note is not self.latest or self._reach is not None:
                     continue
                 self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
-
-    def _path_of(self, preset: str) -> Path | None:
-        entry = self._find(preset)
-        return None if entry is None else entry.path
 
     def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
         """The sources that get a voice: what the monitor holds, without presets that are not here."""

@@ -234,7 +234,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
 
 def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
     try:
-        key_sound = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
+        key_sound = keys.of_key(key)
     except ValueError:
         return False
     return key_sound is not None

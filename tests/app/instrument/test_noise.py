@@ -191,7 +191,7 @@ def test_a_solo_of_one_partial_is_without_noise(patch: Patch, preset: Preset) ->
     sounds = []
     for each in (changed(patch, noise=Noise(onset_db=6.0)), patch):
         stage = Stage(each, preset)
-        stage.player.take(stage.player.tabled(stage.player.keys_of(each, Ear((0.2,), solo=2))))
+        stage.player.take(stage.player.keys_of(each, Ear((0.2,), solo=2)))
         stage.player.handle(NoteOn(KEY, 100))
         sounds.append(stage.left(4_800))
     np.testing.assert_array_equal(*sounds)

@@ -69,7 +69,7 @@ def test_more_notes_than_there_are_places_all_begin(preset: Preset) -> None:
     begun = [each.id for each in stage.begun]
     assert begun == given[-len(begun) :] and len(begun) > 200
     assert np.isfinite(sound).all()
-    assert len(stage.player.ringing()) <= 40
+    assert len(stage.player.compiled.ringing()) <= 40
 
 
 def test_more_events_than_the_ring_holds_are_played_later(koto: Stage) -> None:
@@ -119,12 +119,12 @@ def test_a_single_note_can_be_released_and_its_events_cancelled(harp: Stage) -> 
     harp.player.release(one, 0.01)
     harp.player.release(other, 0.01, frame=5_000)
     harp.run((), 20 * QUANTUM)
-    assert [each.key for each in harp.player.ringing()] == [57]
+    assert [each.key for each in harp.player.compiled.ringing()] == [57]
     harp.player.cancel(other)
     later = harp.player.handle(NoteOn(60, 90), 6_000)
     harp.player.cancel(one)
     harp.run((), 120 * QUANTUM)
-    assert {each.key for each in harp.player.ringing()} == {57, 60}
+    assert {each.key for each in harp.player.compiled.ringing()} == {57, 60}
     assert later in [each.id for each in harp.begun]
 
 
@@ -215,7 +215,7 @@ def test_reports_say_what_was_plucked(preset: Preset) -> None:
     for report in stage.begun:
         event = struck[report.frame]
         assert (report.key, report.channel, report.velocity) == (event.key, event.channel, event.velocity)
-        found = stage.player.keys.string_of(event.key, report.string if report.string >= 0 else None)
+        found = stage.player.keys.of_key(event.key, report.string if report.string >= 0 else None)
         assert found is not None and report.parameters == found.parameters and report.gain > 0
         assert report.modes == found.modes + (min(of.MOST_PAIRS, found.modes) if patch.polarisations else 0)
         pluck = on_string(found, patch.pluck.pluck(event.velocity))
@@ -259,7 +259,7 @@ def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
     patch = shipped(name, pluck={"variation": 0.0})
     one, other = Stage(patch, preset), Stage(patch, preset)
     assert isinstance(one.player.keys, StringKeys)
-    found = one.player.keys.string_of(key)
+    found = one.player.keys.of_key(key)
     assert found is not None
     by_hand = NoteOn(key, 1, pluck=on_string(found, patch.pluck.pluck(90)))
     sound, alike = one.run([(0, NoteOn(key, 90))], 6_400), other.run([(0, by_hand)], 6_400)

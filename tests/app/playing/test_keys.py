@@ -228,7 +228,7 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
     fresh = InstrumentPlayer(exact.patch, exact.preset, 48_000, {"model": 1.0}, exact.ear)
     fresh.handle(NoteOn(45, 60))
     fresh.compiled.catch_up(Mixer(48_000).address)
-    assert played.strike(NoteOn(45, 60)).gain == fresh.reports()[0].gain
+    assert played.strike(NoteOn(45, 60)).gain == fresh.compiled.reports()[0].gain
     last = [event for event in played.recorded() if isinstance(event, PatchTurned)][-1].patch
     assert (last.knobs.stiffness, last.pickup.points, last.pickup.kind) == (3.0, (0.1, 0.2), "velocity")
 

@@ -133,7 +133,7 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
 ) -> None:
     times_s = recorded(tmp_path, end)
     if end != signal.SIGKILL:
-        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["instrument"]["level_db"] == -7.5
+        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["patch"]["level_db"] == -7.5
     (journal,) = left_journals(tmp_path / "left")
     played = journal.read()
     journal.close()
