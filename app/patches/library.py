@@ -5,7 +5,6 @@ A patch is known by its file's name without `.json`. That name is made from the 
 
 from __future__ import annotations
 
-import contextlib
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -89,10 +88,13 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     Args:
         folders: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
     """
-    from engine.presets import unreadable  # which takes longer to load than a patch
-
-    folders = folders or (SHIPPED, own_patches())
-    files = [path for folder in folders for path in _files_in(folder)]
+    files: list[Path] = []
+    unreadable = []
+    for folder in folders or (SHIPPED, own_patches()):
+        try:
+            files += sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
+        except OSError as error:
+            unreadable.append(one_line(f"{folder}: cannot be read ({error.strerror}); check its permissions"))
     patches, problems = read_all(files, lambda path: (path, read_patch(path)), PatchError, "an instrument")
     names: set[str] = set()
     entries = []
@@ -101,13 +103,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
         names.add(name.casefold())
         entries.append(PatchEntry(path, patch.model_copy(update={"name": name})))
     entries.sort(key=lambda entry: (CATEGORIES.index(entry.patch.category), entry.patch.name.casefold()))
-    return entries, [*filter(None, map(unreadable, folders)), *problems]
-
-
-def _files_in(folder: Path) -> list[Path]:
-    with contextlib.suppress(OSError):
-        return sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
-    return []
+    return entries, unreadable + problems
 
 
 def _free_name(taken: set[str], name: str) -> str:
