@@ -19,7 +19,7 @@ import soundfile
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from app.audio.note_file import NoteFileError, read_note
+from app.audio.note_file import read_note
 from app.instrument.bodies import own_bodies
 from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import Name
@@ -229,15 +229,3 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
         )
     except ValueError as error:
         raise PatchError(f"{name}: {explained(error)}") from error
-
-
-__all__ = [
-    "Kept",
-    "NoteFileError",
-    "RecordingError",
-    "both_sounds",
-    "check_name",
-    "keep",
-    "learn_files",
-    "reasons_against",
-]

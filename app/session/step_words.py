@@ -50,7 +50,10 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         return _patch_words(None, after["patch"]) if after["single"] is None else f"preset {after['single']}"
     if "patch" in changed:
         old, new = before["patch"], after["patch"]
-        return _pickup_words(changed, old, new) or _patch_words(old, new)
+        heard = [CHOICES[name] for name in changed if name in Listener.model_fields]
+        if heard and old is not None and new is not None and set(_changed(old, new)) <= PICKUP:
+            return _join_words(heard)
+        return _patch_words(old, new)
     return _join_words([words for name, words in CHOICES.items() if name in changed])
 
 
@@ -61,13 +64,6 @@ def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mappin
     if "patch" in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
         changed_names |= {f"patch.{path}" for path in _changed(old, new)}
     return frozenset(changed_names)
-
-
-def _pickup_words(changed: list[str], before: Patch | None, after: Patch | None) -> str:
-    """The change of where and how the patch is heard, if nothing else of it has changed; else ""."""
-    if before is None or after is None or not set(_changed(before, after)) <= PICKUP:
-        return ""
-    return _join_words([CHOICES[name] for name in changed if name in Listener.model_fields])
 
 
 def _patch_words(before: Patch | None, after: Patch | None) -> str:

@@ -174,7 +174,7 @@ def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(preset: Preset, na
             stage.handle(NoteOn(sum(patch.range) // 2, 100), 0)
         if adds:
             stage.mixer.add(Voice.of_samples(plain_program(RATE_HZ), strangers))
-        return stage.render(RATE_HZ // 2).astype(np.float64)
+        return stage.mixer.render(RATE_HZ // 2).astype(np.float64)
 
     both, own, alone = mixed(True, True), mixed(True, False), mixed(False, True)
     np.testing.assert_allclose(both, own + alone, atol=1e-6)

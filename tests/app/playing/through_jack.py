@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn
-from app.instrument.midi_file import messages_of
+from app.instrument.midi_file import message_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 
@@ -49,8 +49,7 @@ def measured(backend: RtMidi) -> dict[str, Any]:
 
     def send(*events: Event) -> None:
         for event in events:
-            for message in messages_of(event):
-                output.send_message(message.bytes())
+            output.send_message(message_of(event))
 
     def stream() -> None:
         while not ended.is_set():
