@@ -24,7 +24,7 @@ from app.instrument.events import (
     bend_range,
     parameter_set,
 )
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch

@@ -1,4 +1,4 @@
-"""The string of each key, by the laws of `engine.kernels.strings`, as the player has it.
+"""The string of each key before anybody plays it, by the laws of `engine.kernels.strings`, as the player has it.
 
 Pitch is that of the first partial of a quiet pluck. A key changes the length alone, a slackened string the tension
 alone. Both are solved for the pitch in closed form and are exact.
@@ -6,17 +6,22 @@ alone. Both are solved for the pitch in closed form and are exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from app.instrument.effects import body_curves
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch
 from app.patches.tuning import Tuning
+from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import strings as law
 from engine.kernels.constants import HIGHEST_HZ, LENGTH, MOST_MODES
+from engine.pluck import Pluck
+from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.losses import loss_rates
 from engine.resonators.string import decay_rates as law_rates
+from engine.values.ear import Ear
 from engine.values.string import StringParameters
 
 KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
@@ -115,3 +120,43 @@ def decay_rates(patch: Patch, string: StringParameters, modes: int) -> Array:
     if patch.losses is not None:
         rates = rates + loss_rates(patch.losses, string, modes, knobs.decay, knobs.brightness_decay)
     return rates
+
+
+class StringKeys:
+    """The keys of a patch, heard at `ear`, played by a preset, and their common values. The player computes gains.
+
+    Args:
+        near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
+    """
+
+    def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: StringKeys | None = None) -> None:
+        """Raise ValueError: the tuning is impossible, or the patch has drums."""
+        if isinstance(patch.strings, Drums):
+            raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
+        self.patch, self.ear = patch, ear
+        self.strings = Strings(patch)
+        self.recorded = preset.recorded
+        self.polarisations = patch.polarisations if preset.recorded is None else None  # else as the recording says
+        self.body: Array | None = body_curves(patch) if near is None else near.body
+
+    def of_key(self, key: int, string: int | None = None) -> KeyString | None:
+        """The string of a key; None for a silent key.
+
+        `string`: on which of a set it is played, as in `Strings.of_key`.
+
+        Raises:
+            ValueError: the key has no possible string.
+        """
+        key_string = self.strings.of_key(key, string)
+        if key_string is None:
+            return None
+        if self.recorded is not None and self.ear.pickup == "bridge":
+            raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
+        if law.overdamped(key_string.parameters.row, key_string.modes):
+            raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
+        return key_string
+
+
+def on_string(string: KeyString, pluck: Pluck) -> Pluck:
+    """A pluck of the whole string, on the string that a key leaves of it."""
+    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES

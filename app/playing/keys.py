@@ -30,8 +30,8 @@ from app.instrument.events import (
 )
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from app.playing.due import Due
 from app.playing.key_note import AS_THEY_ARE, KeyNote, drop
+from app.playing.playback import Due
 from app.playing.recorder import EventRecorder
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry

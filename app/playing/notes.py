@@ -21,12 +21,12 @@ from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
-from app.playing.due import Due
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
 from app.playing.levels import Levels
 from app.playing.note import PluckVoices
+from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest

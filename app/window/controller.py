@@ -23,14 +23,13 @@ from app.analysis.abx.record import material_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
+from app.playing.playback import Due
 from app.presets.library import Library, PresetEntry
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
-from app.session.slots import missing_presets
-from app.session.through import through_words
+from app.session.slots import missing_presets, through_words
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.views.controls.app_menu import ENTRIES

@@ -14,15 +14,14 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
-from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings
+from app.instrument.strings import Strings, on_string
 from app.patches.drums import Drums
 from app.patches.patch import Patch, StringSet
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.playing.note import PluckVoices
+from app.playing.playback import Due
 from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import string_of

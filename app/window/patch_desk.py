@@ -9,7 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QInputDialog
 
-from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
 from app.instrument.events import (
@@ -25,7 +24,15 @@ from app.instrument.events import (
     NoteOn,
     TimedEvent,
 )
-from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figures_of, knob_for
+from app.instrument.facts import (
+    by_two_numbers,
+    facts_of,
+    facts_of_drum,
+    figures_of,
+    knob_for,
+    outside_of_key,
+    outside_of_string,
+)
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums

@@ -17,7 +17,7 @@ from app.export.plugin.identity import identifier
 from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.instrument.table import WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch

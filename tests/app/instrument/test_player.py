@@ -23,7 +23,7 @@ from app.instrument.offline import (
     render_events,
     render_note,
 )
-from app.instrument.string_keys import StringKeys, on_string
+from app.instrument.strings import StringKeys, on_string
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import ASSIGNABLE, WHEEL, BodyChoice, Fretted, Knobs, Noise, Patch

@@ -36,9 +36,9 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import BodyChoice, Patch
 from app.playing import recorder
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
+from app.playing.playback import Due
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import constants as of
@@ -197,7 +197,7 @@ def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch
         held.wait(30)
         return body_curves(*args)
 
-    monkeypatch.setattr("app.instrument.string_keys.body_curves", slow)
+    monkeypatch.setattr("app.instrument.strings.body_curves", slow)
     knob = Thread(target=played.notes.set_instrument, args=(PATCH.with_value("knobs.stiffness", 3.0), EAR))
     key = Thread(target=lambda: struck.append(played.handle(NoteOn(52, 60))))
     knob.start()

@@ -14,8 +14,7 @@ from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
 
 from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
-from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings
+from app.instrument.strings import Strings, on_string
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, MacroTarget, Patch, Pickup
