@@ -29,6 +29,7 @@ from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import constants as of
+from engine.kernels import midi
 from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
 from engine.presets import Preset
 from engine.values.ear import Ear
@@ -135,23 +136,23 @@ class InstrumentPlayer:
             if channel.bend:
                 state_events.append(Bend(channel.bend, number))
             for controller, value, at_rest in (
-                (events.VOLUME, channel.volume, of.USUAL_VOLUME),
-                (events.EXPRESSION, channel.expression, 127),
-                (events.SUSTAIN, 127 * channel.pedal, 0),
-                (events.SOFT, channel.mute, 0),
-                (events.LEGATO, 127 * channel.legato, 0),
-                (events.PORTAMENTO, 127 * channel.slides, 0),
-                (events.SLIDE_TIME, channel.slide_time, 0),
-                (events.HARMONICS, 127 * channel.harmonics, 0),
-                (events.TREMOLO, 127 * channel.tremolo, 0),
-                (events.STRUM, 127 * channel.strums, 0),
-                (events.SLIDE, channel.slide, None),
+                (midi.VOLUME, channel.volume, of.USUAL_VOLUME),
+                (midi.EXPRESSION, channel.expression, 127),
+                (midi.SUSTAIN, 127 * channel.pedal, 0),
+                (midi.SOFT, channel.mute, 0),
+                (midi.LEGATO, 127 * channel.legato, 0),
+                (midi.PORTAMENTO, 127 * channel.slides, 0),
+                (midi.SLIDE_TIME, channel.slide_time, 0),
+                (midi.HARMONICS, 127 * channel.harmonics, 0),
+                (midi.TREMOLO, 127 * channel.tremolo, 0),
+                (midi.STRUM, 127 * channel.strums, 0),
+                (midi.SLIDE, channel.slide, None),
             ):
                 if value is not None and value != at_rest:
                     state_events.append(ControlChange(controller, value, number))
         wheel, moved_by = self._wheel
         if wheel:
-            state_events.append(ControlChange(events.MOD_WHEEL, wheel, moved_by))
+            state_events.append(ControlChange(midi.MOD_WHEEL, wheel, moved_by))
         return state_events
 
     def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
@@ -270,9 +271,9 @@ class InstrumentPlayer:
 
     def _follow_wheel(self, event: ControlChange) -> None:
         moved_by = self._wheel[1]
-        if event.number == events.MOD_WHEEL:
+        if event.number == midi.MOD_WHEEL:
             self._wheel = event.value, event.channel
-        elif event.number == events.RESET:
+        elif event.number == midi.RESET:
             master = self.patch.mode == "mpe" and event.channel == of.FIRST and moved_by != events.KEYS
             if event.channel == moved_by or master:
                 self._wheel = 0, moved_by

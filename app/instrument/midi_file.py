@@ -12,9 +12,7 @@ from app.instrument.compiled import is_another
 from app.instrument.events import (
     AT_REST,
     KEYS,
-    RESET,
     SETS_PARAMETER,
-    VOLUME,
     Bend,
     ControlChange,
     Event,
@@ -33,6 +31,7 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
+from engine.kernels.midi import RESET, VOLUME
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 

@@ -11,19 +11,11 @@ from numpy.typing import NDArray
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.effects import channels_of, effects_of
-from app.instrument.events import (
-    MOD_WHEEL,
-    ControlChange,
-    Event,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-    TimedEvent,
-    moves_effects,
-)
+from app.instrument.events import ControlChange, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, moves_effects
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.midi import MOD_WHEEL
 from engine.presets import Preset
 from engine.voices import Mixer
 

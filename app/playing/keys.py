@@ -15,19 +15,7 @@ from pathlib import Path
 from app.instrument.compiled import InstrumentPlayer, is_another
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import (
-    NOTES_OFF,
-    RESET,
-    SOUND_OFF,
-    SUSTAIN,
-    SWITCHES,
-    ControlChange,
-    Event,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-    moves_effects,
-)
+from app.instrument.events import SWITCHES, ControlChange, Event, NoteOff, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.playing.key_note import AS_THEY_ARE, KeyNote, drop
@@ -37,6 +25,7 @@ from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from engine.effects import Effects
 from engine.kernels.constants import BEGAN
+from engine.kernels.midi import NOTES_OFF, RESET, SOUND_OFF, SUSTAIN
 from engine.presets import PresetError
 from engine.values.ear import Ear
 from engine.voices import Mixer

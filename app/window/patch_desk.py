@@ -11,19 +11,7 @@ from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
-from app.instrument.events import (
-    HARMONICS,
-    KEYS,
-    LEGATO,
-    PORTAMENTO,
-    SLIDE_TIME,
-    STRUM,
-    TREMOLO,
-    ControlChange,
-    NoteOff,
-    NoteOn,
-    TimedEvent,
-)
+from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.facts import (
     by_two_numbers,
     facts_of,
@@ -66,6 +54,7 @@ from app.window.instruments import Instruments
 from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import SongPlayer
+from engine.kernels.midi import HARMONICS, LEGATO, PORTAMENTO, SLIDE_TIME, STRUM, TREMOLO
 from engine.plain_text import one_line
 from engine.result_file import WriteError
 from engine.schema import explained

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.instrument.events import KEYS, LEGATO, SOUND_OFF, SUSTAIN, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import Fretted, Noise, Patch
 from engine.contact import CONTACTS
 from engine.kernels import constants as of
 from engine.kernels.constants import PART_S, WANTED_DB
+from engine.kernels.midi import LEGATO, SOUND_OFF, SUSTAIN
 from engine.presets import Preset
 from engine.values.ear import Ear
 from tests.app.instrument.conftest import STEEL

@@ -31,6 +31,7 @@ from app.patches.tuning import TuningChoice
 from app.shared.parameters import OF_PATCHES
 from engine import bounds
 from engine.kernels import constants as of
+from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset, load_preset
@@ -243,8 +244,8 @@ def test_a_harmonic_is_plucked_short_of_its_first_node(patch: Patch, preset: Pre
 
 def test_slide_moves_the_pluck_until_all_is_released(patch: Patch, preset: Preset) -> None:
     stage, on = Stage(changed(patch, mode="mpe"), preset), NoteOn(57, 60, 1)
-    stage.play(ControlChange(events.SLIDE, 127, 1), on)
-    stage.play(ControlChange(events.RESET, 0, 1), on)  # RP-015: it is a sound controller
+    stage.play(ControlChange(midi.SLIDE, 127, 1), on)
+    stage.play(ControlChange(midi.RESET, 0, 1), on)  # RP-015: it is a sound controller
     stage.play(*release_all([1]), on)
     assert [each.position for each in stage.begun] == [pytest.approx(0.5)] * 2 + [patch.pluck.position]
 
@@ -282,7 +283,7 @@ def test_a_pluck_by_hand_is_exactly_itself(preset: Preset, shape: Shape) -> None
 
 
 @pytest.mark.parametrize(
-    ("switch", "moves_to"), [(ControlChange(events.TREMOLO, 127), 52), (ControlChange(events.LEGATO, 127), 53)]
+    ("switch", "moves_to"), [(ControlChange(midi.TREMOLO, 127), 52), (ControlChange(midi.LEGATO, 127), 53)]
 )
 def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(
     preset: Preset, switch: ControlChange, moves_to: int
@@ -313,15 +314,13 @@ def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
     stage = Stage(patch, preset)
     assert stage.player.at_hand == [] and stage.player.heard_through == patch
     stage.player.set_gains({"model": 0.25})
-    chosen = [ControlChange(events.REGISTERED, 0, 1), ControlChange(events.FINE_REGISTERED, 0, 1)]
-    switches = [
-        ControlChange(number, 127, events.KEYS) for number in (events.HARMONICS, events.TREMOLO, events.STRUM)
-    ]
-    given = [*chosen, ControlChange(events.VALUE, 5, 1), ControlChange(events.FINE_VALUE, 50, 1), Bend(0.25, 1)]
+    chosen = [ControlChange(midi.REGISTERED, 0, 1), ControlChange(midi.FINE_REGISTERED, 0, 1)]
+    switches = [ControlChange(number, 127, events.KEYS) for number in (midi.HARMONICS, midi.TREMOLO, midi.STRUM)]
+    given = [*chosen, ControlChange(midi.VALUE, 5, 1), ControlChange(midi.FINE_VALUE, 50, 1), Bend(0.25, 1)]
     given += [
-        ControlChange(events.SUSTAIN, 127),
-        ControlChange(events.SLIDE, 9, 2),
-        ControlChange(events.MOD_WHEEL, 127, 3),
+        ControlChange(midi.SUSTAIN, 127),
+        ControlChange(midi.SLIDE, 9, 2),
+        ControlChange(midi.MOD_WHEEL, 127, 3),
     ]
     stage.run([(0, event) for event in (*given, *switches)], QUANTUM)
     made, mixer = stage.player.again(44_100), Mixer(44_100)
@@ -338,7 +337,7 @@ def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
     assert made.at_hand == stage.player.at_hand and set(switches) < set(made.at_hand)
     assert (made.rate_hz, made.compiled.source_gain(0)) == (44_100, 0.25)
     assert stage.player.heard_through == made.heard_through != patch and made.compiled.wheel == (127, 3)
-    stage.player.handle(ControlChange(events.RESET, 0, 3), 0)
+    stage.player.handle(ControlChange(midi.RESET, 0, 3), 0)
     assert stage.player.heard_through == patch
 
 
@@ -349,7 +348,7 @@ def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: st
     def heard(value: int) -> object:
         wheel = changed(patch, mod_wheel=field, body=BodyChoice(name="guitar"), room=Room(mix=0.1))
         stage = Stage(wheel, preset)
-        stage.play(ControlChange(events.MOD_WHEEL, value))
+        stage.play(ControlChange(midi.MOD_WHEEL, value))
         for key, velocity in ((50, 20), (52, 110)):
             stage.play(NoteOn(key, velocity), NoteOff(key))
         plucks = [(each.position, each.amplitude_mm, each.width) for each in stage.begun]
@@ -362,11 +361,11 @@ def test_the_wheel_brings_the_room(patch: Patch, preset: Preset) -> None:
     wheel = changed(patch, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
 
     def tail(value: int) -> float:
-        played = [(0.0, ControlChange(events.MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
+        played = [(0.0, ControlChange(midi.MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
         return float(np.abs(play(wheel, preset, 1.6, *played)[round(1.2 * RATE_HZ) :]).max())
 
     assert tail(0) < 1e-5 and tail(127) > 1e-4
-    turned, still = ([TimedEvent(0.0, ControlChange(events.MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
+    turned, still = ([TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
     assert [channels_played(wheel, each) for each in (turned, still)] == [2, 1], "its echo has two sides"
 
 
@@ -449,7 +448,7 @@ def test_a_file_ends_with_its_last_note_whatever_controllers_follow(patch: Patch
     late = [TimedEvent(time_s, ControlChange(11, 90)) for time_s in (30.0, 50.0)]
     alone, followed = (sum(map(len, render_events(patch, preset, each, RATE_HZ))) for each in (timed, timed + late))
     assert followed == alone < 20 * RATE_HZ
-    pedal = [TimedEvent(0.05, ControlChange(events.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(events.SUSTAIN, 0))]
+    pedal = [TimedEvent(0.05, ControlChange(midi.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(midi.SUSTAIN, 0))]
     sound = np.concatenate(list(render_events(patch, preset, timed + pedal, RATE_HZ)))
     assert RATE_HZ < len(sound) < 2 * RATE_HZ  # the pedal after it is followed
     assert level_db(sound[:, 0], 0.8, 0.95) > -60

@@ -14,24 +14,7 @@ import pytest
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_curves
-from app.instrument.events import (
-    KEYS,
-    LEGATO,
-    MOD_WHEEL,
-    NOTES_OFF,
-    PORTAMENTO,
-    RESET,
-    SLIDE_TIME,
-    SOUND_OFF,
-    STRUM,
-    SUSTAIN,
-    TREMOLO,
-    Bend,
-    ControlChange,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-)
+from app.instrument.events import KEYS, Bend, ControlChange, NoteOff, NoteOn, PatchTurned
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import BodyChoice, Patch
@@ -42,6 +25,18 @@ from app.playing.playback import Due
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import constants as of
+from engine.kernels.midi import (
+    LEGATO,
+    MOD_WHEEL,
+    NOTES_OFF,
+    PORTAMENTO,
+    RESET,
+    SLIDE_TIME,
+    SOUND_OFF,
+    STRUM,
+    SUSTAIN,
+    TREMOLO,
+)
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 from engine.voices import Mixer

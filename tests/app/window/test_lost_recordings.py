@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs PO
 RECORDING = """
 import json
 from PySide6.QtCore import QTimer
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import (Bend, ControlChange, NoteOff, NoteOn, PatchTurned)
 from app.window import main
 
 EVENTS = [NoteOn(60, 100), ControlChange(64, 127), Bend(0.25), NoteOff(60), NoteOn(64, 80)]
@@ -60,7 +60,7 @@ import json, sys
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
-from app.instrument.events import NoteOn
+from app.instrument.events import (NoteOn)
 from app.window import main
 
 def watch(controller):

@@ -42,7 +42,7 @@ OPENING = """
 import json, sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
-from app.instrument.events import NoteOn
+from app.instrument.events import (NoteOn)
 from app.window import main
 
 def watch(controller):
