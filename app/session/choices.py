@@ -106,10 +106,10 @@ class Choices(Monitor, Listener, ShownString):
             ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
         """
         changes = dict(changes)
-        if "preset" in changes:
-            changes["single"] = changes.pop("preset")
         if "instrument" in changes:
             changes |= {"patch": changes.pop("instrument"), "single": None}
+        if "preset" in changes:
+            changes["single"] = changes.pop("preset")
         try:  # with those of the other fields by which old choices are known
             checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:
