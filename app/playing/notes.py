@@ -429,10 +429,7 @@ class Notes:
         for note in left:
             if isinstance(note, PluckVoices) and note in plucks[-MOST_CARRIED:]:
                 note.from_s = note.seconds
-                note.begin_frame = 0
-                note.mixer = None
-                note.pending, note.handed_over = True, False
-                self.in_background(partial(self._begin, note, 0.0), note)
+                self._begin_again(note)
             else:
                 note.end()
 
@@ -443,24 +440,13 @@ class Notes:
             self._make_room(MOST_NOTES)
 
     def _begin(self, note: PluckVoices, struck_s: float) -> None:
-        """Make the voices and hand them over; again where the device changes its rate meanwhile."""
-        for _ in range(3):
-            mixer = self._sound.mixer
-            self._make_voices(note, mixer.rate_hz, struck_s)
-            note.set_begin(struck_s)
-            if note.ahead:
-                for voice in note.ahead:
-                    self._ahead.render(voice)
-                return
-            self._skip(note)
-            if self._hand_over(note, mixer):
-                return
-            note.begin_frame = 0  # another mixer counts again
-
-    def _skip(self, note: PluckVoices) -> None:
-        if note.from_s > 0:
-            for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
+        """Make the voices and hand them over, at once or when those that are rendered ahead are far enough."""
+        self._make_voices(note, self._sound.mixer.rate_hz, struck_s)
+        note.set_begin(struck_s)
+        for voice in note.ahead:
+            self._ahead.render(voice)
+        if not note.ahead:
+            self._hand_over(note, struck_s)
 
     def _make_voices(self, note: PluckVoices, rate_hz: int, struck_s: float) -> None:
         request, voices = note.request, dict[str, Voice]()
@@ -503,32 +489,37 @@ class Notes:
             if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
                 return
             note.handed_over = True  # or two that are ready at the same time would both do it
-        self._skip(note)
-        if not self._hand_over(note, self._sound.mixer):
-            note.handed_over, note.begin_frame = False, 0
-            self.in_background(partial(self._begin, note, struck_s), note)
+        self._hand_over(note, struck_s)
 
     def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
         note.cut = True
         self._report(f"This pluck cannot be rendered: {error}", "")
 
-    def _hand_over(self, note: PluckVoices, mixer: Mixer) -> bool:
-        """Hand a note over to a mixer; return False where the device has another mixer by now."""
+    def _hand_over(self, note: PluckVoices, struck_s: float) -> None:
+        """Hand a note over to the mixer; begin it again where the device has one of another rate or frame by now."""
+        if note.from_s > 0:
+            for voice in note.voices.values():
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
         with self._lock:
+            mixer = self._sound.mixer
             if note.over:
-                return True
-            if mixer is not self._sound.mixer:
-                return False
+                return
             note.match = self._levels.of(note)
             self._apply_monitor(note, at_once=note.from_s == 0)
-            try:
-                mixer.add(*note.voices.values())
-            except ValueError:
-                return False
+            rates_hz = {voice.program.rate_hz for voice in note.voices.values()}
+            if rates_hz - {mixer.rate_hz} or note.mixer not in (None, mixer):
+                self._begin_again(note, struck_s)
+                return
+            mixer.add(*note.voices.values())
             note.mixer, note.pending = mixer, False
             self._make_room(MOST_NOTES)
         self._ask_match(note)
-        return True
+
+    def _begin_again(self, note: PluckVoices, struck_s: float = 0.0) -> None:
+        """Begin a note in another mixer, which counts its frames anew."""
+        note.pending, note.handed_over = True, False
+        note.begin_frame, note.mixer = 0, None
+        self.in_background(partial(self._begin, note, struck_s), note)
 
     def _bound_load(self, status: SoundStatus) -> None:
         """End the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
