@@ -343,7 +343,6 @@ _OF_CHOICES = (
 )
 OF_PATCHES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_PATCHES}
 OF_CHOICES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_CHOICES}
-PARAMETERS: Mapping[str, Parameter] = {**OF_PATCHES, **OF_CHOICES}
 MOST_MACROS = 8  # of a patch
 MACROS: Mapping[str, Parameter] = {
     id: Parameter(id, label, (0, 1), 0.5, PERCENT, modulation="learn")

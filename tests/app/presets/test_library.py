@@ -18,7 +18,7 @@ from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
-from app.shared.parameters import PARAMETERS
+from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
@@ -158,7 +158,7 @@ def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
     """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
     export, preset = ExportChoices(), load_preset(preset_folder / "first.safetensors")
     assert export.until_decayed
-    assert export.longest_s > PARAMETERS["seconds"].limits[1]
+    assert export.longest_s > OF_CHOICES["seconds"].limits[1]
     request = SoundRequest(preset, Pluck(0.5, 2.0), 0.3, export.longest_s, decay_db=export.decay_db)
     export_sound(request, tmp_path / "a.wav")
     dropped = receive(tmp_path / "a.wav", library)
