@@ -250,10 +250,9 @@ class Keys:
     @property
     def heard_through(self) -> Patch | None:
         """The patch whose body and room are heard, as controllers have turned them."""
-        player, wanted = self.player, self._wanted
-        if player is not None:
-            return player.heard_through
-        return None if wanted is None else wanted.patch
+        if self.player is not None:
+            return self.player.heard_through
+        return None if self._wanted is None else self._wanted.patch
 
     def begin_recording(self) -> None:
         """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""

@@ -22,6 +22,7 @@ class PluckVoices:
         sources: those that get a voice: "model", "truth", and `OTHER` + the name of another preset.
         from_s: where in its motion it begins.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
+        struck_s: the time of its gesture by the sound's clock; 0: it is none.
         voices: by source.
         ahead: those of its voices that are rendered ahead.
         match: by source, the factor that brings it to the level of the truth; None until it is known.
@@ -38,6 +39,7 @@ class PluckVoices:
     sources: tuple[str, ...]
     from_s: float = 0.0
     begin_frame: int = 0
+    struck_s: float = 0.0
     voices: dict[str, Voice] = field(default_factory=dict)
     ahead: list[AheadVoice] = field(default_factory=list)
     match: Mapping[str, float] | None = None
@@ -106,10 +108,10 @@ class PluckVoices:
         starved_s = min(voice.starved_s for voice in self.voices.values())
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
-    def set_begin(self, struck_s: float) -> None:
-        """Give its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+    def set_begin(self) -> None:
+        """Give its voices the time of their gesture, and the frame they begin at."""
         for voice in self.voices.values():
-            voice.set_struck(struck_s)
+            voice.set_struck(self.struck_s)
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:

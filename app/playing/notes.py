@@ -86,7 +86,6 @@ class Notes:
         self._lock = threading.RLock()
         self._notes: list[PluckVoices | KeyNote] = []
         self._monitor = Monitor()
-        self._compared = True
         self._ear: Ear | None = None
         self.latest: PluckVoices | KeyNote | None = None
         self._chosen: RenderRequest | None = None
@@ -147,10 +146,10 @@ class Notes:
             compared: whether keys that are struck from now on can be switched to another source while they ring.
         """
         with self._lock:
-            self._monitor, self._compared = monitor, compared
+            self._monitor = monitor
             notes = self._plucks()
             self._do_for_each(notes, self._apply_monitor)
-        self._set_gains_of_keys()
+        self._set_gains_of_keys(compared)
         for note in notes:
             if not note.pending and not note.over:
                 self._ask_match(note)
@@ -185,11 +184,12 @@ class Notes:
             self.latest = begun or self.latest
             return begun
         with self._lock:
-            if self._chosen is None:
-                return None
-            chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
-        frame = 0 if due is None else due.frame_in(self._sound.mixer)
-        self.latest = note = self._ring_pluck(chosen, 0.0, frame, struck_s, due is not None)
+            if self._chosen is not None:
+                self._chosen = replace(self._chosen, pluck=placed.pluck)
+            note = self._chosen_note(begin_frame=0 if due is None else due.frame_in(self._sound.mixer))
+        if note is not None:
+            note.struck_s, note.ahead_of_event = struck_s, due is not None
+            self.latest = self._ring(note)
         return note
 
     def _as_pluck(self, event: Event) -> Event:
@@ -211,20 +211,18 @@ class Notes:
         """
         if alone:
             self.stop(REPLACED_S)
-        return None if self._chosen is None else self._ring_pluck(self._chosen, from_s, begin_frame)
+        note = self._chosen_note(from_s, begin_frame)
+        return None if note is None else self._ring(note)
 
-    def _ring_pluck(
-        self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
-    ) -> PluckVoices:
+    def _ring(self, note: PluckVoices) -> PluckVoices:
         """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
-        note = PluckVoices(chosen, self._voices_of(chosen), from_s, begin_frame)
-        note.ahead_of_event, loaded = waits, self._is_loaded(note)
-        if begin_frame:
+        loaded = self._is_loaded(note)
+        if note.begin_frame:
             note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
             self._notes.append(note)
-        begin = partial(self._begin, note, struck_s)
-        if from_s > 0 or not loaded:
+        begin = partial(self._begin, note)
+        if note.from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
             self._wrap_errors(begin, note)()
@@ -272,9 +270,8 @@ class Notes:
     @property
     def at_hand(self) -> bool:
         """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
-        with self._lock:
-            chosen = self._chosen
-            return chosen is not None and self._is_loaded(PluckVoices(chosen, self._voices_of(chosen)))
+        note = self._chosen_note()
+        return note is not None and self._is_loaded(note)
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
@@ -315,9 +312,8 @@ class Notes:
     @property
     def match(self) -> Mapping[str, float] | None:
         """The factor by source that brings the chosen pluck to the level of the truth. None: not known yet."""
-        with self._lock:
-            chosen = self._chosen
-            return None if chosen is None else self._levels.of(PluckVoices(chosen, self._voices_of(chosen)))
+        note = self._chosen_note()
+        return None if note is None else self._levels.of(note)
 
     @property
     def ringing(self) -> int:
@@ -374,10 +370,9 @@ class Notes:
             for voice in note.voices.values():
                 voice.listen(self._ear)
 
-    def _set_gains_of_keys(self) -> None:
+    def _set_gains_of_keys(self, compared: bool = True) -> None:
         """Set which sources of keys are heard; both are of one string, whose levels match as they are."""
-        gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
-        self.keys.set_gains(gains, self._compared)
+        self.keys.set_gains({source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}, compared)
 
     def _plucks(self) -> list[PluckVoices]:
         """The notes whose voices are made here."""
@@ -395,10 +390,13 @@ class Notes:
                     continue
                 self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
 
-    def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
-        """The sources that get a voice: what the monitor holds, without presets that are not here."""
-        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
-        return tuple(source for source in self._monitor.voices if source in available) or ("model",)
+    def _chosen_note(self, from_s: float = 0.0, begin_frame: int = 0) -> PluckVoices | None:
+        """A note of the chosen pluck, with voices of what the monitor holds, without presets that are not here."""
+        if (chosen := self._chosen) is None:
+            return None
+        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in chosen.others)}
+        sources = tuple(source for source in self._monitor.voices if source in available) or ("model",)
+        return PluckVoices(chosen, sources, from_s, begin_frame)
 
     def _is_loaded(self, note: PluckVoices) -> bool:
         """Return True if nothing needs to be loaded for it."""
@@ -428,7 +426,7 @@ class Notes:
         plucks = [note for note in left if isinstance(note, PluckVoices) and note.seconds and not note.released]
         for note in left:
             if isinstance(note, PluckVoices) and note in plucks[-MOST_CARRIED:]:
-                note.from_s = note.seconds
+                note.from_s, note.struck_s = note.seconds, 0.0
                 self._begin_again(note)
             else:
                 note.end()
@@ -439,16 +437,16 @@ class Notes:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
 
-    def _begin(self, note: PluckVoices, struck_s: float) -> None:
+    def _begin(self, note: PluckVoices) -> None:
         """Make the voices and hand them over, at once or when those that are rendered ahead are far enough."""
-        self._make_voices(note, self._sound.mixer.rate_hz, struck_s)
-        note.set_begin(struck_s)
+        self._make_voices(note, self._sound.mixer.rate_hz)
+        note.set_begin()
         for voice in note.ahead:
             self._ahead.render(voice)
         if not note.ahead:
-            self._hand_over(note, struck_s)
+            self._hand_over(note)
 
-    def _make_voices(self, note: PluckVoices, rate_hz: int, struck_s: float) -> None:
+    def _make_voices(self, note: PluckVoices, rate_hz: int) -> None:
         request, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
         for source in note.sources:
@@ -475,7 +473,7 @@ class Notes:
                     initial_m,
                     program.grid_weights(request.ear),
                     (subject, request.pluck, request.ear, request.seconds),
-                    lambda: self._hand_over_rendered(note, ahead, struck_s),
+                    lambda: self._hand_over_rendered(note, ahead),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
                     note.from_s,
@@ -483,19 +481,19 @@ class Notes:
             )
         note.ahead, note.voices = ahead, voices
 
-    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice], struck_s: float) -> None:
+    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice]) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
                 return
             note.handed_over = True  # or two that are ready at the same time would both do it
-        self._hand_over(note, struck_s)
+        self._hand_over(note)
 
     def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
         note.cut = True
         self._report(f"This pluck cannot be rendered: {error}", "")
 
-    def _hand_over(self, note: PluckVoices, struck_s: float) -> None:
+    def _hand_over(self, note: PluckVoices) -> None:
         """Hand a note over to the mixer; begin it again where the device has one of another rate or frame by now."""
         if note.from_s > 0:
             for voice in note.voices.values():
@@ -508,18 +506,18 @@ class Notes:
             self._apply_monitor(note, at_once=note.from_s == 0)
             rates_hz = {voice.program.rate_hz for voice in note.voices.values()}
             if rates_hz - {mixer.rate_hz} or note.mixer not in (None, mixer):
-                self._begin_again(note, struck_s)
+                self._begin_again(note)
                 return
             mixer.add(*note.voices.values())
             note.mixer, note.pending = mixer, False
             self._make_room(MOST_NOTES)
         self._ask_match(note)
 
-    def _begin_again(self, note: PluckVoices, struck_s: float = 0.0) -> None:
+    def _begin_again(self, note: PluckVoices) -> None:
         """Begin a note in another mixer, which counts its frames anew."""
         note.pending, note.handed_over = True, False
         note.begin_frame, note.mixer = 0, None
-        self.in_background(partial(self._begin, note, struck_s), note)
+        self.in_background(partial(self._begin, note), note)
 
     def _bound_load(self, status: SoundStatus) -> None:
         """End the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
