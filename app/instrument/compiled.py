@@ -213,7 +213,7 @@ class InstrumentPlayer:
     def silent(self, key: int) -> bool:
         """Return True if a key has nothing that sounds. Raises ValueError: it has an impossible string."""
         keys = self.keys
-        return (keys.of_key(key) if isinstance(keys, DrumKeys) else keys.strings.pitch_hz(key)) is None
+        return (keys.of_key(key) if isinstance(keys, DrumKeys) else keys.pitch_hz(key)) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
         """Hand an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
@@ -296,7 +296,7 @@ class InstrumentPlayer:
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
         with contextlib.suppress(ValueError):  # reported when it is struck
-            key_string = keys.strings.of_key(note.key, note.string if note.string >= 0 else None)
+            key_string = keys.of_key(note.key, note.string if note.string >= 0 else None)
             return 0.0 if key_string is None else 12 * math.log2(key_string.parameters.length_m / note.length_m)
         return 0.0
 

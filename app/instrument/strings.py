@@ -50,7 +50,7 @@ class Strings:
 
     def __init__(self, patch: Patch) -> None:
         """Raise ValueError: the tuning is impossible."""
-        self._patch = patch
+        self.patch = patch
         self._tuning = Tuning(patch.tuning)
 
     def of_key(self, key: int, string: int | None = None) -> KeyString | None:
@@ -66,9 +66,9 @@ class Strings:
         pitch_hz = self.pitch_hz(key)
         if pitch_hz is None:
             return None
-        if isinstance(self._patch.strings, Drums):
+        if isinstance(self.patch.strings, Drums):
             raise ValueError(
-                f"key {key} of {self._patch.name} is a drum, and no string; choose an instrument of strings"
+                f"key {key} of {self.patch.name} is a drum, and no string; choose an instrument of strings"
             )
         try:
             parameters, shortened = self._stopped(key, string, pitch_hz)
@@ -76,13 +76,13 @@ class Strings:
             if modes < 1:
                 raise ValueError(f"it would have no partial below {HIGHEST_HZ:g} Hz; choose a lower key")
         except ValueError as error:
-            raise ValueError(f"key {key} of {self._patch.name}, {pitch_hz:.4g} Hz: {error}") from error
+            raise ValueError(f"key {key} of {self.patch.name}, {pitch_hz:.4g} Hz: {error}") from error
         return KeyString(key, parameters, pitch_hz, modes, shortened)
 
     def pitch_hz(self, key: int) -> float | None:
         """The pitch of a key; None as in `of_key`."""
-        low, high = self._patch.range
-        if isinstance(self._patch.strings, Drums) and self._patch.strings.of_key(key) is None:
+        low, high = self.patch.range
+        if isinstance(self.patch.strings, Drums) and self.patch.strings.of_key(key) is None:
             return None
         return self._tuning.hz(key) if low <= key <= high and self._tuning.mapped(key) else None
 
@@ -92,7 +92,7 @@ class Strings:
 
     def _stopped(self, key: int, number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
         """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
-        strings, slackened = self._patch.strings, 1.0
+        strings, slackened = self.patch.strings, 1.0
         assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
             string = strings.string
@@ -102,7 +102,7 @@ class Strings:
             string = open_string.string
             if key < open_string.note:
                 slackened = pitch_hz / self._tuning.hz(open_string.note)
-        knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
+        knobs = [getattr(self.patch.knobs, name) for name in KNOBS]
         whole, stopped_row = [0.0] * of.STRING, [0.0] * of.STRING
         law.stop(string.row, knobs, slackened, pitch_hz, whole, stopped_row)
         if not whole[of.TENSION] > 0:
@@ -122,8 +122,8 @@ def decay_rates(patch: Patch, string: StringParameters, modes: int) -> Array:
     return rates
 
 
-class StringKeys:
-    """The keys of a patch, heard at `ear`, played by a preset, and their common values. The player computes gains.
+class StringKeys(Strings):
+    """The strings as played by a preset and heard at `ear`, with their common values. The player computes gains.
 
     Args:
         near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
@@ -133,21 +133,15 @@ class StringKeys:
         """Raise ValueError: the tuning is impossible, or the patch has drums."""
         if isinstance(patch.strings, Drums):
             raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
-        self.patch, self.ear = patch, ear
-        self.strings = Strings(patch)
+        super().__init__(patch)
+        self.ear = ear
         self.recorded = preset.recorded
         self.polarisations = patch.polarisations if preset.recorded is None else None  # else as the recording says
         self.body: Array | None = body_curves(patch) if near is None else near.body
 
     def of_key(self, key: int, string: int | None = None) -> KeyString | None:
-        """The string of a key; None for a silent key.
-
-        `string`: on which of a set it is played, as in `Strings.of_key`.
-
-        Raises:
-            ValueError: the key has no possible string.
-        """
-        key_string = self.strings.of_key(key, string)
+        """The string of a key as of `Strings`. Raises ValueError: it cannot be heard or played so, too."""
+        key_string = super().of_key(key, string)
         if key_string is None:
             return None
         if self.recorded is not None and self.ear.pickup == "bridge":

@@ -26,7 +26,6 @@ from app.presets.library import PresetEntry
 from engine.effects import Effects
 from engine.kernels.constants import BEGAN
 from engine.kernels.midi import NOTES_OFF, RESET, SOUND_OFF, SUSTAIN
-from engine.presets import PresetError
 from engine.values.ear import Ear
 from engine.voices import Mixer
 
@@ -154,16 +153,16 @@ class Keys:
             if isinstance(event, ControlChange):
                 self._note_switch(event)
             player, mixer = self._present(), self._mixer()
-            self._release_before(event, 0 if due is None else due.frame_in(mixer))
+            frame = 0 if due is None else due.frame_in(mixer)
+            self._release_before(event, frame)
             if player is None:
                 return None
             self.recorder.take(event, None if due is None else due.time_s)
-            frame, id = 0 if due is None else due.frame_in(mixer), 0
-            note_on = event if isinstance(event, NoteOn) and event.velocity > 0 else None
+            note_on, id = event if isinstance(event, NoteOn) and event.velocity > 0 else None, 0
             try:
                 if note_on is None or not player.silent(note_on.key):
                     id = player.handle(event, frame, struck_s)
-            except (ValueError, PresetError) as error:
+            except ValueError as error:
                 self._report(str(error), "")
             if isinstance(event, ControlChange) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
@@ -354,7 +353,7 @@ class Keys:
             if drums is not None and not self._compute_drums(drums):
                 return
             player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
-        except (ValueError, PresetError) as error:
+        except ValueError as error:
             self._report(str(error), "")
             return
         with self._lock:

@@ -37,7 +37,6 @@ from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
 from engine.pluck import Pluck
-from engine.presets import PresetError
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 
@@ -410,7 +409,7 @@ class Notes:
             try:
                 work()
                 return
-            except (PresetError, ValueError) as error:
+            except ValueError as error:
                 self._report(str(error), "")
             except Exception as error:
                 self._report(f"This pluck cannot be played: {error}", traceback.format_exc())
@@ -455,7 +454,7 @@ class Notes:
                 program = self._sources.program(subject, source, rate_hz)
                 initial_m, begin = self._sources.begin(subject, source, rate_hz, request.pluck)
                 model = self._sources.load(subject).model if program.rendered else None
-            except (PresetError, ValueError):
+            except ValueError:
                 if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why

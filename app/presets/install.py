@@ -31,8 +31,6 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> tuple[P
     try:
         ModelSource(load_preset(file))  # all checks, and that a pluck can start it
         data = read_bounded(file, LARGEST_PRESET_BYTES)
-    except PresetError:
-        raise
     except OSError as error:
         raise PresetError(f"{file}: cannot be read ({error.strerror}); check the name") from error
     except ValueError as error:
