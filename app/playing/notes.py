@@ -513,7 +513,7 @@ class Notes:
         self._ask_match(note)
 
     def _begin_again(self, note: PluckVoices) -> None:
-        """Begin a note in another mixer, which counts its frames anew."""
+        """Begin a note in another mixer, which counts its own frames."""
         note.pending, note.handed_over = True, False
         note.begin_frame, note.mixer = 0, None
         self.in_background(partial(self._begin, note), note)

@@ -110,7 +110,7 @@ class Choices(Monitor, Listener, ShownString):
             changes |= {"patch": changes.pop("instrument"), "single": None}
         if "preset" in changes:
             changes["single"] = changes.pop("preset")
-        try:  # with those of the other fields by which old choices are known
+        try:  # `a`, `b` and `single` tell them from old choices
             checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
