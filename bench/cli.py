@@ -19,7 +19,6 @@ from training.cli.console import Failure, ProgressReport, progress, say
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
-    from app.patches.instrument import SingleString
     from app.patches.patch import Patch
 
 bench = typer.Typer(
@@ -262,15 +261,14 @@ def _patch(name: str) -> Patch:
         raise Failure(str(error)) from error
 
 
-def _single(name: str) -> SingleString:
-    from app.patches.instrument import SingleString
+def _single(name: str) -> str:
     from engine.folders import usable_files
     from engine.presets import find_preset
 
     files = usable_files()
     if (found := find_preset(name, files)) not in files:
         raise typer.BadParameter("the name of a preset, as `learned-strings presets` lists it", param_hint="--preset")
-    return SingleString(preset=found.stem)
+    return found.stem
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -73,10 +73,10 @@ def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> Plugin
     instance.activate(RATE_HZ)
     for key in keys:
         player.handle(NoteOn(key, VELOCITY), 0)
-    player.render(BLOCK_FRAMES)
+    player.mixer.render(BLOCK_FRAMES)
     instance.render(BLOCK_FRAMES, [note_on(0, key, VELOCITY) for key in keys])
     next_block = instance.repeated(np.zeros((2, BLOCK_FRAMES), np.float32))
-    rounds = [(_taken_s(lambda: player.render(BLOCK_FRAMES)), _taken_s(next_block)) for _ in range(ROUNDS)]
+    rounds = [(_taken_s(lambda: player.mixer.render(BLOCK_FRAMES)), _taken_s(next_block)) for _ in range(ROUNDS)]
     instance.destroy()
     app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
     string, sound_s = Strings(patch).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ

@@ -6,9 +6,7 @@ The user's lie in a folder beside the patches. A body is known by its file's nam
 from __future__ import annotations
 
 import hashlib
-from contextlib import suppress
 from functools import lru_cache
-from itertools import count
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
@@ -17,11 +15,11 @@ from app.audio.impulse_file import ImpulseError, read_impulse
 from app.patches.fields import LONGEST_NAME
 from app.patches.library import file_stem
 from app.patches.patch import Reference
+from app.shared.user_files import install
 from engine.bounds import LARGEST_IMPULSE_BYTES
 from engine.effects import BODIES, Impulse
 from engine.folders import user_folder
 from engine.read_file import read_bounded
-from engine.result_file import WriteError, explain, whole_file
 
 ENDINGS = (".wav", ".wave", ".bwf", ".flac", ".aif", ".aiff", ".aifc")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)
@@ -80,26 +78,12 @@ def install_body(file: Path) -> str:
         WriteError: the copy cannot be written; nothing is left.
     """
     read_impulse(file)
-    folder, own_files = own_bodies(), _own_files()
-    stem = file_stem(file.stem)[: LONGEST_NAME - 5]
     try:
         data = read_bounded(file, LARGEST_IMPULSE_BYTES)
     except OSError as error:
         raise ImpulseError(f"{file}: cannot be read ({error.strerror}); check the name") from error
-    for name, path in own_files.items():
-        with suppress(OSError):  # one that cannot be read counts as another
-            if path.stat().st_size == len(data) and read_bounded(path, LARGEST_IMPULSE_BYTES) == data:
-                return name
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        used_names = {path.stem.casefold() for path in folder.iterdir()} | set(BODIES)  # some disks ignore case
-    except OSError as error:
-        raise WriteError(explain(folder, error)) from error
-    names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
-    name = next(name for name in names if name.casefold() not in used_names)
-    with whole_file(folder / f"{name}{file.suffix.lower()}") as copy:
-        copy.write(data)
-    return name
+    name = f"{file_stem(file.stem)[: LONGEST_NAME - 5]}{file.suffix.lower()}"
+    return install(data, name, own_bodies(), _own_files().values(), BODIES).stem
 
 
 def _own_files() -> dict[str, Path]:

@@ -6,7 +6,6 @@ import contextlib
 import math
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -25,26 +24,19 @@ from app.instrument.events import (
     bend_range,
     parameter_set,
 )
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import constants as of
+from engine.kernels import midi
 from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
 from engine.presets import Preset
 from engine.values.ear import Ear
 from engine.voices import CompiledPlayer
-from engine.voices.player import NoteReport, Ringing, Table
+from engine.voices.player import Ringing, Table
 
 STOP_S = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class Tabled:
-    """Keys with the table that the kernels read of them: what `InstrumentPlayer.take` plays."""
-
-    keys: StringKeys | DrumKeys
-    table: Table
 
 
 class InstrumentPlayer:
@@ -61,6 +53,10 @@ class InstrumentPlayer:
         most_notes: that ring at once; the oldest makes room.
         varied: whether plucks vary from stroke to stroke, as the patch says; the same strokes vary alike.
         keys: of this patch and ear, where they are there already.
+
+    Attributes:
+        keys: what is played: strings or drums of a patch, and where they are heard.
+        of_drums: it can hold drums; else it holds strings.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -81,30 +77,29 @@ class InstrumentPlayer:
             raise ValueError(
                 f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
-        self._preset = preset
+        self.preset = preset
+        self.rate_hz = rate_hz
         self.grid_points = preset.info.grid_points
         self.most_notes = most_notes
         self._sources = tuple(gains)
-        self._of_drums = isinstance(patch.strings, Drums)
-        self._programs = programs_of(preset, rate_hz, self._sources, self._of_drums)
+        self.of_drums = isinstance(patch.strings, Drums)
+        self._programs = programs_of(preset, rate_hz, self._sources, self.of_drums)
         self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
         self._wheel = 0, 0  # the modulation wheel as events have left it, and the channel that moved it
         self.table: Table | None = None
-        modes = of.MOST_DRUM_MODES if self._of_drums else min(of.MOST_MODES, self.grid_points - 2)
+        modes = of.MOST_DRUM_MODES if self.of_drums else min(of.MOST_MODES, self.grid_points - 2)
         self.compiled = CompiledPlayer(rate_hz, modes, most_notes)
         self.set_gains(gains)
-        self._keys = self.keys_of(patch, ear) if keys is None else keys
-        self.take(self.tabled(self._keys))
+        self.keys = self.keys_of(patch, ear) if keys is None else keys
+        self.take(self.keys)
 
     def again(self, rate_hz: int) -> InstrumentPlayer:
         """The same for another mixer, with wheels and pedals as they stand. Its keys are taken over."""
         gains = {source: self.compiled.source_gain(place) for place, source in enumerate(self._sources)}
-        patch = self.patch
-        ear = self.ear
-        most = self.most_notes
-        keys = self._keys
-        player = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
+        player = InstrumentPlayer(
+            self.patch, self.preset, rate_hz, gains, self.ear, self.most_notes, self._varied, self.keys
+        )
         for event in self.at_hand:
             player.handle(event)
         return player
@@ -113,29 +108,12 @@ class InstrumentPlayer:
 
     @property
     def patch(self) -> Patch:
-        return self._keys.patch
-
-    @property
-    def keys(self) -> StringKeys | DrumKeys:
-        return self._keys
-
-    @property
-    def preset(self) -> Preset:
-        return self._preset
-
-    @property
-    def of_drums(self) -> bool:
-        """Return True if it can hold drums; else it holds strings."""
-        return self._of_drums
+        return self.keys.patch
 
     @property
     def ear(self) -> Ear:
         """The place where strings are heard that are struck now."""
-        return self._keys.ear
-
-    @property
-    def rate_hz(self) -> int:
-        return self.compiled.rate_hz
+        return self.keys.ear
 
     @property
     def heard_through(self) -> Patch:
@@ -155,30 +133,26 @@ class InstrumentPlayer:
                 state_events += parameter_set(FINE_TUNING, steps // 128, steps % 128, number)
             if channel.coarse_tuning:
                 state_events += parameter_set(COARSE_TUNING, channel.coarse_tuning + 64, 0, number)
-            if channel.volume != of.USUAL_VOLUME:
-                state_events.append(ControlChange(events.VOLUME, channel.volume, number))
-            if channel.expression != 127:
-                state_events.append(ControlChange(events.EXPRESSION, channel.expression, number))
             if channel.bend:
                 state_events.append(Bend(channel.bend, number))
-            if channel.pedal:
-                state_events.append(ControlChange(events.SUSTAIN, 127, number))
-            for controller, value in (
-                (events.SOFT, channel.mute),
-                (events.LEGATO, 127 * channel.legato),
-                (events.PORTAMENTO, 127 * channel.slides),
-                (events.SLIDE_TIME, channel.slide_time),
-                (events.HARMONICS, 127 * channel.harmonics),
-                (events.TREMOLO, 127 * channel.tremolo),
-                (events.STRUM, 127 * channel.strums),
+            for controller, value, at_rest in (
+                (midi.VOLUME, channel.volume, of.USUAL_VOLUME),
+                (midi.EXPRESSION, channel.expression, 127),
+                (midi.SUSTAIN, 127 * channel.pedal, 0),
+                (midi.SOFT, channel.mute, 0),
+                (midi.LEGATO, 127 * channel.legato, 0),
+                (midi.PORTAMENTO, 127 * channel.slides, 0),
+                (midi.SLIDE_TIME, channel.slide_time, 0),
+                (midi.HARMONICS, 127 * channel.harmonics, 0),
+                (midi.TREMOLO, 127 * channel.tremolo, 0),
+                (midi.STRUM, 127 * channel.strums, 0),
+                (midi.SLIDE, channel.slide, None),
             ):
-                if value:
+                if value is not None and value != at_rest:
                     state_events.append(ControlChange(controller, value, number))
-            if channel.slide is not None:
-                state_events.append(ControlChange(events.SLIDE, channel.slide, number))
         wheel, moved_by = self._wheel
         if wheel:
-            state_events.append(ControlChange(events.MOD_WHEEL, wheel, moved_by))
+            state_events.append(ControlChange(midi.MOD_WHEEL, wheel, moved_by))
         return state_events
 
     def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
@@ -191,7 +165,7 @@ class InstrumentPlayer:
         self.compiled.set_spares(not compared)
 
     def keys_of(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> StringKeys | DrumKeys:
-        """Prepare the keys of a patch, as `tabled` needs them.
+        """Prepare the keys of a patch.
 
         Another body takes milliseconds, in which keys are played.
 
@@ -202,41 +176,44 @@ class InstrumentPlayer:
             ValueError: the tuning is impossible, or the patch has drums for a player of strings, or the reverse.
         """
         ear = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        near = self._keys if nearly else None
+        near = self.keys if nearly else None
         if not isinstance(patch.strings, Drums):
-            if self._of_drums:
+            if self.of_drums:
                 raise ValueError(f"{patch.name} has strings, and this player plays drums")
-            return StringKeys(patch, ear, self._preset.info, near if isinstance(near, StringKeys) else None)
-        if not self._of_drums:
+            return StringKeys(patch, ear, self.preset.info, near if isinstance(near, StringKeys) else None)
+        if not self.of_drums:
             raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
         return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
 
-    def tabled(self, keys: StringKeys | DrumKeys) -> Tabled:
-        """The table of keys, which takes milliseconds, of drums more."""
-        return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
+    def table_of(self, keys: StringKeys | DrumKeys) -> Table:
+        """The table that the kernels read of keys, which takes milliseconds, of drums more."""
+        return table_of(keys, self.grid_points, self._sources, self._programs, self._varied)
 
-    def take(self, tabled: Tabled, frame: int = 0) -> None:
-        """Play these keys from a frame on, at once; strings that ring glide to them.
+    def take(self, keys: StringKeys | DrumKeys, table: Table | None = None, frame: int = 0) -> None:
+        """Play these keys, at once or from a frame on; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
+
+        Args:
+            table: of these keys, where it is there already.
         """
+        table = table or self.table_of(keys)
         with self._lock:
-            if self.table is None or is_another(tabled.keys.patch, self._keys.patch):
+            if self.table is None or is_another(keys.patch, self.patch):
                 self._instrument += 1
                 self._wheel = 0, 0
             self._serial += 1
-            record = tabled.table.record
+            record = table.record
             record["serial"], record["instrument"] = self._serial, self._instrument
-            self._keys, self.table = tabled.keys, tabled.table
-            self.compiled.take(self.table, frame)
+            self.keys, self.table = keys, table
+            self.compiled.take(table, frame)
 
     # Events
 
     def silent(self, key: int) -> bool:
         """Return True if a key has nothing that sounds. Raises ValueError: it has an impossible string."""
-        if isinstance(self._keys, DrumKeys):
-            return self._keys.of_key(key) is None
-        return self._keys.strings.pitch_hz(key) is None
+        keys = self.keys
+        return (keys.of_key(key) if isinstance(keys, DrumKeys) else keys.pitch_hz(key)) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
         """Hand an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
@@ -250,7 +227,7 @@ class InstrumentPlayer:
             ValueError: a key has no possible string.
         """
         if isinstance(event, PatchTurned):
-            self.take(self.tabled(self.keys_of(event.patch)), frame)
+            self.take(self.keys_of(event.patch), frame=frame)
             return 0
         if isinstance(event, PluckAt):
             return 0
@@ -264,44 +241,39 @@ class InstrumentPlayer:
                 of.NOTE_ON,
                 key=event.key,
                 value=event.velocity,
-                by_hand=None if self._of_drums else event.pluck,
+                by_hand=None if self.of_drums else event.pluck,
                 struck_s=struck_s,
                 struck=blow,
                 string=event.string,
             )
-        elif isinstance(event, NoteOff):
+        if isinstance(event, NoteOff):
             return give(of.NOTE_OFF, key=event.key, string=event.string)
-        elif isinstance(event, Bend):
+        if isinstance(event, Bend):
             return give(of.BEND, value=event.value)
-        else:
-            self._follow_wheel(event)
-            return give(of.CONTROLLER, key=event.number, value=event.value)
+        self._follow_wheel(event)
+        return give(of.CONTROLLER, key=event.number, value=event.value)
 
     def _check(self, event: NoteOn) -> None:
         """Raise ValueError: no string on which an event may play its key is possible."""
-        keys = self._keys
-        if isinstance(keys, DrumKeys):
-            keys.of_key(event.key)
-            return
         string = event.channel if event.string is None else event.string
         if event.string is not None or string < strings_of(self.patch):  # its own, or that of its channel, if any
             with contextlib.suppress(ValueError):
-                keys.string_of(event.key, string)
+                self.keys.of_key(event.key, string)
                 return
-        keys.string_of(event.key)
+        self.keys.of_key(event.key)
 
     def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
         """The effect of a blow at a place of its own on a drum's modes; None: the drum's own place."""
-        if event.place is None or not isinstance(self._keys, DrumKeys):
+        if event.place is None or not isinstance(self.keys, DrumKeys):
             return None
-        drum_key = self._keys.of_key(event.key)
+        drum_key = self.keys.of_key(event.key)
         return None if drum_key is None else drum_key.struck(event.place)
 
     def _follow_wheel(self, event: ControlChange) -> None:
         moved_by = self._wheel[1]
-        if event.number == events.MOD_WHEEL:
+        if event.number == midi.MOD_WHEEL:
             self._wheel = event.value, event.channel
-        elif event.number == events.RESET:
+        elif event.number == midi.RESET:
             master = self.patch.mode == "mpe" and event.channel == of.FIRST and moved_by != events.KEYS
             if event.channel == moved_by or master:
                 self._wheel = 0, moved_by
@@ -318,23 +290,13 @@ class InstrumentPlayer:
         """Let one note fade out, by its number, from a frame on."""
         self.compiled.give(of.CHOKE, of.ANY, of.ANY, seconds, frame, note=note)
 
-    # What became of them
-
-    def reports(self) -> list[NoteReport]:
-        """The reports of what became of notes since the last call. One thread asks."""
-        return self.compiled.reports()
-
-    def ringing(self) -> list[Ringing]:
-        """The notes that ring, one for each place."""
-        return self.compiled.ringing()
-
     def slid(self, note: Ringing) -> float:
         """The semitones above its key where a note's string is stopped now, as while it slides."""
-        keys = self._keys
+        keys = self.keys
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
         with contextlib.suppress(ValueError):  # reported when it is struck
-            key_string = keys.strings.of_key(note.key, note.string if note.string >= 0 else None)
+            key_string = keys.of_key(note.key, note.string if note.string >= 0 else None)
             return 0.0 if key_string is None else 12 * math.log2(key_string.parameters.length_m / note.length_m)
         return 0.0
 

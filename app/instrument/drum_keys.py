@@ -57,20 +57,12 @@ class DrumKey:
         speed = velocities.between(played.softest_m_s, played.hardest_m_s, velocities.share(velocity, curve))
         return Strike(played.place, speed, played.mallet)
 
-    @property
-    def pitch_hz(self) -> float:
-        """The pitch of its first mode, at rest."""
-        return float(math.sqrt(self.modes.omega[0] ** 2 - self.modes.sigma[0] ** 2) / math.tau)
-
-    def rise(self, velocity: float, curve: float = 0.0) -> float:
-        """ΔT/T₀ of a blow, averaged over the first swing: half of what all of it as displacement would give."""
-        speeds = self.strike(velocity, curve).speeds(self.modes)
-        resonator = self.modes.resonator(np.zeros((1, 2)))
-        return float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2
-
     def drop_cents(self, velocity: float, curve: float = 0.0) -> float:
         """The fall of the pitch of the first mode after a blow, in cents."""
-        return 600 * math.log2(1 + self.rise(velocity, curve))
+        speeds = self.strike(velocity, curve).speeds(self.modes)
+        resonator = self.modes.resonator(np.zeros((1, 2)))
+        rise = float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2  # ΔT/T₀ over the first swing
+        return 600 * math.log2(1 + rise)
 
 
 def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, float]:
@@ -98,7 +90,8 @@ class DrumKeys:
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
         """The drum of a key, remembered; None for a silent key. Raises ValueError: the key has no possible drum."""
         if key not in self._known:
-            self._known[key] = self._of_key(key)
+            drum_and_ratio = self.tuned_to(key)
+            self._known[key] = None if drum_and_ratio is None else self._drum_key(key, *drum_and_ratio)
         return self._known[key]
 
     def tuned_to(self, key: int) -> tuple[PlayedDrum, float] | None:
@@ -113,31 +106,16 @@ class DrumKeys:
         speeds = {name: getattr(played, name) * softer for name in ("softest_m_s", "hardest_m_s")}
         return played.model_copy(update=speeds), ratio
 
-    def _of_key(self, key: int) -> DrumKey | None:
-        drum_and_ratio = self.tuned_to(key)
-        if drum_and_ratio is None:
-            return None
-        played, ratio = drum_and_ratio
+    def _drum_key(self, key: int, played: PlayedDrum, ratio: float) -> DrumKey:
+        knobs, drum = self.patch.knobs, played.drum
+        d1, d3 = drum.damping_d1_kg_m2_s * knobs.decay, drum.damping_d3_kg_s * knobs.brightness_decay
+        modulus_pa = drum.youngs_modulus_pa * knobs.modulus
         try:
-            modes = self._modes(played, ratio)
+            undamped = replace(drum, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0, youngs_modulus_pa=modulus_pa)
+            modes = tuned(undamped, ratio, self.drums.highest_hz).damped(d1, d3)  # a knob of decay takes no time
         except ValueError as error:
             raise ValueError(f"key {key} of {self.patch.name}, {played.name}: {error}") from error
         return DrumKey(key, played, modes, self.ear.points)
-
-    def _modes(self, played: PlayedDrum, ratio: float) -> DrumModes:
-        knobs, drum = self.patch.knobs, played.drum
-        drum = replace(
-            drum,
-            damping_d1_kg_m2_s=drum.damping_d1_kg_m2_s * knobs.decay,
-            damping_d3_kg_s=drum.damping_d3_kg_s * knobs.brightness_decay,
-            youngs_modulus_pa=drum.youngs_modulus_pa * knobs.modulus,
-        )
-        undamped = replace(drum, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0)  # a knob of decay takes no time
-        return tuned(undamped, ratio, self.drums.highest_hz).damped(drum.damping_d1_kg_m2_s, drum.damping_d3_kg_s)
-
-    @property
-    def curve(self) -> float:
-        return self.patch.pluck.curve
 
 
 @lru_cache(maxsize=256)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +25,9 @@ def effects_of(patch: Patch) -> Effects | None:
 
 def effects_from(chosen: BodyChoice, room: Room, amp: Amp, level_db: float) -> Effects | None:
     """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
-    driven = amp.drive_db > 0
-    effects = Effects(
-        _body(chosen)[0], room if room.mix > 0 else None, amp if driven else None, level_db if driven else 0.0
-    )
+    effects = Effects(_body(chosen)[0], room if room.mix > 0 else None)
+    if amp.drive_db > 0:
+        return replace(effects, amp=amp, level_db=level_db)
     return None if effects == Effects() else effects
 
 
@@ -72,14 +73,11 @@ def body_curves(patch: Patch) -> NDArray[np.float64] | None:
 
 def _body(chosen: BodyChoice) -> tuple[Body | None, str]:
     """The body, and why it cannot be used."""
-    name = chosen.name
-    mix = chosen.mix
-    size = chosen.size
-    if not name or mix == 0:
+    if not chosen.name or chosen.mix == 0:
         return None, ""
-    if name in BODIES:
-        return Body(mix, size, name), ""
+    if chosen.name in BODIES:
+        return Body(chosen.mix, chosen.size, chosen.name), ""
     try:
-        return Body(mix, size, impulse=own_impulse(name)), ""
+        return Body(chosen.mix, chosen.size, impulse=own_impulse(chosen.name)), ""
     except ImpulseError as error:
         return None, str(error)

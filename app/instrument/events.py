@@ -8,52 +8,26 @@ from typing import Annotated
 
 from app.patches.fields import ranged
 from app.patches.patch import Patch
-from engine.kernels.midi import (
-    BEND_RANGE,
-    DECREMENT,
-    EXPRESSION,
-    FINE_OTHER,
-    FINE_REGISTERED,
-    FINE_VALUE,
-    HARMONICS,
-    INCREMENT,
-    LEGATO,
-    MOD_WHEEL,
-    NO_PARAMETER,
-    NOTES_OFF,
-    OTHER,
-    PEDAL_DOWN,
-    PORTAMENTO,
-    REGISTERED,
-    RESET,
-    SLIDE,
-    SLIDE_TIME,
-    SOFT,
-    SOUND_OFF,
-    STRUM,
-    SUSTAIN,
-    TREMOLO,
-    VALUE,
-    VOLUME,
-)
+from engine.kernels import midi
 from engine.pluck import Pluck
 
-SWITCHES = (LEGATO, PORTAMENTO, SLIDE_TIME, HARMONICS, TREMOLO, STRUM)  # how keys are played
-SETS_PARAMETER = (VALUE, FINE_VALUE, INCREMENT, DECREMENT)
+# how keys are played
+SWITCHES = (midi.LEGATO, midi.PORTAMENTO, midi.SLIDE_TIME, midi.HARMONICS, midi.TREMOLO, midi.STRUM)
+SETS_PARAMETER = (midi.VALUE, midi.FINE_VALUE, midi.INCREMENT, midi.DECREMENT)
 AT_REST = 127  # value of `RESET` with which nothing stays, of what MIDI's own, 0, leaves: ranges, tuning, volume
 _PARAMETER = "chooses or sets a parameter, as the bend range"
 _FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
-    SUSTAIN: "is the sustain pedal",
-    SLIDE_TIME: "is the time of slides",
-    PORTAMENTO: "lets legato slide",
-    SOFT: "is the palm mute",
-    LEGATO: "is the legato footswitch",
-    HARMONICS: "is the footswitch of harmonics",
-    TREMOLO: "is the footswitch of tremolo",
-    STRUM: "is the footswitch of strums",
+    midi.SUSTAIN: "is the sustain pedal",
+    midi.SLIDE_TIME: "is the time of slides",
+    midi.PORTAMENTO: "lets legato slide",
+    midi.SOFT: "is the palm mute",
+    midi.LEGATO: "is the legato footswitch",
+    midi.HARMONICS: "is the footswitch of harmonics",
+    midi.TREMOLO: "is the footswitch of tremolo",
+    midi.STRUM: "is the footswitch of strums",
     **dict.fromkeys(SETS_PARAMETER, _PARAMETER),
-    **dict.fromkeys((REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
-    **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
+    **dict.fromkeys((midi.REGISTERED, midi.FINE_REGISTERED, midi.OTHER, midi.FINE_OTHER), _PARAMETER),
+    **dict.fromkeys(range(midi.SOUND_OFF, 128), "stops or resets what is played"),
 }
 LONGEST_RECORDING = 100_000  # events
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
@@ -131,13 +105,13 @@ def fixed_function(number: int) -> str:
 
 def is_obeyed(number: int) -> bool:
     """Return True if a controller does anything without being assigned."""
-    return bool(fixed_function(number)) or number in (MOD_WHEEL, VOLUME, EXPRESSION, SLIDE)
+    return bool(fixed_function(number)) or number in (midi.MOD_WHEEL, midi.VOLUME, midi.EXPRESSION, midi.SLIDE)
 
 
 def moves_effects(event: object, patch: Patch) -> bool:
     """Return True if an event changes a patch's body or room."""
     if isinstance(event, ControlChange):
-        return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
+        return event.number in (midi.MOD_WHEEL, midi.RESET) and patch.mod_wheel.startswith(("body.", "room."))
     return isinstance(event, PatchTurned)
 
 
@@ -153,27 +127,27 @@ def release_all(channels: Iterable[int]) -> list[Event]:
     """Events that leave channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
     events: list[Event] = []
     for channel in sorted(channels):
-        events += [ControlChange(SUSTAIN, 0, channel), Bend(0.0, channel)]
-        events += [ControlChange(RESET, AT_REST, channel), ControlChange(NOTES_OFF, 0, channel)]
+        events += [ControlChange(midi.SUSTAIN, 0, channel), Bend(0.0, channel)]
+        events += [ControlChange(midi.RESET, AT_REST, channel), ControlChange(midi.NOTES_OFF, 0, channel)]
     return events
 
 
 def parameter_set(number: int, value: int, fine_value: int, channel: int) -> list[Event]:
     """The events that set a registered parameter of a channel, and then choose none."""
     messages = (
-        (REGISTERED, 0),
-        (FINE_REGISTERED, number),
-        (VALUE, value),
-        (FINE_VALUE, fine_value),
-        (REGISTERED, NO_PARAMETER),
-        (FINE_REGISTERED, NO_PARAMETER),
+        (midi.REGISTERED, 0),
+        (midi.FINE_REGISTERED, number),
+        (midi.VALUE, value),
+        (midi.FINE_VALUE, fine_value),
+        (midi.REGISTERED, midi.NO_PARAMETER),
+        (midi.FINE_REGISTERED, midi.NO_PARAMETER),
     )
     return [ControlChange(controller, byte, channel) for controller, byte in messages]
 
 
 def bend_range(semitones: float, channel: int) -> list[Event]:
     """The events that set the range of a channel's bends."""
-    return parameter_set(BEND_RANGE, *divmod(round(100 * semitones), 100), channel)
+    return parameter_set(midi.BEND_RANGE, *divmod(round(100 * semitones), 100), channel)
 
 
 def releases_for(events: Iterable[Event]) -> list[Event]:
@@ -190,10 +164,10 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
             strokes = (1 if event.string is not None else strokes + 1) if begins else strokes - 1
             if strokes > 0:
                 down[off] = strokes
-        elif isinstance(event, ControlChange) and event.number == SUSTAIN:
-            up = ControlChange(SUSTAIN, 0, event.channel)
+        elif isinstance(event, ControlChange) and event.number == midi.SUSTAIN:
+            up = ControlChange(midi.SUSTAIN, 0, event.channel)
             down.pop(up, None)
-            if event.value >= PEDAL_DOWN:
+            if event.value >= midi.PEDAL_DOWN:
                 down[up] = 1
     return [event for event, count in down.items() for _ in range(count)]
 

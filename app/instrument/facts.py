@@ -1,16 +1,24 @@
-"""A key's string in figures, in string makers' units; and the way from such a figure back to its knob."""
+"""A key's string in figures, in string makers' units; the way from such a figure back to its knob; and its warnings.
+
+Warnings name the parts of a note outside the training of the model that plays it, also after a knob was turned.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from app.instrument.strings import KeyString, Strings, decay_rates
+from app.instrument.events import NoteOn
+from app.instrument.strings import KeyString, Strings, decay_rates, on_string
 from app.patches.drums import PlayedDrum
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from app.shared.parameters import OF_PATCHES
+from engine.pluck import Pluck
+from engine.presets import PresetInfo, outside_training
+from engine.presets.of_string import info_of_string
 from engine.resonators.family import BRIGHT_HZ, inharmonicity
 from engine.values.string import StringParameters
 
@@ -131,3 +139,30 @@ def knob_for(patch: Patch, key: tuple[int, int | None], field: str, figure_value
             above = (figure.of(key_string.parameters, trial) > figure_value) != figure.falls
         low, high = (low, middle) if above else (middle, high)
     return math.sqrt(low * high)
+
+
+def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | None = None) -> list[str]:
+    """The warnings as of `outside_of_string`, for a key's sound; empty for a key without a possible string.
+
+    Wheels and slides are left out.
+
+    Args:
+        string: on which of a set it is played, as of `Strings.of_key`.
+    """
+    try:
+        key_string = Strings(patch).of_key(event.key, string)
+    except ValueError:
+        key_string = None
+    if key_string is None:
+        return []
+    return outside_of_string(
+        info, by_two_numbers(patch, key_string.parameters), on_string(key_string, patch.pluck.pluck(event.velocity))
+    )
+
+
+def outside_of_string(info: PresetInfo, string: StringParameters, pluck: Pluck) -> list[str]:
+    """The differences of a string and its pluck from a preset's training, in plain words; empty where none."""
+    if info.family is not None:
+        with contextlib.suppress(ValueError):  # it cannot play that one; its own string is judged
+            info = info_of_string(info, string)
+    return outside_training(info, pluck)

@@ -19,17 +19,18 @@ import soundfile
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from app.audio.note_file import NoteFileError, read_note
+from app.audio.note_file import read_note
 from app.instrument.bodies import own_bodies
 from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import Name
 from app.patches.library import SHIPPED, SUFFIX, PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import BodyChoice, Category, Fretted, Patch, Pickup, PluckChoices
+from app.shared.user_files import make_folder
 from engine.effects.responses import resampled
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
 from engine.presets import load_preset
-from engine.result_file import WriteError, explain, whole_file
+from engine.result_file import whole_file
 from engine.schema import explained
 from training.recording.fit import FREE_POLES
 from training.recording.learn import Learned, combined, examined, learn
@@ -172,10 +173,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     body = own_bodies() / f"{stem}.wav"
     preset = user_folder() / f"{stem}.safetensors"
     report = user_folder() / f"{stem}.report.json"
-    try:
-        body.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WriteError(explain(body.parent, error)) from error
+    make_folder(body.parent)
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     encoded = io.BytesIO()  # libsndfile cannot pass on the error of a full disk
     soundfile.write(encoded, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
@@ -230,15 +228,3 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
         )
     except ValueError as error:
         raise PatchError(f"{name}: {explained(error)}") from error
-
-
-__all__ = [
-    "Kept",
-    "NoteFileError",
-    "RecordingError",
-    "both_sounds",
-    "check_name",
-    "keep",
-    "learn_files",
-    "reasons_against",
-]

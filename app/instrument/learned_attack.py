@@ -42,9 +42,8 @@ def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[Recorde
     if force is None:
         return None
     part = note.part(0, PART_S)
-    hz = np.fft.rfftfreq(2 * len(part), 1 / note.rate_hz)
-    power = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, 2 * len(part))) ** 2
-    level_db = 10 * math.log10(float(force @ force) / max(float(power.sum()) / len(part), 1e-30))
+    energy = len(part) * _mean_square(part, note.rate_hz)
+    level_db = 10 * math.log10(float(force @ force) / max(energy, 1e-30))
     return RecordedAttack.of(force, note.rate_hz), level_db
 
 
@@ -58,11 +57,8 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
     tuned = patch.model_copy(update={"tuning": tuning})
     truth = resampled(note.part(0, PART_S)[:, None], note.rate_hz, RESPONSE_HZ)[:, 0]
     events, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
-    dry = np.concatenate(
-        list(
-            render_events(tuned, preset, events, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
-        )
-    )
+    blocks = render_events(tuned, preset, events, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
+    dry = np.concatenate(list(blocks))
     sound = fftconvolve(dry[:, 0].astype(np.float64), body)[: len(truth)]
     attack = recorded.attack
     force = resampled(attack.samples[:, None], attack.rate_hz, RESPONSE_HZ)[: len(truth), 0]

@@ -7,15 +7,12 @@ import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from app.instrument.compiled import is_another
 from app.instrument.events import (
     AT_REST,
     KEYS,
-    RESET,
     SETS_PARAMETER,
-    VOLUME,
     Bend,
     ControlChange,
     Event,
@@ -34,6 +31,7 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
+from engine.kernels.midi import RESET, VOLUME
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
@@ -227,10 +225,10 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
     tick = 0
     for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
-        now = round(mido.second2tick(entry.time_s, TICKS, TEMPO))
-        for message in messages_of(entry.event):
-            track.append(message.copy(time=max(0, now - tick)))
-            tick = max(tick, now)
+        if message := message_of(entry.event):
+            now = max(tick, round(mido.second2tick(entry.time_s, TICKS, TEMPO)))
+            track.append(mido.Message.from_bytes(message, time=now - tick))
+            tick = now
     file = mido.MidiFile(type=0, ticks_per_beat=TICKS)
     file.tracks.append(track)
     buffer = io.BytesIO()
@@ -272,20 +270,16 @@ def _bend_semitones(patch: Patch, channel: int) -> float:
     return MEMBER_SEMITONES if member else patch.bend_semitones
 
 
-def messages_of(event: Event) -> Iterable[Any]:
-    """The mido messages of an event; none where MIDI has no message for it."""
-    import mido
-
+def message_of(event: Event) -> list[int]:
+    """The bytes of an event as a message, as of `event_of`; empty where MIDI has no message for it."""
     if isinstance(event, PatchTurned | PluckAt):
-        return
+        return []
     channel = 0 if event.channel == KEYS else event.channel % 16
     if isinstance(event, NoteOn):
-        yield mido.Message("note_on", note=event.key, velocity=event.velocity, channel=channel)
-    elif isinstance(event, NoteOff):
-        yield mido.Message("note_off", note=event.key, velocity=64, channel=channel)
-    elif isinstance(event, Bend):
-        steps = BEND_STEPS if event.value < 0 else BEND_STEPS - 1
-        yield mido.Message("pitchwheel", pitch=round(event.value * steps), channel=channel)
-    elif isinstance(event, ControlChange):
-        value = 0 if event.number == RESET else event.value
-        yield mido.Message("control_change", control=event.number, value=value, channel=channel)
+        return [NOTE_ON + channel, event.key, event.velocity]
+    if isinstance(event, NoteOff):
+        return [NOTE_OFF + channel, event.key, 64]
+    if isinstance(event, Bend):
+        steps = round(event.value * (BEND_STEPS if event.value < 0 else BEND_STEPS - 1)) + BEND_STEPS
+        return [BEND + channel, steps % 128, steps // 128]
+    return [CONTROLLER + channel, event.number, 0 if event.number == RESET else event.value]

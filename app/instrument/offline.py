@@ -11,19 +11,11 @@ from numpy.typing import NDArray
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.effects import channels_of, effects_of
-from app.instrument.events import (
-    MOD_WHEEL,
-    ControlChange,
-    Event,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-    TimedEvent,
-    moves_effects,
-)
+from app.instrument.events import ControlChange, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, moves_effects
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.midi import MOD_WHEEL
 from engine.presets import Preset
 from engine.voices import Mixer
 
@@ -42,6 +34,9 @@ class OfflinePlayer:
         gains: of the sources that are heard together; a difference, of two, is heard without body and room.
         varied: whether plucks vary from stroke to stroke; those of a difference do not.
         dry: without amplifier, body and room.
+
+    Attributes:
+        tail_s: how long effects and sympathetic strings may ring on.
     """
 
     def __init__(
@@ -69,25 +64,14 @@ class OfflinePlayer:
         if moves_effects(event, self.player.patch):
             self._set_effects()
 
-    def render(self, frames: int) -> NDArray[np.float32]:
-        """The next frames."""
-        return self.mixer.render(frames)
-
     def _set_effects(self) -> None:
-        effects = None if self._dry else effects_of(self._heard_through())
+        patch = self.player.heard_through
+        effects = None if self._dry else effects_of(patch)
         self.mixer.set_effects(effects)
         if effects is not None:
             self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
-        if self._heard_through().sympathy_s_kg > 0:
+        if patch.sympathy_s_kg > 0:
             self.tail_s = max(self.tail_s, SYMPATHY_S)
-
-    def _heard_through(self) -> Patch:
-        return self.player.heard_through
-
-    @property
-    def silent(self) -> bool:
-        """Return True if nothing rings any more."""
-        return not self.mixer.active
 
 
 def render_events(
@@ -120,19 +104,18 @@ def render_events(
         ValueError: a key has no possible string, or there is no such `source`.
     """
     stage = OfflinePlayer(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied, dry)
-    channels = channels_played(patch, timed)
-    skipped = AHEAD if limited else 0  # the delay of the limiter
+    channels, delay = channels_played(patch, timed), AHEAD if limited else 0
     done, events = 0, sorted(timed, key=lambda timed_event: timed_event.time_s)
-    tail = max((place for place, timed_event in enumerate(events) if _sounds(timed_event.event)), default=-1) + 1
+    sounding = [place for place, entry in enumerate(events) if isinstance(entry.event, NoteOn | NoteOff)]
+    tail = sounding[-1] + 1 if sounding else 0
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
-        nonlocal done, skipped
+        nonlocal done
         while done < frame:
-            block = stage.render(min(BLOCK_FRAMES, frame - done))
+            block = stage.mixer.render(min(BLOCK_FRAMES, frame - done))
             done += len(block)
-            cut, skipped = block[skipped:, :channels], max(0, skipped - len(block))
-            if len(cut):
-                yield cut
+            if done > delay:
+                yield block[max(0, delay - done + len(block)) :, :channels]
             advanced(done / rate_hz)
 
     def play_until(frame: int, few: Sequence[TimedEvent]) -> Iterator[NDArray[np.float32]]:
@@ -143,7 +126,7 @@ def render_events(
         yield from blocks_until(frame)
 
     if seconds is not None:
-        end = round(seconds * rate_hz) + (AHEAD if limited else 0)
+        end = round(seconds * rate_hz) + delay
         yield from play_until(end, [timed_event for timed_event in events if timed_event.time_s < seconds])
         return
     yield from play_until(0, events[:tail])
@@ -164,12 +147,8 @@ def render_events(
         if loudest >= quiet:
             yield from waiting
             waiting = []
-        quiet_s = quiet_s + (done - before) / rate_hz if stage.silent or loudest < quiet else 0.0
+        quiet_s = quiet_s + (done - before) / rate_hz if loudest < quiet or not stage.mixer.active else 0.0
     yield from waiting[:1]
-
-
-def _sounds(event: Event) -> bool:
-    return isinstance(event, NoteOn | NoteOff)
 
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
@@ -209,10 +188,9 @@ def render_note(
     Raises:
         ValueError: the key has no string, or an impossible one, or the sound is not finite.
     """
-    events: list[tuple[float, Event]] = [(0.0, NoteOn(key, velocity))]
+    timed = [TimedEvent(0.0, NoteOn(key, velocity))]
     if held_s < seconds:
-        events.append((held_s, NoteOff(key)))
-    timed = [TimedEvent(time_s, event) for time_s, event in events]
+        timed.append(TimedEvent(held_s, NoteOff(key)))
     blocks = list(
         render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced, varied=False)
     )

@@ -1,4 +1,4 @@
-"""The string of each key, by the laws of `engine.kernels.strings`, as the player has it.
+"""The string of each key before anybody plays it, by the laws of `engine.kernels.strings`, as the player has it.
 
 Pitch is that of the first partial of a quiet pluck. A key changes the length alone, a slackened string the tension
 alone. Both are solved for the pitch in closed form and are exact.
@@ -6,17 +6,22 @@ alone. Both are solved for the pitch in closed form and are exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from app.instrument.effects import body_curves
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch
 from app.patches.tuning import Tuning
+from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import strings as law
 from engine.kernels.constants import HIGHEST_HZ, LENGTH, MOST_MODES
+from engine.pluck import Pluck
+from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.losses import loss_rates
 from engine.resonators.string import decay_rates as law_rates
+from engine.values.ear import Ear
 from engine.values.string import StringParameters
 
 KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
@@ -45,7 +50,7 @@ class Strings:
 
     def __init__(self, patch: Patch) -> None:
         """Raise ValueError: the tuning is impossible."""
-        self._patch = patch
+        self.patch = patch
         self._tuning = Tuning(patch.tuning)
 
     def of_key(self, key: int, string: int | None = None) -> KeyString | None:
@@ -61,9 +66,9 @@ class Strings:
         pitch_hz = self.pitch_hz(key)
         if pitch_hz is None:
             return None
-        if isinstance(self._patch.strings, Drums):
+        if isinstance(self.patch.strings, Drums):
             raise ValueError(
-                f"key {key} of {self._patch.name} is a drum, and no string; choose an instrument of strings"
+                f"key {key} of {self.patch.name} is a drum, and no string; choose an instrument of strings"
             )
         try:
             parameters, shortened = self._stopped(key, string, pitch_hz)
@@ -71,13 +76,13 @@ class Strings:
             if modes < 1:
                 raise ValueError(f"it would have no partial below {HIGHEST_HZ:g} Hz; choose a lower key")
         except ValueError as error:
-            raise ValueError(f"key {key} of {self._patch.name}, {pitch_hz:.4g} Hz: {error}") from error
+            raise ValueError(f"key {key} of {self.patch.name}, {pitch_hz:.4g} Hz: {error}") from error
         return KeyString(key, parameters, pitch_hz, modes, shortened)
 
     def pitch_hz(self, key: int) -> float | None:
         """The pitch of a key; None as in `of_key`."""
-        low, high = self._patch.range
-        if isinstance(self._patch.strings, Drums) and self._patch.strings.of_key(key) is None:
+        low, high = self.patch.range
+        if isinstance(self.patch.strings, Drums) and self.patch.strings.of_key(key) is None:
             return None
         return self._tuning.hz(key) if low <= key <= high and self._tuning.mapped(key) else None
 
@@ -87,7 +92,7 @@ class Strings:
 
     def _stopped(self, key: int, number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
         """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
-        strings, slackened = self._patch.strings, 1.0
+        strings, slackened = self.patch.strings, 1.0
         assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
             string = strings.string
@@ -97,7 +102,7 @@ class Strings:
             string = open_string.string
             if key < open_string.note:
                 slackened = pitch_hz / self._tuning.hz(open_string.note)
-        knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
+        knobs = [getattr(self.patch.knobs, name) for name in KNOBS]
         whole, stopped_row = [0.0] * of.STRING, [0.0] * of.STRING
         law.stop(string.row, knobs, slackened, pitch_hz, whole, stopped_row)
         if not whole[of.TENSION] > 0:
@@ -115,3 +120,37 @@ def decay_rates(patch: Patch, string: StringParameters, modes: int) -> Array:
     if patch.losses is not None:
         rates = rates + loss_rates(patch.losses, string, modes, knobs.decay, knobs.brightness_decay)
     return rates
+
+
+class StringKeys(Strings):
+    """The strings as played by a preset and heard at `ear`, with their common values. The player computes gains.
+
+    Args:
+        near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
+    """
+
+    def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: StringKeys | None = None) -> None:
+        """Raise ValueError: the tuning is impossible, or the patch has drums."""
+        if isinstance(patch.strings, Drums):
+            raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
+        super().__init__(patch)
+        self.ear = ear
+        self.recorded = preset.recorded
+        self.polarisations = patch.polarisations if preset.recorded is None else None  # else as the recording says
+        self.body: Array | None = body_curves(patch) if near is None else near.body
+
+    def of_key(self, key: int, string: int | None = None) -> KeyString | None:
+        """The string of a key as of `Strings`. Raises ValueError: it cannot be heard or played so, too."""
+        key_string = super().of_key(key, string)
+        if key_string is None:
+            return None
+        if self.recorded is not None and self.ear.pickup == "bridge":
+            raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
+        if law.overdamped(key_string.parameters.row, key_string.modes):
+            raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
+        return key_string
+
+
+def on_string(string: KeyString, pluck: Pluck) -> Pluck:
+    """A pluck of the whole string, on the string that a key leaves of it."""
+    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))

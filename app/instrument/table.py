@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
@@ -173,7 +173,7 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
             table["attack"] = tail.put(attack.view(np.float64), samples)
     elif (edge := patch.javari).distance_mm > 0:
         table["javari"] = edge.distance_mm / 1000, edge.stiffness_n_m, edge.loss_s_m
-    table["pitches_hz"] = [loud.strings.pitch_hz(key) or 0.0 for key in range(of.KEYS)]
+    table["pitches_hz"] = [loud.pitch_hz(key) or 0.0 for key in range(of.KEYS)]
     strings = patch.strings
     assert not isinstance(strings, Drums)
     if isinstance(strings, Fretted):
@@ -181,7 +181,7 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
     else:
         table["strings"] = len(strings.strings)
         for number, string in enumerate(strings.strings[::-1]):
-            table["open"][number] = string.note, loud.strings.open_hz(string.note), string.string.row
+            table["open"][number] = string.note, loud.open_hz(string.note), string.string.row
     turn = 2 * (grid_points - 1)
     table["sines"] = tail.put(np.sin(2 * np.pi * np.arange(turn) / turn))
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.patches.fields import LONGEST_NAME
 from app.patches.patch import CATEGORIES, Patch
+from app.shared.user_files import make_folder, read_all
 from engine import bounds
 from engine.folders import user_folder
 from engine.plain_text import name_text, one_line
@@ -87,28 +88,22 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     Args:
         folders: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
     """
-    entries: dict[str, PatchEntry] = {}
-    names: set[str] = set()
-    problems = []
+    files: list[Path] = []
+    unreadable = []
     for folder in folders or (SHIPPED, own_patches()):
         try:
-            paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
+            files += sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
         except OSError as error:
-            problems.append(one_line(f"{folder}: cannot be read ({error.strerror}); check its permissions"))
-            continue
-        for path in paths:
-            try:
-                patch = read_patch(path)
-                if name_text(path.stem) in entries:
-                    raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
-                name = _free_name(names, patch.name)
-                names.add(name.casefold())
-                entries[name_text(path.stem)] = PatchEntry(path, patch.model_copy(update={"name": name}))
-            except PatchError as error:
-                problems.append(str(error))
-            except Exception as error:  # so that the other files are listed
-                problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
-    return sorted(entries.values(), key=_order), problems
+            unreadable.append(one_line(f"{folder}: cannot be read ({error.strerror}); check its permissions"))
+    patches, problems = read_all(files, lambda path: (path, read_patch(path)), PatchError, "an instrument")
+    names: set[str] = set()
+    entries = []
+    for path, patch in patches.values():
+        name = _free_name(names, patch.name)
+        names.add(name.casefold())
+        entries.append(PatchEntry(path, patch.model_copy(update={"name": name})))
+    entries.sort(key=lambda entry: (CATEGORIES.index(entry.patch.category), entry.patch.name.casefold()))
+    return entries, unreadable + problems
 
 
 def _free_name(taken: set[str], name: str) -> str:
@@ -156,10 +151,7 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
         raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
     if replace is None and path.exists():
         raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WriteError(explain(path.parent, error)) from error
+    make_folder(path.parent)
     with whole_file(path) as file:
         file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
     return PatchEntry(path, patch)
@@ -219,7 +211,3 @@ def file_stem(name: str) -> str:
     """The name of a patch's file, on every system: its letters and digits in lower case, the rest underscores."""
     stem = "_".join(re.findall(r"[^\W_]+", unicodedata.normalize("NFC", name.casefold()))) or "patch"
     return f"{stem}_" if stem in DEVICES else stem
-
-
-def _order(entry: PatchEntry) -> tuple[int, str]:
-    return CATEGORIES.index(entry.patch.category), entry.patch.name.casefold()

@@ -87,14 +87,9 @@ class Knobs(Rows, part="knobs"):
     A heavier string (`density`, `gauge`) is tighter at the length that it has.
 
     Attributes:
-        stiffness: of the second moment of area alone, and so of the bending stiffness: inharmonicity.
-        decay: of d₁, damping of all modes alike; above 1 all decay faster.
-        brightness_decay: of d₃, damping that grows with frequency; above 1 the sound darkens sooner.
-        modulus: of Young's modulus: bending stiffness, and how much a hard pluck glides in pitch.
-        density: of the mass per volume.
+        stiffness: of the second moment of area alone.
+        decay, brightness_decay: of d₁ and d₃.
         gauge: of the radius: the area grows with its square, the second moment with its fourth power.
-        tension: of the tension; the length grows with its root. Tighter: more harmonic, less glide of hard plucks.
-        length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
 
@@ -237,12 +232,7 @@ class Damping(Rows, part="damping"):
 class Technique(Rows, part="technique"):
     """The technique that keys are played with. MIDI's footswitches 80, 81 and 82 switch on what is off here.
 
-    Attributes:
-        harmonic: which partial is the lowest that a finger leaves, which touches the string there as it is plucked.
-        strum_ms: from one string of a chord to the next. A chord is what begins within 30 ms.
-        strokes: of strums: 0 from low to high, 1 from high to low, 2 by turns.
-        tremolo_hz: how often a string is plucked while its key is held.
-        vibrato_cents, vibrato_hz: how far the pitch goes up and down, and how often.
+    A chord, for strums, is what begins within 30 ms.
     """
 
 
@@ -327,17 +317,13 @@ class Patch(Value):
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
 
     @model_validator(mode="after")
-    def _javari_fits(self) -> Self:
-        if self.javari.distance_mm > 0 and isinstance(self.strings, Drums):
+    def _strings_fit(self) -> Self:
+        has_edge = self.javari.distance_mm > 0
+        if has_edge and isinstance(self.strings, Drums):
             raise ValueError("javari.distance_mm: drums have no strings; leave it out")
-        if self.javari.distance_mm > 0 and self.course.bridge > 0:
-            raise ValueError(
-                "javari.distance_mm: strings with course.bridge above 0 have no edge; set one of both to 0"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _courses_fit(self) -> Self:
+        if has_edge and self.course.bridge > 0:
+            both = "strings with course.bridge above 0 have no edge; set one of both to 0"
+            raise ValueError(f"javari.distance_mm: {both}")
         if isinstance(self.strings, Drums) and self.course.strings > 1:
             raise ValueError("course: drums have no strings; leave it out")
         count = len(self.strings.strings) if isinstance(self.strings, StringSet) else 0
@@ -351,10 +337,8 @@ class Patch(Value):
         if low > high:
             raise ValueError(f"range: the lowest key {low} is above the highest, {high}; exchange them")
         if self.mod_wheel not in ("none", *WHEEL):
-            raise ValueError(
-                f"mod_wheel: {bounds.brief(self.mod_wheel)} is no field that the wheel can turn; "
-                f"try none, {', '.join(WHEEL)}"
-            )
+            fault = f"{bounds.brief(self.mod_wheel)} is no field that the wheel can turn"
+            raise ValueError(f"mod_wheel: {fault}; try none, {', '.join(WHEEL)}")
         for number, macro in enumerate(self.macros):
             for target in macro.targets:
                 where = f"macros.{number}: target {target.field[:LONGEST_NAME]}"
@@ -373,9 +357,8 @@ class Patch(Value):
     def value(self, field: str) -> float:
         """The value of a parameter. Raises ValueError: there is none by this id, or the instrument lacks it."""
         if not self.has(field):
-            raise ValueError(
-                f"field: {bounds.brief(field)} is no parameter of this instrument; try {', '.join(OF_PATCHES)}"
-            )
+            fault = f"{bounds.brief(field)} is no parameter of this instrument"
+            raise ValueError(f"field: {fault}; try {', '.join(OF_PATCHES)}")
         value: Any = self
         for part in field.split("."):
             value = value[int(part)] if isinstance(value, tuple) else getattr(value, part)
@@ -397,13 +380,11 @@ class Patch(Value):
     def with_knob(self, field: str, value: float) -> Patch:
         """Set a value as `with_value`; macros that turn this field follow it."""
         patch = self.with_value(field, value)
-        macros = tuple(
-            macro.model_copy(update={"value": macro.nearest(patch)})
-            if any(target.field == field for target in macro.targets)
-            else macro
-            for macro in patch.macros
-        )
-        return patch.model_copy(update={"macros": macros})
+        macros = list(patch.macros)
+        for number, macro in enumerate(macros):
+            if any(target.field == field for target in macro.targets):
+                macros[number] = macro.model_copy(update={"value": macro.nearest(patch)})
+        return patch.model_copy(update={"macros": tuple(macros)})
 
     def turned(self, macro: int, value: float) -> Patch:
         """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and its targets' fields set.
@@ -411,20 +392,18 @@ class Patch(Value):
         A target stays where the others forbid its value: the softest pluck does not pass the hardest.
         """
         share = min(1.0, max(0.0, value))
-        before = self.macros[macro]
-        after = before.model_copy(update={"value": share})
-        macros = (*self.macros[:macro], after, *self.macros[macro + 1 :])
-        patch = self.model_copy(update={"macros": macros})
-        for target in before.targets:
+        macros = list(self.macros)
+        macros[macro] = macros[macro].model_copy(update={"value": share})
+        patch = self.model_copy(update={"macros": tuple(macros)})
+        for target in macros[macro].targets:
             with contextlib.suppress(ValueError):
                 patch = patch.with_value(target.field, target.low + share * (target.high - target.low))
         return patch
 
     def _check_assignable(self, where: str, field: str) -> None:
         if field not in ASSIGNABLE or not self.has(field):
-            raise ValueError(
-                f"{where}: {bounds.brief(field)} is no field that can be turned; try {', '.join(ASSIGNABLE)}"
-            )
+            fault = f"{bounds.brief(field)} is no field that can be turned"
+            raise ValueError(f"{where}: {fault}; try {', '.join(ASSIGNABLE)}")
 
     def _replacement(self, field: str, value: float) -> tuple[str, Any]:
         """The name of the patch's own field that changes, and its new and checked value."""

@@ -42,6 +42,7 @@ class AheadVoice:
         from_s: where in its motion it will begin.
         ends_s: when the model ran away; None: it did not.
         done: the number of frames rendered.
+        frames: their blocks.
     """
 
     voice: Voice
@@ -55,7 +56,7 @@ class AheadVoice:
     from_s: float = 0.0
     ends_s: float | None = None
     _state: SourceState | None = None
-    _frames: list[NDArray[np.float32]] = field(default_factory=list)
+    frames: list[NDArray[np.float32]] = field(default_factory=list)
     _spent_s: float = 0.0
     done: int = 0
     finished: bool = False
@@ -74,7 +75,7 @@ class AheadVoice:
     @property
     def wanted_s(self) -> float:
         """The seconds that must be rendered before it begins."""
-        total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
+        total_s = (self.done + self.voice.room) / self.source.rate_hz
         least_s = min(self.from_s + LEAST_S, total_s)
         return max(least_s, total_s - (total_s - self.from_s) * CARE * self.speed) if self.speed else least_s
 
@@ -84,10 +85,6 @@ class AheadVoice:
         if self.begun or not self.speed:
             return 0.0
         return max(0.0, (self.wanted_s - self.rendered_s) / self.speed)
-
-    @property
-    def may_begin(self) -> bool:
-        return self.finished or (self.speed > 0 and self.rendered_s >= self.wanted_s)
 
     @property
     def lead_s(self) -> float:
@@ -110,28 +107,20 @@ class AheadVoice:
                 self.voice.end_here()
                 return
         samples = (block / FULL_SCALE_M).astype(np.float32)
-        self._take(samples)
-        self._frames.append(samples)
-        if self.done > 1 + AHEAD_FIRST:
+        done = self.done + len(samples)
+        silent = done > AHEAD_FIRST and float(np.abs(samples).max()) < SILENT
+        self.take(samples, last=silent or self.voice.room == len(samples))
+        if done > 1 + AHEAD_FIRST:
             self._spent_s += time.monotonic() - began_s
-        if self.voice.room == 0 or (self.done > AHEAD_FIRST and float(np.abs(samples).max()) < SILENT):
+
+    def take(self, samples: NDArray[np.float32], last: bool) -> None:
+        """Take samples (frames, channels) that were rendered, or are known from an earlier pluck."""
+        self.voice.append(samples)
+        self.frames.append(samples)
+        self.done += len(samples)
+        if last:
             self.voice.end_here()
             self.finished = True
-
-    def take_known(self, samples: NDArray[np.float32]) -> None:
-        """Take all samples, which are known from an earlier pluck."""
-        self._take(samples)
-        self.voice.end_here()
-        self.finished = True
-
-    @property
-    def samples(self) -> NDArray[np.float32]:
-        """The samples that were rendered so far, (frames, channels)."""
-        return np.concatenate(self._frames)
-
-    def _take(self, samples: NDArray[np.float32]) -> None:
-        self.voice.append(samples)
-        self.done += len(samples)
 
 
 class Ahead:
@@ -155,7 +144,7 @@ class Ahead:
                     self._thread = threading.Thread(target=self._run, name="render-ahead", daemon=True)
                     self._thread.start()
                 return
-        voice.take_known(kept_samples)
+        voice.take(kept_samples, last=True)
         voice.begun = True
         voice.begin()
 
@@ -172,9 +161,7 @@ class Ahead:
         while True:
             with self._mailbox:
                 self._voices = [
-                    voice
-                    for voice in self._voices
-                    if not voice.finished and not voice.voice.over and not voice.given_up()
+                    voice for voice in self._voices if not (voice.finished or voice.voice.over or voice.given_up())
                 ]
                 self._mailbox.wait_for(lambda: bool(self._voices) or self._closing)
                 if self._closing:
@@ -183,16 +170,13 @@ class Ahead:
             try:
                 voice.advance()
                 if voice.finished and voice.ends_s is None:
-                    self._keep(voice)
-                if not voice.begun and voice.may_begin:
+                    with self._mailbox:
+                        self._known[voice.key] = np.concatenate(voice.frames)
+                        while len(self._known) > KEPT:
+                            self._known.popitem(last=False)
+                if not voice.begun and (voice.finished or (voice.speed and voice.rendered_s >= voice.wanted_s)):
                     voice.begun = True
                     voice.begin()
             except Exception as error:
                 voice.finished = True
                 voice.failed(error)
-
-    def _keep(self, voice: AheadVoice) -> None:
-        with self._mailbox:
-            self._known[voice.key] = voice.samples
-            while len(self._known) > KEPT:
-                self._known.popitem(last=False)

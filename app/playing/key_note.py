@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import NoteOn
 from app.patches.drums import Drums
+from app.playing.note import PluckVoices
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf
+from app.shared.log import log_fault
 from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
@@ -17,52 +21,48 @@ from engine.voices import Mixer
 from engine.voices.player import NoteReport, Playing
 
 SOURCES = ("model", "truth")
+DROPPED = "A note was dropped because of an internal error. All others play on; please report the details."
+DROPPED_S = 0.03  # of its fade
 AS_THEY_ARE: Mapping[str, float] = dict.fromkeys(SOURCES, 1.0)
 
 
+@dataclass(eq=False)
 class KeyNote:
     """The state of a key's note, as known from the latest `take` and `look`.
 
-    Args:
+    Attributes:
         player: whose voices it has, in `mixer`.
         id: of its event, which reports carry.
         path: of the preset.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
-
-    Attributes:
         patch: with which it was struck.
         ear: where it was heard then.
         request: the string and how it was plucked, once the player has reported them; None before, and of a drum.
         string: on which of a set it is played, as of `Strings.of_key`; None: the key chooses it.
         gain: the factor of its voices.
         match: by source, the factor of the level match: both sources are the same string, and stay as they are.
-        released: whether it was asked to fade out.
-        cut: it is not heard any more: its mixer was replaced, or no string could play it.
-        timed: its latency has been noted.
+        released, cut, timed: as of `PluckVoices`.
     """
 
+    player: InstrumentPlayer
+    mixer: Mixer
+    id: int
+    event: NoteOn
+    path: Path
+    begin_frame: int = 0
+    request: RenderRequest | None = None
+    string: int | None = None
+    gain: float = 1.0
+    match: Mapping[str, float] = field(default_factory=lambda: AS_THEY_ARE)
+    released: bool = False
+    cut: bool = False
+    timed: bool = False
+    _ended: bool = False
+    _begun: NoteReport | None = None
     from_s = 0.0
-    waits_s = 0.0
-    pending = False
 
-    def __init__(
-        self, player: InstrumentPlayer, mixer: Mixer, id: int, event: NoteOn, path: Path, begin_frame: int = 0
-    ) -> None:
-        self.player = player
-        self.mixer = mixer
-        self.id = id
-        self.event = event
-        self._path = path
-        self.begin_frame = begin_frame
-        self.patch = player.patch
-        self.ear = player.ear
-        self.request: RenderRequest | None = None
-        self.string: int | None = None
-        self.gain = 1.0
-        self.match = AS_THEY_ARE
-        self.released = self.cut = self.timed = False
-        self._ended = False
-        self._begun: NoteReport | None = None
+    def __post_init__(self) -> None:
+        self.patch, self.ear = self.player.patch, self.player.ear
         self._playing = Playing(0.0, 0, None)
 
     def take(self, report: NoteReport) -> None:
@@ -74,7 +74,7 @@ class KeyNote:
                 pluck = self.event.pluck or self.patch.pluck.pluck(self.event.velocity)
                 width = pluck.width if pluck.shape == "triangular" else report.width
                 pluck = pluck.nearest(position=report.position, amplitude_mm=report.amplitude_mm, width=width)
-                self.request = RenderRequest(StringOf(self._path, report.parameters), pluck, 0.0, self.ear)
+                self.request = RenderRequest(StringOf(self.path, report.parameters), pluck, 0.0, self.ear)
             self.look()
         else:
             self._ended = True
@@ -152,3 +152,12 @@ class KeyNote:
     def end(self) -> None:
         """Mark the note as cut, where no device plays its voices any more."""
         self.cut = True
+
+
+def drop(note: PluckVoices | KeyNote | None, error: Exception, report: Callable[[str, str], None]) -> None:
+    """End a note whose handling failed, as far as it was made. Its report is always the same, to be shown once."""
+    report(DROPPED, log_fault(error, "while a note was played"))
+    if note is not None:
+        note.cut = True
+        with contextlib.suppress(Exception):  # what has failed may be this
+            note.release(DROPPED_S)

@@ -22,30 +22,19 @@ ANYWHERE = (0.05, 0.95)  # of a model without trained positions
 ANY_AMPLITUDE_MM = (0.5, 10.0)
 SOFTEST_MM = 0.05
 LARGEST_VELOCITY = 127
-LOWEST_PLACE, HIGHEST_PLACE = (
-    36,
-    96,
-)  # keys of a keyboard of 61, which are places from one end of the reach to the other
+LOWEST_PLACE, HIGHEST_PLACE = 36, 96  # keys of a keyboard of 61: places from one end of the reach to the other
 VELOCITY_STEP = 16
 DIGITS = 4  # after the point, for file names and recipes have them
 
-# Native codes of the ten keys from A on, and their letters for platforms without codes.
-_ROW_CODES = {
-    "linux": tuple(range(38, 48)),  # of X11, and of Wayland through Qt
-    "win32": tuple(range(0x1E, 0x28)),
-}
-_ROW_LETTERS = "ASDFGHJKL;"
-# A piano of eighteen keys: white ones in the same row, black ones above, from C on; and the letters beside it.
+# A piano of eighteen keys: white ones in the row from A on, black ones above from C on, and letters beside it.
 _WHITE = (0, 2, 4, 5, 7, 9, 11, 12, 14, 16, 17)
 _BLACK = {1: 1, 2: 3, 4: 6, 5: 8, 6: 10, 8: 13, 9: 15}  # place in the row above -> semitones
-_UPPER_LETTERS = "QWERTYUIOP"
+# By native codes of the first key of each row, of X11 (and of Wayland through Qt) and Windows; else by letters.
 _PIANO_CODES = {
-    "linux": {38 + n: s for n, s in enumerate(_WHITE)} | {24 + n: s for n, s in _BLACK.items()},
-    "win32": {0x1E + n: s for n, s in enumerate(_WHITE)} | {0x10 + n: s for n, s in _BLACK.items()},
+    platform: {row + n: s for n, s in enumerate(_WHITE)} | {upper + n: s for n, s in _BLACK.items()}
+    for platform, row, upper in (("linux", 38, 24), ("win32", 0x1E, 0x10))
 }
-_PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
-    _UPPER_LETTERS[n]: s for n, s in _BLACK.items()
-}
+_PIANO_LETTERS = dict(zip("ASDFGHJKL;'", _WHITE, strict=True)) | {"QWERTYUIOP"[n]: s for n, s in _BLACK.items()}
 LOWEST_C = 48  # the MIDI key that A plays at octave 0
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
@@ -139,8 +128,8 @@ def octave_near(octave: int, keys: Collection[int]) -> int:
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:
     """The octaves, counted as those of the computer's keys, of the MIDI keys `low` and `high`."""
-    lowest, highest = (low - LOWEST_C) // 12, (high - LOWEST_C) // 12
-    return max(min(lowest, HIGHEST_OCTAVE), LOWEST_OCTAVE), max(min(highest, HIGHEST_OCTAVE), LOWEST_OCTAVE)
+    lowest, highest = (min(max((key - LOWEST_C) // 12, LOWEST_OCTAVE), HIGHEST_OCTAVE) for key in (low, high))
+    return lowest, highest
 
 
 def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
@@ -149,23 +138,16 @@ def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
     if letter in OCTAVE_STEPS:
         return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity
     if letter and letter in "123456789":
-        return octave, _velocity_of_digit(int(letter))
+        return octave, round(1 + (int(letter) - 1) / 8 * (LARGEST_VELOCITY - 1))
     step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
     return None if step is None else (octave, min(max(velocity + step, 1), LARGEST_VELOCITY))
 
 
 def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """The place 0 … 9 along the row; None for a key that is not of it."""
-    codes = _ROW_CODES.get(platform)
-    if codes and press.code:
-        return codes.index(press.code) if press.code in codes else None
-    place = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
-    return place if place >= 0 else None
+    """The place 0 … 9 along the row of white keys; None for a key that is not of it."""
+    semitone = semitone_of(press, platform)
+    return _WHITE.index(semitone) if semitone in _WHITE[:PLACES] else None
 
 
 def _round_within(value: float, low: float, high: float) -> float:
     return min(max(round(value, DIGITS), low), high)
-
-
-def _velocity_of_digit(digit: int) -> int:
-    return round(1 + (digit - 1) / 8 * (LARGEST_VELOCITY - 1))

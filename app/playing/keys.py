@@ -15,29 +15,17 @@ from pathlib import Path
 from app.instrument.compiled import InstrumentPlayer, is_another
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import (
-    NOTES_OFF,
-    RESET,
-    SOUND_OFF,
-    SUSTAIN,
-    SWITCHES,
-    ControlChange,
-    Event,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-    moves_effects,
-)
+from app.instrument.events import SWITCHES, ControlChange, Event, NoteOff, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from app.playing.dropping import drop
-from app.playing.due import Due
-from app.playing.key_note import AS_THEY_ARE, KeyNote
+from app.playing.key_note import AS_THEY_ARE, KeyNote, drop
+from app.playing.playback import Due
 from app.playing.recorder import EventRecorder
 from app.playing.sources import Sources
+from app.presets.library import PresetEntry
 from engine.effects import Effects
 from engine.kernels.constants import BEGAN
-from engine.presets import PresetError
+from engine.kernels.midi import NOTES_OFF, RESET, SOUND_OFF, SUSTAIN
 from engine.values.ear import Ear
 from engine.voices import Mixer
 
@@ -77,7 +65,7 @@ class Keys:
     Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
-        find: the path of a preset by its name; None where there is none.
+        find: a preset by its name; None where there is none.
         mixer: the present one.
         in_background: does work in another thread.
         report: is called with a message and its details where something cannot be played; in any thread.
@@ -85,12 +73,13 @@ class Keys:
 
     Attributes:
         recorder: of the events that are played, and of the patch as it is turned.
+        player: of the keys; None: no patch, or its preset is not loaded yet.
     """
 
     def __init__(
         self,
         sources: Sources,
-        find: Callable[[str], Path | None],
+        find: Callable[[str], PresetEntry | None],
         mixer: Callable[[], Mixer],
         in_background: Callable[[Callable[[], None]], None],
         report: Callable[[str, str], None],
@@ -104,7 +93,7 @@ class Keys:
         self._set_effects = set_effects
         self.recorder = EventRecorder(report)
         self._lock = threading.RLock()
-        self._player: InstrumentPlayer | None = None
+        self.player: InstrumentPlayer | None = None
         self._in: Mixer | None = None  # where the player's events are played
         self._playing: list[InstrumentPlayer] = []  # with those before, whose notes may ring
         self._gains: Mapping[str, float] = AS_THEY_ARE
@@ -115,16 +104,9 @@ class Keys:
         self._path = Path()
         self._effects: Effects | None = None  # as set
         self._dry = False
-        self._switches: dict[
-            tuple[int, int], ControlChange
-        ] = {}  # the latest of each channel, which players take over
+        self._switches: dict[tuple[int, int], ControlChange] = {}  # the latest by channel, which players take over
         self._frames, self._moved_s = -1, 0.0  # of the mixer when it was last seen to move, and when that was
         self._reported_body = ""  # the fault of the body that was reported last
-
-    @property
-    def player(self) -> InstrumentPlayer | None:
-        """The player of the keys; None: no patch, or its preset is not loaded yet."""
-        return self._player
 
     def set_patch(self, patch: Patch | None, ear: Ear) -> None:
         """Set the patch that keys play from now on, and where it is heard.
@@ -135,9 +117,9 @@ class Keys:
         patch.
         """
         with self._lock:
-            player = self._player
+            player = self.player
             if patch is None or (player is not None and not _can_play(player, patch)):
-                self._player = None
+                self.player = None
             self._wanted = None if patch is None else _Wanted(patch, ear)
         self._follow_wish()
 
@@ -147,7 +129,7 @@ class Keys:
             if self._wanted is None:
                 return
             self._wanted = _Wanted(self._wanted.patch, ear)
-            if self._player is None:  # it is being loaded, or cannot be
+            if self.player is None:  # it is being loaded, or cannot be
                 return
         self._follow_wish()
 
@@ -171,16 +153,16 @@ class Keys:
             if isinstance(event, ControlChange):
                 self._note_switch(event)
             player, mixer = self._present(), self._mixer()
-            self._release_before(event, 0 if due is None else due.frame_in(mixer))
+            frame = 0 if due is None else due.frame_in(mixer)
+            self._release_before(event, frame)
             if player is None:
                 return None
             self.recorder.take(event, None if due is None else due.time_s)
-            frame, id = 0 if due is None else due.frame_in(mixer), 0
-            note_on = event if isinstance(event, NoteOn) and event.velocity > 0 else None
+            note_on, id = event if isinstance(event, NoteOn) and event.velocity > 0 else None, 0
             try:
                 if note_on is None or not player.silent(note_on.key):
                     id = player.handle(event, frame, struck_s)
-            except (ValueError, PresetError) as error:
+            except ValueError as error:
                 self._report(str(error), "")
             if isinstance(event, ControlChange) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
@@ -194,7 +176,7 @@ class Keys:
         """Let releases of keys and pedals damp what players before have struck, too. Under the lock."""
         released = isinstance(event, NoteOff) or (isinstance(event, ControlChange) and event.number in RELEASES)
         for player in self._playing if released else []:
-            if player is not self._player:
+            if player is not self.player:
                 player.handle(event, frame)
 
     def _note_switch(self, event: ControlChange) -> None:
@@ -208,7 +190,7 @@ class Keys:
         begun_notes = []
         with self._lock:  # a note is known before its report is read
             for player in self._playing:
-                for report in player.reports():
+                for report in player.compiled.reports():
                     note = self._notes.get((player, report.id))
                     if note is None:
                         continue
@@ -225,14 +207,14 @@ class Keys:
                     self._notes.pop((player, id)).end()
             self._notes = {key: note for key, note in self._notes.items() if not note.over}
             with_notes = {player for player, _ in self._notes}
-            self._playing = [player for player in self._playing if player is self._player or player in with_notes]
+            self._playing = [player for player in self._playing if player is self.player or player in with_notes]
         return begun_notes
 
     def cancel(self) -> None:
         """Cancel the events that were handed over and are not due yet."""
         with self._lock:
-            if self._player is not None:
-                self._player.cancel()
+            if self.player is not None:
+                self.player.cancel()
             self.recorder.cancel()
 
     def stop(self, seconds: float) -> None:
@@ -250,12 +232,12 @@ class Keys:
 
     def sounding_notes(self) -> list[SoundingNote]:
         """The notes that ring, with their strings; none while the output stands."""
-        player, mixer = self._player, self._mixer()
+        player, mixer = self.player, self._mixer()
         if player is None or self._in is not mixer or self._mixer_stands(mixer):
             return []
         return [
             SoundingNote(note.key, min(max(1 + note.level_db / SEEN_DB, 0.0), 1.0), note.string, player.slid(note))
-            for note in player.ringing()
+            for note in player.compiled.ringing()
         ]
 
     def _mixer_stands(self, mixer: Mixer) -> bool:
@@ -267,15 +249,14 @@ class Keys:
     @property
     def heard_through(self) -> Patch | None:
         """The patch whose body and room are heard, as controllers have turned them."""
-        player, wanted = self._player, self._wanted
-        if player is not None:
-            return player.heard_through
-        return None if wanted is None else wanted.patch
+        if self.player is not None:
+            return self.player.heard_through
+        return None if self._wanted is None else self._wanted.patch
 
     def begin_recording(self) -> None:
         """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
         with self._lock:
-            player = self._player
+            player = self.player
             self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand])
 
     def hear_dry(self, dry: bool) -> None:
@@ -300,28 +281,28 @@ class Keys:
 
     def _present(self) -> InstrumentPlayer | None:
         """The player in the present mixer; in a new one its strings are at rest. Under the lock."""
-        player, mixer = self._player, self._mixer()
+        player, mixer = self.player, self._mixer()
         if player is not None and mixer is not self._in:
             self._set_player(player.again(mixer.rate_hz), mixer)
-        return self._player
+        return self.player
 
     def _set_player(self, player: InstrumentPlayer, mixer: Mixer) -> None:
         """Let keys play a player. Under the lock."""
         player.set_gains(self._gains, self._compared)
         mixer.set_player(player.compiled)
-        self._player, self._in = player, mixer
+        self.player, self._in = player, mixer
         self._playing.append(player)
 
     def _follow_wish(self) -> None:
         """Play what is wanted; what takes milliseconds of it, in the background."""
-        wanted, player = self._wanted, self._player
+        wanted, player = self._wanted, self.player
         if wanted is not None and player is not None and not player.of_drums:
             self._load_wanted(player, wanted, nearly=not is_another(wanted.patch, player.patch))
         self._in_background(self._complete)
 
     def _complete(self) -> None:
         """All that keys need to play what is wanted now."""
-        wanted, player = self._wanted, self._player
+        wanted, player = self._wanted, self.player
         if wanted is not None and wanted is not self._completed:
             self._completed = wanted
             if player is None:
@@ -336,7 +317,7 @@ class Keys:
             keys = player.keys_of(wanted.patch, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
-            table = player.tabled(keys)
+            table = player.table_of(keys)
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
@@ -344,9 +325,9 @@ class Keys:
             self._report(str(error), "")
             return
         with self._lock:
-            if wanted is self._wanted and player is self._player:
+            if wanted is self._wanted and player is self.player:
                 is_outdated = (player.patch, player.ear) != (wanted.patch, wanted.ear)
-                player.take(table)
+                player.take(keys, table)
                 if is_outdated:
                     self.recorder.take(_turned_event(player))
 
@@ -362,17 +343,17 @@ class Keys:
 
     def _begin(self, wanted: _Wanted) -> None:
         """Load the preset of what is wanted."""
-        patch, path = wanted.patch, self._find(wanted.patch.preset)
-        if path is None:
+        patch, entry = wanted.patch, self._find(wanted.patch.preset)
+        if entry is None:
             self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")
             return
         try:
-            preset, rate_hz = self._sources.load(path).preset, self._mixer().rate_hz
+            preset, rate_hz = self._sources.load(entry.path).preset, self._mixer().rate_hz
             drums = DrumKeys(patch, wanted.ear) if isinstance(patch.strings, Drums) else None
             if drums is not None and not self._compute_drums(drums):
                 return
             player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
-        except (ValueError, PresetError) as error:
+        except ValueError as error:
             self._report(str(error), "")
             return
         with self._lock:
@@ -383,7 +364,7 @@ class Keys:
                 player = player.again(mixer.rate_hz)
             for event in self._switches.values():
                 player.handle(event)
-            self._path = path
+            self._path = entry.path
             self._set_player(player, mixer)
             self.recorder.take(_turned_event(player))
         if now is not wanted:  # it is heard elsewhere by now

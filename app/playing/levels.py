@@ -59,10 +59,10 @@ class Levels:
         try:
             seconds = min([MATCHED_S, *(voice.rendered_s for voice in note.ahead)])  # a pluck may be shorter
             levels = {source: self._level(note, source, seconds, rate_hz) for source in note.voices}
-            gains = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         finally:
             with self._lock:
                 self._waiting.discard(key)
+        gains = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         with self._lock:
             self._known[key] = gains
             while len(self._known) > KEPT_MATCHES:

@@ -91,16 +91,6 @@ class RtMidi:
                 raise
             return RtMidiInput(client, name, callback)
 
-    def virtual_output(self, name: str) -> Any:
-        """An output that other programs find as an input: the library's `MidiOut`. Raises OSError."""
-        with self._faults():
-            output = self._library.MidiOut(self._api, CLIENT)
-            try:
-                return output.open_virtual_port(name)
-            except BaseException:
-                output.delete()
-                raise
-
     def _client(self) -> Any:
         return self._library.MidiIn(self._api, CLIENT, QUEUE_MESSAGES)
 

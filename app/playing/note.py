@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from app.playing.ahead import AheadVoice
 from app.rendering import RenderRequest
@@ -12,44 +13,43 @@ from engine.kernels.constants import QUANTUM
 from engine.voices import Mixer, Voice
 
 
+@dataclass(eq=False)
 class PluckVoices:
     """A note whose voices begin with the same frame, so that a switch between them stays in time.
 
-    Args:
+    Attributes:
         request: the string, how it is plucked, where it is heard, and other presets for the same pluck.
         sources: those that get a voice: "model", "truth", and `OTHER` + the name of another preset.
         from_s: where in its motion it begins.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
-
-    Attributes:
+        struck_s: the time of its gesture by the sound's clock; 0: it is none.
         voices: by source.
         ahead: those of its voices that are rendered ahead.
         match: by source, the factor that brings it to the level of the truth; None until it is known.
         pending: it was not handed to a mixer yet.
+        handed_over: it was, or is about to be.
         released: whether it was asked to fade out.
         mixer: to which it was handed, or whose frame it waits for.
         cut: it is not heard any more: its mixer was replaced, or it could not be played.
+        timed: its latency has been noted.
+        ahead_of_event: it was handed over before its event is due, and may be cancelled until then.
     """
 
-    def __init__(
-        self,
-        request: RenderRequest,
-        sources: tuple[str, ...],
-        from_s: float = 0.0,
-        begin_frame: int = 0,
-    ) -> None:
-        self.request, self.sources = request, sources
-        self.from_s, self.begin_frame = from_s, begin_frame
-        self.voices: dict[str, Voice] = {}
-        self.match: Mapping[str, float] | None = None
-        self.ahead: list[AheadVoice] = []
-        self.pending = True
-        self.handed_over = False  # or about to be
-        self.released = False
-        self.mixer: Mixer | None = None
-        self.cut = False
-        self.timed = False  # its latency has been noted
-        self.ahead_of_event = False  # it was handed over before its event is due, and may be cancelled until then
+    request: RenderRequest
+    sources: tuple[str, ...]
+    from_s: float = 0.0
+    begin_frame: int = 0
+    struck_s: float = 0.0
+    voices: dict[str, Voice] = field(default_factory=dict)
+    ahead: list[AheadVoice] = field(default_factory=list)
+    match: Mapping[str, float] | None = None
+    mixer: Mixer | None = None
+    pending: bool = True
+    handed_over: bool = False
+    released: bool = False
+    cut: bool = False
+    timed: bool = False
+    ahead_of_event: bool = False
 
     def subject(self, source: str) -> Subject:
         """The preset or string whose sound a source is."""
@@ -108,10 +108,10 @@ class PluckVoices:
         starved_s = min(voice.starved_s for voice in self.voices.values())
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
-    def set_begin(self, struck_s: float) -> None:
-        """Give its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+    def set_begin(self) -> None:
+        """Give its voices the time of their gesture, and the frame they begin at."""
         for voice in self.voices.values():
-            voice.set_struck(struck_s)
+            voice.set_struck(self.struck_s)
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:

@@ -15,21 +15,18 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
-from app.playing.dropping import drop
-from app.playing.due import Due
-from app.playing.key_note import SOURCES, KeyNote
+from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
 from app.playing.levels import Levels
 from app.playing.note import PluckVoices
+from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
@@ -40,7 +37,6 @@ from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
 from engine.pluck import Pluck
-from engine.presets import PresetError
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 
@@ -89,7 +85,6 @@ class Notes:
         self._lock = threading.RLock()
         self._notes: list[PluckVoices | KeyNote] = []
         self._monitor = Monitor()
-        self._compared = True
         self._ear: Ear | None = None
         self.latest: PluckVoices | KeyNote | None = None
         self._chosen: RenderRequest | None = None
@@ -103,22 +98,21 @@ class Notes:
         self._levels = Levels(sources, self.in_background)
         self._closed = False
         self._wished_plucks: object = None
-        self.keys = Keys(sources, self._path_of, lambda: sound.mixer, self.in_background, report, set_effects)
+        self.keys = Keys(sources, find, lambda: sound.mixer, self.in_background, report, set_effects)
         self._set_gains_of_keys()
         sound.watch(self._bound_load)
 
     # What is played
 
-    def set_instrument(self, instrument: Instrument, ear: Ear, patch: Patch | None = None) -> None:
+    def set_instrument(self, patch: Patch | None, ear: Ear, single: str | None = None) -> None:
         """Set what events play from now on, and where all notes are heard.
 
         Args:
-            patch: one that is loaded while a single string is played, so that its keys sound at once when it is.
-                Its notes fade out, so that the string is heard by itself.
+            single: the preset whose string is played by itself: notes of the patch fade out. The patch is loaded all
+                the same, so that its keys sound at once when it is played.
         """
-        single = isinstance(instrument, SingleString)
-        entry = self._find(instrument.preset) if single else None
-        reach = PluckRange.of(entry.info if entry is not None else None) if single else None
+        entry = None if single is None else self._find(single)
+        reach = None if single is None else PluckRange.of(entry.info if entry is not None else None)
         with self._lock:
             plucked_before = self._reach is not None
             self._reach = reach
@@ -126,9 +120,9 @@ class Notes:
             request = self._chosen
             if request is not None and entry is not None and path_of(request.preset) != entry.path:
                 self._chosen = replace(request, preset=entry.path)
-        if single and not plucked_before:
+        if single is not None and not plucked_before:
             self.keys.stop(REPLACED_S)
-        self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
+        self.keys.set_patch(patch, ear)
         self._hear_effects()
 
     def listen(self, ear: Ear) -> None:
@@ -151,10 +145,10 @@ class Notes:
             compared: whether keys that are struck from now on can be switched to another source while they ring.
         """
         with self._lock:
-            self._monitor, self._compared = monitor, compared
+            self._monitor = monitor
             notes = self._plucks()
             self._do_for_each(notes, self._apply_monitor)
-        self._set_gains_of_keys()
+        self._set_gains_of_keys(compared)
         for note in notes:
             if not note.pending and not note.over:
                 self._ask_match(note)
@@ -189,11 +183,12 @@ class Notes:
             self.latest = begun or self.latest
             return begun
         with self._lock:
-            if self._chosen is None:
-                return None
-            chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
-        frame = 0 if due is None else due.frame_in(self._sound.mixer)
-        self.latest = note = self._ring_pluck(chosen, 0.0, frame, struck_s, due is not None)
+            if self._chosen is not None:
+                self._chosen = replace(self._chosen, pluck=placed.pluck)
+            note = self._chosen_note(begin_frame=0 if due is None else due.frame_in(self._sound.mixer))
+        if note is not None:
+            note.struck_s, note.ahead_of_event = struck_s, due is not None
+            self.latest = self._ring(note)
         return note
 
     def _as_pluck(self, event: Event) -> Event:
@@ -215,20 +210,18 @@ class Notes:
         """
         if alone:
             self.stop(REPLACED_S)
-        return None if self._chosen is None else self._ring_pluck(self._chosen, from_s, begin_frame)
+        note = self._chosen_note(from_s, begin_frame)
+        return None if note is None else self._ring(note)
 
-    def _ring_pluck(
-        self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
-    ) -> PluckVoices:
+    def _ring(self, note: PluckVoices) -> PluckVoices:
         """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
-        note = PluckVoices(chosen, self._voices_of(chosen), from_s, begin_frame)
-        note.ahead_of_event, loaded = waits, self._is_loaded(note)
-        if begin_frame:
+        loaded = self._is_loaded(note)
+        if note.begin_frame:
             note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
             self._notes.append(note)
-        begin = partial(self._begin, note, struck_s)
-        if from_s > 0 or not loaded:
+        begin = partial(self._begin, note)
+        if note.from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
             self._wrap_errors(begin, note)()
@@ -276,9 +269,8 @@ class Notes:
     @property
     def at_hand(self) -> bool:
         """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
-        with self._lock:
-            chosen = self._chosen
-            return chosen is not None and self._is_loaded(PluckVoices(chosen, self._voices_of(chosen)))
+        note = self._chosen_note()
+        return note is not None and self._is_loaded(note)
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
@@ -319,9 +311,8 @@ class Notes:
     @property
     def match(self) -> Mapping[str, float] | None:
         """The factor by source that brings the chosen pluck to the level of the truth. None: not known yet."""
-        with self._lock:
-            chosen = self._chosen
-            return None if chosen is None else self._levels.of(PluckVoices(chosen, self._voices_of(chosen)))
+        note = self._chosen_note()
+        return None if note is None else self._levels.of(note)
 
     @property
     def ringing(self) -> int:
@@ -378,10 +369,9 @@ class Notes:
             for voice in note.voices.values():
                 voice.listen(self._ear)
 
-    def _set_gains_of_keys(self) -> None:
+    def _set_gains_of_keys(self, compared: bool = True) -> None:
         """Set which sources of keys are heard; both are of one string, whose levels match as they are."""
-        gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
-        self.keys.set_gains(gains, self._compared)
+        self.keys.set_gains({source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}, compared)
 
     def _plucks(self) -> list[PluckVoices]:
         """The notes whose voices are made here."""
@@ -399,14 +389,13 @@ class Notes:
                     continue
                 self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
 
-    def _path_of(self, preset: str) -> Path | None:
-        entry = self._find(preset)
-        return None if entry is None else entry.path
-
-    def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
-        """The sources that get a voice: what the monitor holds, without presets that are not here."""
-        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
-        return tuple(source for source in self._monitor.voices if source in available) or ("model",)
+    def _chosen_note(self, from_s: float = 0.0, begin_frame: int = 0) -> PluckVoices | None:
+        """A note of the chosen pluck, with voices of what the monitor holds, without presets that are not here."""
+        if (chosen := self._chosen) is None:
+            return None
+        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in chosen.others)}
+        sources = tuple(source for source in self._monitor.voices if source in available) or ("model",)
+        return PluckVoices(chosen, sources, from_s, begin_frame)
 
     def _is_loaded(self, note: PluckVoices) -> bool:
         """Return True if nothing needs to be loaded for it."""
@@ -420,7 +409,7 @@ class Notes:
             try:
                 work()
                 return
-            except (PresetError, ValueError) as error:
+            except ValueError as error:
                 self._report(str(error), "")
             except Exception as error:
                 self._report(f"This pluck cannot be played: {error}", traceback.format_exc())
@@ -436,11 +425,8 @@ class Notes:
         plucks = [note for note in left if isinstance(note, PluckVoices) and note.seconds and not note.released]
         for note in left:
             if isinstance(note, PluckVoices) and note in plucks[-MOST_CARRIED:]:
-                note.from_s = note.seconds
-                note.begin_frame = 0
-                note.mixer = None
-                note.pending, note.handed_over = True, False
-                self.in_background(partial(self._begin, note, 0.0), note)
+                note.from_s, note.struck_s = note.seconds, 0.0
+                self._begin_again(note)
             else:
                 note.end()
 
@@ -450,27 +436,16 @@ class Notes:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
 
-    def _begin(self, note: PluckVoices, struck_s: float) -> None:
-        """Make the voices and hand them over; again where the device changes its rate meanwhile."""
-        for _ in range(3):
-            mixer = self._sound.mixer
-            self._make_voices(note, mixer.rate_hz, struck_s)
-            note.set_begin(struck_s)
-            if note.ahead:
-                for voice in note.ahead:
-                    self._ahead.render(voice)
-                return
-            self._skip(note)
-            if self._hand_over(note, mixer):
-                return
-            note.begin_frame = 0  # another mixer counts again
+    def _begin(self, note: PluckVoices) -> None:
+        """Make the voices and hand them over, at once or when those that are rendered ahead are far enough."""
+        self._make_voices(note, self._sound.mixer.rate_hz)
+        note.set_begin()
+        for voice in note.ahead:
+            self._ahead.render(voice)
+        if not note.ahead:
+            self._hand_over(note)
 
-    def _skip(self, note: PluckVoices) -> None:
-        if note.from_s > 0:
-            for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
-
-    def _make_voices(self, note: PluckVoices, rate_hz: int, struck_s: float) -> None:
+    def _make_voices(self, note: PluckVoices, rate_hz: int) -> None:
         request, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
         for source in note.sources:
@@ -479,7 +454,7 @@ class Notes:
                 program = self._sources.program(subject, source, rate_hz)
                 initial_m, begin = self._sources.begin(subject, source, rate_hz, request.pluck)
                 model = self._sources.load(subject).model if program.rendered else None
-            except (PresetError, ValueError):
+            except ValueError:
                 if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why
@@ -497,7 +472,7 @@ class Notes:
                     initial_m,
                     program.grid_weights(request.ear),
                     (subject, request.pluck, request.ear, request.seconds),
-                    lambda: self._hand_over_rendered(note, ahead, struck_s),
+                    lambda: self._hand_over_rendered(note, ahead),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
                     note.from_s,
@@ -505,38 +480,43 @@ class Notes:
             )
         note.ahead, note.voices = ahead, voices
 
-    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice], struck_s: float) -> None:
+    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice]) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
                 return
             note.handed_over = True  # or two that are ready at the same time would both do it
-        self._skip(note)
-        if not self._hand_over(note, self._sound.mixer):
-            note.handed_over, note.begin_frame = False, 0
-            self.in_background(partial(self._begin, note, struck_s), note)
+        self._hand_over(note)
 
     def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
         note.cut = True
         self._report(f"This pluck cannot be rendered: {error}", "")
 
-    def _hand_over(self, note: PluckVoices, mixer: Mixer) -> bool:
-        """Hand a note over to a mixer; return False where the device has another mixer by now."""
+    def _hand_over(self, note: PluckVoices) -> None:
+        """Hand a note over to the mixer; begin it again where the device has one of another rate or frame by now."""
+        if note.from_s > 0:
+            for voice in note.voices.values():
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
         with self._lock:
+            mixer = self._sound.mixer
             if note.over:
-                return True
-            if mixer is not self._sound.mixer:
-                return False
+                return
             note.match = self._levels.of(note)
             self._apply_monitor(note, at_once=note.from_s == 0)
-            try:
-                mixer.add(*note.voices.values())
-            except ValueError:
-                return False
+            rates_hz = {voice.program.rate_hz for voice in note.voices.values()}
+            if rates_hz - {mixer.rate_hz} or note.mixer not in (None, mixer):
+                self._begin_again(note)
+                return
+            mixer.add(*note.voices.values())
             note.mixer, note.pending = mixer, False
             self._make_room(MOST_NOTES)
         self._ask_match(note)
-        return True
+
+    def _begin_again(self, note: PluckVoices) -> None:
+        """Begin a note in another mixer, which counts its own frames."""
+        note.pending, note.handed_over = True, False
+        note.begin_frame, note.mixer = 0, None
+        self.in_background(partial(self._begin, note), note)
 
     def _bound_load(self, status: SoundStatus) -> None:
         """End the oldest notes where the device has no time for all. In the caretaker's thread of the sound.

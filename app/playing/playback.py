@@ -5,15 +5,34 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.instrument.events import Event, TimedEvent, channels_in, release_all
-from app.playing.due import Due
 from engine.voices import Mixer
 
 AHEAD_S = 0.05  # lead of a handed-over event, besides the device's buffer: so late the thread may be
 LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
 JOIN_S = 2.0
+
+
+@dataclass(frozen=True)
+class Due:
+    """The time of an event that is handed over before it: a frame of a mixer.
+
+    Where another mixer has taken its place, the event counts at once.
+
+    Attributes:
+        time_s: the same on the clock of `time.monotonic`, in s.
+    """
+
+    mixer: Mixer
+    frame: int
+    time_s: float
+
+    def frame_in(self, mixer: Mixer) -> int:
+        """The frame of this mixer; 0, at once, where it is another."""
+        return self.frame if mixer is self.mixer else 0
 
 
 class Clock(Protocol):

@@ -64,14 +64,12 @@ class EventRecorder:
         with self._lock:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
-                self._recorded, self._unfetched = (
-                    [
-                        timed_event
-                        for timed_event in part
-                        if timed_event.time_s <= played_s or (event is not None and timed_event.event != event)
+                for part in (self._recorded, self._unfetched):
+                    part[:] = [
+                        entry
+                        for entry in part
+                        if entry.time_s <= played_s or (event is not None and entry.event != event)
                     ]
-                    for part in (self._recorded, self._unfetched)
-                )
 
     def end(self) -> list[TimedEvent]:
         """End the recording; return events as `played_from` has them. Those not fetched yet can be, up to here."""

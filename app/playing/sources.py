@@ -33,13 +33,13 @@ class Sources:
         self._lock = threading.Lock()  # of the dictionaries, for a moment
         self._loading = threading.RLock()  # one load after the other
         self._presets: OrderedDict[Subject, Loaded] = OrderedDict()
-        self._programs: dict[tuple[Subject, str, int], Program] = {}
         self._kept_begin = lru_cache(maxsize=KEPT_PLUCKS)(self._begin)
 
     def has(self, subject: Subject, rate_hz: int) -> bool:
         """Return True if it is loaded with both programs at this rate, so that a strike would not wait."""
         with self._lock:
-            return subject in self._presets and all((subject, kind, rate_hz) in self._programs for kind in KINDS)
+            loaded = self._presets.get(subject)
+        return loaded is not None and all((kind, rate_hz) in loaded.programs for kind in KINDS)
 
     def load(self, subject: Subject) -> Loaded:
         """The preset, or a string of it, from memory or from its file. Raises PresetError."""
@@ -50,8 +50,7 @@ class Sources:
             with self._lock:
                 self._presets[subject] = loaded
                 while len(self._presets) > KEPT_PRESETS:
-                    oldest, _ = self._presets.popitem(last=False)
-                    self._programs = {key: program for key, program in self._programs.items() if key[0] != oldest}
+                    self._presets.popitem(last=False)
             return loaded
 
     def _read(self, subject: Subject) -> Preset:
@@ -65,16 +64,14 @@ class Sources:
         Args:
             rate_hz: of the device.
         """
-        kind = "truth" if source == "truth" else "model"
-        key = (subject, kind, rate_hz)
-        if (program := self._programs.get(key)) is not None:
+        kind, loaded = "truth" if source == "truth" else "model", self.load(subject)
+        if (program := loaded.programs.get((kind, rate_hz))) is not None:
             return program
         with self._loading:
-            preset = self.load(subject).preset
-            if (program := self._programs.get(key)) is None:
+            preset = loaded.preset
+            if (program := loaded.programs.get((kind, rate_hz))) is None:
                 program = truth_program(preset.info, rate_hz) if kind == "truth" else model_program(preset, rate_hz)
-                with self._lock:
-                    self._programs[key] = program
+                loaded.programs[kind, rate_hz] = program
             return program
 
     def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Array, tuple[Array, Array]]:

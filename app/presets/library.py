@@ -11,6 +11,7 @@ from pathlib import Path
 from psygnal import Signal
 
 from app.presets.words import model_word
+from app.shared.user_files import read_all
 from engine.folders import user_folder
 from engine.plain_text import name_text, one_line
 from engine.presets import (
@@ -117,28 +118,19 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     Args:
         folders: by default the shipped one and the user's; of two presets of one name, that of the earlier folder.
     """
-    entries: dict[str, PresetEntry] = {}
     folders = folders or (SHIPPED, user_folder())
     tables = [read_heard(folder) for folder in folders]
     records = {digest: by_digest for table, _ in tables for digest, by_digest in table.items()}
     problems = [problem for _, table_problems in tables for problem in table_problems]
-    for folder in folders:
-        problems += [problem] if (problem := unreadable(folder)) else []
-        for path in preset_files(folder):
-            try:
-                name = name_text(path.stem)
-                if name in entries:
-                    problems.append(f"{path}: a preset of this name exists already; rename the file to use it")
-                    continue
-                state = path.stat()
-                entry = _read_entry(path, state.st_mtime_ns, state.st_size)
-                entries[name] = replace(entry, heard=records.get(preset_digest(path))) if records else entry
-            except PresetError as error:
-                problems.append(str(error))
-            except OSError as error:  # such as a file that was deleted meanwhile
-                problems.append(f"{path}: cannot be read ({error.strerror})")
-            except Exception as error:  # no fault of one file may keep the others from being listed
-                problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
+
+    def read(path: Path) -> PresetEntry:
+        state = path.stat()
+        entry = _read_entry(path, state.st_mtime_ns, state.st_size)
+        return replace(entry, heard=records.get(preset_digest(path))) if records else entry
+
+    files = [path for folder in folders for path in preset_files(folder)]
+    entries, of_files = read_all(files, read, PresetError, "a preset")
+    problems += [*filter(None, map(unreadable, folders)), *of_files]
     models = Counter(title for title, _ in {(entry.title, entry.info.model) for entry in entries.values()})
     for name, entry in entries.items():
         if models[entry.title] > 1:  # two models of one string

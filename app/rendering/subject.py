@@ -56,6 +56,7 @@ class Loaded:
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
+        self.programs: dict[tuple[str, int], Program] = {}  # by kind, model or truth, and rate of a device
 
     @cached_property
     def model(self) -> ModelSource:

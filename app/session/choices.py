@@ -13,7 +13,6 @@ from pydantic import Field, ValidationError, model_validator
 
 from app.patches.drums import Drums
 from app.patches.fields import String, parameter
-from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.session.listener import Listener, points_of
 from app.session.monitor import Monitor
@@ -48,15 +47,15 @@ class Choices(Monitor, Listener, ShownString):
     """The choices that are restored at the next start.
 
     Attributes:
-        instrument: what is played.
-        kept: the patch that is there, while a single string is played.
+        patch: the instrument that is there, played or not; None: there is none.
+        single: the name of the preset whose string is played instead, at places along it; None: the patch is played.
         seconds: how long the pluck is rendered.
         octave: by how many octaves the computer's keys are transposed.
         velocity: with which the computer's keys are struck, as in MIDI.
     """
 
-    instrument: Instrument = SingleString()
-    kept: Patch | None = None
+    patch: Patch | None = None
+    single: str | None = ""
     seconds: float = parameter("seconds")
     loop: bool = False
     volume_db: float = parameter("volume_db")
@@ -76,24 +75,23 @@ class Choices(Monitor, Listener, ShownString):
 
     @property
     def preset(self) -> str:
-        """The name of the instrument's preset; "": none."""
-        return self.instrument.preset
+        """The name of the preset that is played; "": none."""
+        return self.single or (self.instrument.preset if self.instrument else "")
 
     @property
-    def patch(self) -> Patch | None:
-        """The patch that is there, played or not."""
-        return self.instrument if isinstance(self.instrument, Patch) else self.kept
+    def instrument(self) -> Patch | None:
+        """The patch, if it is played: keys are pitches. None: they are places along a single string."""
+        return self.patch if self.single is None else None
 
     @property
     def plays_patch(self) -> bool:
-        """Return True if the instrument is a patch, whose keys are pitches; else keys are places along a string."""
-        return isinstance(self.instrument, Patch)
+        """Return True if the patch is played."""
+        return self.instrument is not None
 
     @property
     def drums(self) -> Drums | None:
         """The drums that are played; None: a string or an instrument of strings is."""
-        patch = self.instrument
-        return patch.strings if isinstance(patch, Patch) and isinstance(patch.strings, Drums) else None
+        return self.instrument.strings if self.instrument and isinstance(self.instrument.strings, Drums) else None
 
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """Copy these choices with other values: the one way to change them.
@@ -101,60 +99,52 @@ class Choices(Monitor, Listener, ShownString):
         Another preset resets `string`, unless given.
 
         Args:
-            changes: fields. Also `preset`, the name of one whose single string becomes the instrument, and `patch`,
-                which replaces the present one, played or not.
+            changes: fields. Also `preset`, the name of one whose single string is played from now on, and
+                `instrument`, a patch that is.
 
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
         """
         changes = dict(changes)
+        if "instrument" in changes:
+            changes |= {"patch": changes.pop("instrument"), "single": None}
         if "preset" in changes:
-            changes["instrument"] = SingleString(preset=changes.pop("preset"))
-        if "patch" in changes:
-            changes["instrument" if self.plays_patch else "kept"] = changes.pop("patch")
-        elif self.plays_patch and "instrument" in changes:
-            changes.setdefault("kept", self.instrument)
-        try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
-            checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
+            changes["single"] = changes.pop("preset")
+        try:  # `a`, `b` and `single` tell them from old choices
+            checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
         choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
-        follow: dict[str, Any] = {"kept": None} if choices.plays_patch else {}
         if choices.preset != self.preset and "string" not in changes:
-            follow["string"] = None
-        return _with_one_pickup(choices.model_copy(update=follow), changes)
+            choices = choices.model_copy(update={"string": None})
+        return _with_one_pickup(choices, changes)
 
 
-OBSERVED = (*Choices.model_fields, "preset", "patch")  # names that `Session.changed` carries
+OBSERVED = (*Choices.model_fields, "preset")  # names that `Session.changed` carries
 
 
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
-    """The fields of these choices, read from those of an earlier version."""
-    return _with_instrument(_without_slots(data))
+    """The fields of these choices, read from those of earlier versions.
 
-
-def _without_slots(data: dict[str, Any]) -> dict[str, Any]:
-    """Convert choices from before there were slots, when `heard` named the source itself."""
-    if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
-        return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
-    return data
-
-
-def _with_instrument(data: dict[str, Any]) -> dict[str, Any]:
-    """Convert choices from before there were instruments.
-
-    Then `keys_play` said if `patch` was played or the string of `preset`.
+    Before there were slots, `heard` named the source itself. `instrument` was a patch, or a preset alone with `kept`
+    as the patch beside it. Before that, `keys_play` said if `patch` was played or the string of `preset`.
     """
-    old = {name: data[name] for name in ("preset", "patch", "keys_play") if name in data}
-    if not old or "instrument" in data:
-        return data
-    rest = {name: value for name, value in data.items() if name not in old}
-    preset, patch = old.get("preset", ""), old.get("patch")
-    if patch is None or old.get("keys_play", "pitch") == "place":
-        return {**rest, "instrument": {"preset": preset}, "kept": patch}
-    model = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
-    string = rest.pop("string", None)
-    return {**rest, "instrument": patch, "string": string if preset in ("", model) else None}
+    data = dict(data)
+    if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
+        data |= {"a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
+    if "instrument" in data:
+        instrument, kept = data.pop("instrument"), data.pop("kept", None)
+        if isinstance(instrument, dict) and not instrument.keys() - {"preset"}:
+            data |= {"patch": kept, "single": instrument.get("preset", "")}
+        else:
+            data |= {"patch": instrument, "single": None}
+    elif "single" not in data and data.keys() & {"preset", "patch", "keys_play"}:
+        preset, place, patch = data.pop("preset", ""), data.pop("keys_play", "") == "place", data.get("patch")
+        data["single"] = preset if patch is None or place else None
+        model = patch.get("preset", Patch.model_fields["preset"].default) if isinstance(patch, dict) else preset
+        if data["single"] is None and preset not in ("", model):
+            data["string"] = None  # it is of another preset
+    return data
 
 
 class Session:
@@ -185,7 +175,7 @@ class Session:
         """
         patch = self._choices.patch
         if patch is not None and changes.get("preset") == patch.preset:
-            changes = {"instrument": patch, **changes}
+            changes = {**changes, "single": None}
             del changes["preset"]
         if names := self._take(changes):
             self.changed.emit(names)
@@ -203,13 +193,13 @@ class Session:
 
     def play_patch(self) -> None:
         """Make the patch that is there the instrument: keys are pitches."""
-        if (patch := self._choices.patch) is not None:
-            self.update(instrument=patch)
+        if self._choices.patch is not None:
+            self.update(single=None)
 
     def play_string(self) -> None:
         """Make the string that is shown the instrument: keys are places along it."""
         choices = self._choices
-        self.update(instrument=SingleString(preset=choices.preset), string=choices.string)
+        self.update(single=choices.preset, string=choices.string)
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Take the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
@@ -237,8 +227,9 @@ def _with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
         ValueError: the patch cannot be heard so.
     """
     patch = choices.instrument
-    if not isinstance(patch, Patch):
+    if patch is None:
         return choices
-    if "instrument" not in asked and any(name in asked for name in Listener.model_fields if name != "solo"):
-        return choices.model_copy(update={"instrument": choices.picked_up(patch)})
+    chosen = "patch" in asked or "single" in asked
+    if not chosen and any(name in asked for name in Listener.model_fields if name != "solo"):
+        return choices.model_copy(update={"patch": choices.picked_up(patch)})
     return choices.model_copy(update=points_of(patch.pickup))

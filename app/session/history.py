@@ -17,7 +17,7 @@ from app.session.listener import Listener
 from app.session.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset({"instrument", "kept", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
+RECORDED = frozenset({"patch", "single", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
@@ -48,20 +48,20 @@ class History:
         self._held = self._restoring = False
         self._open_fields: frozenset[str] | None = None  # of the step that still gathers; None: the next is a new one
         self._changed_s = 0.0
-        session.played.connect(self._choices_played)
+        session.played.connect(self._take_played)
         session.changed.connect(self._choices_changed)
 
     @property
     def undo_words(self) -> str:
         """The step that `undo` would take back, in words; "" where there is nothing."""
-        step = self._next(self._undo)
-        return "" if step is None else step_words(step, {name: self._present[name] for name in step})
+        step = self._next(self._undo) or {}
+        return step_words(step, {name: self._present[name] for name in step})
 
     @property
     def redo_words(self) -> str:
         """The step that `redo` would do again, in words; "" where there is nothing."""
-        step = self._next(self._redo)
-        return "" if step is None else step_words({name: self._present[name] for name in step}, step)
+        step = self._next(self._redo) or {}
+        return step_words({name: self._present[name] for name in step}, step)
 
     def _next(self, steps: Sequence[Values]) -> Values | None:
         """The last step that would change something: a drag that came back to its start does not."""
@@ -101,7 +101,7 @@ class History:
             followed = {name for name, value in self._present.items() if value != before[name]}
             target.append({name: before[name] for name in {*step, *followed}})
 
-    def _choices_played(self, _: frozenset[str]) -> None:
+    def _take_played(self, _: frozenset[str]) -> None:
         self._present = _recorded(self._session.choices)
 
     def _choices_changed(self, names: frozenset[str]) -> None:
@@ -116,6 +116,7 @@ class History:
         if self._open_fields is None or not (self._held or soon):
             self._undo.append({})
         step = self._undo[-1]
+        fields |= {"patch"} if "single" in fields else set()  # for the step's words
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from app.patches.fields import parameter
 from app.patches.patch import Patch, Pickup
-from app.shared.parameters import OF_CHOICES
 from app.shared.value import Value
 from engine.values.ear import Ear
 from engine.values.ear import Pickup as PickupKind
@@ -23,8 +23,8 @@ class Listener(Value):
         solo: above 0: this mode is heard alone.
     """
 
-    listen: float = Field(OF_CHOICES["listen"].default, ge=0, le=1)
-    listen_right: float = Field(OF_CHOICES["listen_right"].default, ge=0, le=1)
+    listen: float = parameter("listen")
+    listen_right: float = parameter("listen_right")
     stereo: bool = False
     pickup: PickupKind = "displacement"
     solo: int = Field(0, ge=0, le=HIGHEST_MODE)

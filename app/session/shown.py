@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from app.presets.library import Library
@@ -52,14 +51,14 @@ DEFAULT_SOURCES = (ShownSource("model", "A", "model", heard=True), ShownSource("
 
 def shown_sources(choices: Choices, library: Library) -> tuple[ShownSource, ...]:
     """The source in slot A and the one in slot B; one alone where both hold the same."""
-    return tuple(_sources(choices, library))
-
-
-def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
-    for source in dict.fromkeys((choices.a, choices.b)):
-        slots = " ".join(letter for letter, slot in (("A", choices.a), ("B", choices.b)) if slot == source)
-        gain_db = choices.difference_gain_db if source == DIFFERENCE else 0.0
-        yield ShownSource(source, slots, source_title(source, library), source == choices.source_heard, gain_db)
+    slots = {choices.a: "A B"} if choices.a == choices.b else {choices.a: "A", choices.b: "B"}
+    gains_db = {DIFFERENCE: choices.difference_gain_db}
+    return tuple(
+        ShownSource(
+            source, letters, source_title(source, library), source == choices.source_heard, gains_db.get(source, 0.0)
+        )
+        for source, letters in slots.items()
+    )
 
 
 def part_words(choices: Choices) -> str:

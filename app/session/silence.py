@@ -33,14 +33,11 @@ def why_ran_away(take: Take) -> str:
     """The time when a take's model was silenced, because its output grew without bound, and the remedy."""
     if take.model_ends_s is None:
         return ""
-    title, outside = take.info.title, "; ".join(outside_training(take.info, take.pluck))
-    if take.model_ends_s < AT_ONCE_S:
-        what = f"The model of {title} cannot play this pluck and is silent: its output grows without bound at once."
-    else:
-        what = (
-            f"The output of the model of {title} grew without bound {take.model_ends_s:.2f} s after the "
-            "pluck; it is silent from there."
-        )
+    model, outside = f"model of {take.info.title}", "; ".join(outside_training(take.info, take.pluck))
+    what = f"The {model} cannot play this pluck and is silent: its output grows without bound at once."
+    if take.model_ends_s >= AT_ONCE_S:
+        when = f"{take.model_ends_s:.2f} s after the pluck"
+        what = f"The output of the {model} grew without bound {when}; it is silent from there."
     if outside:
         return f"{what} It was not trained for such plucks ({outside}). Choose one inside it; the truth plays."
     return f"{what} Choose another pluck or another preset; the truth plays."
@@ -63,16 +60,15 @@ def why_difference_silent(choices: Choices, take: Take) -> str:
 
 def _why_points_silent(choices: Choices) -> str:
     ear = choices.ear
-    ends = [point in (0.0, 1.0) for point in ear.points]
-    nodes = [ear.is_on_node(point) for point in ear.points]
-    if not any(nodes):
+    silent_points = [point for point in ear.points if ear.is_on_node(point)]
+    if not silent_points:
         return ""
-    place = "a fixed end" if all(ends[i] for i, node in enumerate(nodes) if node) else f"a node of mode {ear.solo}"
+    place = "a fixed end" if all(point in (0.0, 1.0) for point in silent_points) else f"a node of mode {ear.solo}"
     if not choices.stereo:
         return f"silent: the listening point is at {place}"
-    if all(nodes):
+    if len(silent_points) == 2:
         return f"silent: both listening points are at {place}"
-    return f"{'left' if nodes[0] else 'right'} silent: its listening point is at {place}"
+    return f"{'left' if ear.is_on_node(choices.listen) else 'right'} silent: its listening point is at {place}"
 
 
 def _why_solo_silent(choices: Choices, library: Library) -> str:

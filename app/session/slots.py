@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
+from app.instrument.effects import added_words
 from app.presets.library import Library, PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
-from app.shared.vocabulary import OTHER
+from app.shared.vocabulary import DIFFERENCE, OTHER
 from engine.presets import PresetInfo
 from engine.presets.of_string import info_of_string
 
@@ -58,3 +59,19 @@ def request_of(choices: Choices, library: Library) -> RenderRequest | None:
     paths = tuple(other.path for other in others if other is not None)
     subject = subject_of(choices, entry.path)
     return RenderRequest(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)
+
+
+def through_words(choices: Choices) -> tuple[str, ...]:
+    """The instrument that keys sound through, in words, the longest wording first.
+
+    A string that sounds alone has one empty text.
+    """
+    patch = choices.instrument
+    if patch is None:
+        return ("",)
+    name = f"heard through {patch.name}"
+    if any(other_preset(voice) for voice in choices.voices):
+        return f"keys are {name}, a string plucked by hand alone", f"keys {name}"
+    if choices.source_heard == DIFFERENCE:
+        return f"{name} without amplifier, body and room", name
+    return f"{name}: {added_words(patch)}", name

@@ -46,33 +46,24 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         before, after: the same fields of `Choices` with their values before and after the step.
     """
     changed = [name for name in after if before[name] != after[name]]
-    if "instrument" in changed:
-        old, new = before["instrument"], after["instrument"]
-        if not isinstance(new, Patch):
-            return f"preset {new.preset}"
-        if not isinstance(old, Patch):
-            return f"instrument {new.name}"
-        return _pickup_words(changed, old, new) or _patch_words(old, new)
-    if "kept" in changed:
-        return _patch_words(before["kept"], after["kept"])
+    if "single" in changed:
+        return _patch_words(None, after["patch"]) if after["single"] is None else f"preset {after['single']}"
+    if "patch" in changed:
+        old, new = before["patch"], after["patch"]
+        heard = [CHOICES[name] for name in changed if name in Listener.model_fields]
+        if heard and old is not None and new is not None and set(_changed(old, new)) <= PICKUP:
+            return _join_words(heard)
+        return _patch_words(old, new)
     return _join_words([words for name, words in CHOICES.items() if name in changed])
 
 
 def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
     """The changed fields: `names` of `Choices` and, of a patch that has kept its name, its own as "patch.PATH"."""
     changed_names = set(names)
-    for field in ("instrument", "kept"):
-        old, new = before.get(field), after.get(field)
-        if field in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
-            changed_names |= {f"patch.{path}" for path in _changed(old, new)}
+    old, new = before.get("patch"), after.get("patch")
+    if "patch" in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
+        changed_names |= {f"patch.{path}" for path in _changed(old, new)}
     return frozenset(changed_names)
-
-
-def _pickup_words(changed: list[str], before: Patch, after: Patch) -> str:
-    """The change of where and how the patch is heard, if nothing else of it has changed; else ""."""
-    if not set(_changed(before, after)) <= PICKUP:
-        return ""
-    return _join_words([CHOICES[name] for name in changed if name in Listener.model_fields])
 
 
 def _patch_words(before: Patch | None, after: Patch | None) -> str:

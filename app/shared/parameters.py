@@ -54,13 +54,17 @@ class Taper:
 
 
 TIMES = Taper(1.03, "× {:.2f}", True)
-MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
+MM, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
 DECIBELS = Taper(0.5, "{:+.1f} dB")
 CONTACT = Taper(0.02, "{:.2f} ms", curve=400.0)
 MUTED = Taper(0.02, "{:.1%}", curve=40.0)  # by each tenth of the way the T60 of a guitar's string shrinks by a third
 PLACE = Taper(0.01)
 WIDTH = Taper(1.05, "{:.3f}", True)
 PERCENT = Taper(0.02, "{:.0%}")
+COUNT = Taper(1, "{:.0f}")
+CONCERT_PITCH = Taper(2 ** (1 / 1200), "{:.1f} Hz", True)
+CENTS = Taper(1, "{:.0f} cents")
+SPEED, HERTZ = Taper(1.25, "× {:.3f}", True), Taper(1.05, "{:.1f} Hz", True)
 
 
 @dataclass(frozen=True)
@@ -234,197 +238,111 @@ TIPS = {
 
 
 def _knob(
-    part: str,
-    label: str,
-    limits: tuple[float, float],
-    figure_unit: str,
-    *,
-    name: str = "",
-    wheel_factor: float = 4.0,
+    part: str, label: str, limits: tuple[float, float], unit: str, name: str = "", wheel_factor: float = 4.0
 ) -> Parameter:
-    """A multiplier of the string, which the wheel multiplies by four at its end, unless said otherwise."""
-    group = DECAY if part in ("decay", "brightness_decay") else STRING
-    return Parameter(
-        f"knobs.{part}",
-        label,
-        limits,
-        1.0,
-        TIMES,
-        group,
-        "wheel",
-        name,
-        wheel_factor=wheel_factor,
-        figure_unit=figure_unit,
-    )
+    """A multiplier of the string, which the wheel multiplies at its end; `unit`: of its figure."""
+    group, id = DECAY if part in ("decay", "brightness_decay") else STRING, f"knobs.{part}"
+    return Parameter(id, label, limits, 1.0, TIMES, group, "wheel", name, wheel_factor=wheel_factor, figure_unit=unit)
 
 
 MULTIPLIER = (0.05, 20.0)
 AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+STROKES = "down", "up", "both"
 NOISE_DB = (-60.0, 6.0)  # the lowest is off
-OF_PATCHES: Mapping[str, Parameter] = {
-    parameter.id: parameter
-    for parameter in (
-        Parameter(
-            "tuning.a4_hz",
-            "A4",
-            (220, 880),
-            440,
-            Taper(2 ** (1 / 1200), "{:.1f} Hz", True),
-            PITCH,
-            name="pitch of A4",
-        ),
-        Parameter(
-            "tuning.transpose",
-            "transpose",
-            (-48, 48),
-            0,
-            Taper(1, "{:+.0f}"),
-            PITCH,
-            name="transposition",
-            whole=True,
-        ),
-        _knob("tension", "tension", (0.0625, 16.0), "N"),  # over which the length goes through its own range
-        _knob("length", "length", (0.25, 4.0), "mm", name="string length", wheel_factor=2.0),
-        _knob("gauge", "gauge", (0.25, 4.0), "mm"),
-        _knob("density", "density", MULTIPLIER, "kg/m³"),
-        _knob("modulus", "modulus", MULTIPLIER, "GPa"),
-        _knob("stiffness", "stiffness", MULTIPLIER, ""),
-        _knob("decay", "decay", MULTIPLIER, "s"),
-        _knob("brightness_decay", "HF loss", MULTIPLIER, "s"),
-        Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
-        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", wheel=1.0),
-        Parameter(
-            "pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", wheel=0.5
-        ),
-        Parameter(
-            "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
-        ),
-        Parameter(
-            "pluck.width_hard",
-            "hard width",
-            WIDTH_RANGE,
-            0.06,
-            WIDTH,
-            PLUCK,
-            "wheel",
-            "width (high velocity)",
-            wheel=0.02,
-        ),
-        Parameter("pluck.softest_mm", "softest", AMPLITUDE_MM, 0.1, MILLIMETRES, PLUCK, "macro", "softest amplitude"),
-        Parameter(
-            "pluck.hardest_mm",
-            "hardest",
-            AMPLITUDE_MM,
-            3.0,
-            MILLIMETRES,
-            PLUCK,
-            "wheel",
-            "hardest amplitude",
-            wheel_factor=2,
-        ),
-        Parameter(
-            "pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", wheel=1.0
-        ),
-        Parameter("pluck.release_ms", "soft contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (low velocity)"),
-        Parameter(
-            "pluck.release_hard_ms", "hard contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (high velocity)"
-        ),
-        Parameter("javari.gap_um", "javari", (0, 200), 5, Taper(0.02, "{:.1f} µm", curve=100.0), "", "macro"),
-        Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
-        Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
-        Parameter(
-            "technique.harmonic", "harmonic", (1, 5), 1, Taper(1, "{:.0f}"), TECHNIQUE, "wheel", wheel=2, whole=True
-        ),
-        Parameter("technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, "wheel", wheel=40),
-        Parameter(
-            "technique.strokes",
-            "strokes",
-            (0, 2),
-            0,
-            Taper(1, "{:.0f}"),
-            TECHNIQUE,
-            "macro",
-            "strokes of strums",
-            whole=True,
-            words=("down", "up", "both"),
-        ),
-        Parameter(
-            "technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, "wheel", wheel=12
-        ),
-        Parameter(
-            "technique.vibrato_cents",
-            "vibrato",
-            (0, 100),
-            0,
-            Taper(1, "{:.0f} cents"),
-            TECHNIQUE,
-            "wheel",
-            "vibrato depth",
-            wheel=35,
-        ),
-        Parameter(
-            "technique.vibrato_hz",
-            "rate",
-            (0.5, 12),
-            5.5,
-            Taper(1.05, "{:.1f} Hz", True),
-            TECHNIQUE,
-            "wheel",
-            "vibrato rate",
-            wheel=7,
-        ),
-        Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
-        Parameter(
-            "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
-        ),
-        Parameter("amp.drive_db", "drive", AMP_DRIVE_DB, 0, Taper(1, "{:.0f} dB"), BODY, "macro", "amplifier drive"),
-        Parameter(
-            "amp.tone_db", "amp tone", AMP_TONE_DB, 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"
-        ),
-        Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", wheel=1.0),
-        Parameter("body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
-        Parameter("room.mix", "room", (0, 1), 0, PERCENT, BODY, "wheel", wheel=1.0),
-        Parameter(
-            "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3
-        ),
-        Parameter("bend_semitones", "bend range", (0, 48), 2, Taper(1, "{:g} semitones")),
-        Parameter("level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro"),
-    )
-}
-OF_CHOICES: Mapping[str, Parameter] = {
-    parameter.id: parameter
-    for parameter in (
-        Parameter("position", "position", POSITION_RANGE, 0.35, PLACE, modulation="learn", name="pluck position"),
-        Parameter(
-            "amplitude_mm", "amplitude", (0, LARGEST_AMPLITUDE_MM), 4.0, Taper(0.25, "{:.2f} mm"), modulation="learn"
-        ),
-        Parameter("width", "width", WIDTH_RANGE, 0.06, WIDTH, modulation="learn", name="pluck width"),
-        Parameter("listen", "listen", (0, 1), DEFAULT_LISTEN, PLACE, modulation="learn", name="listening point"),
-        Parameter(
-            "listen_right",
-            "right",
-            (0, 1),
-            1 - DEFAULT_LISTEN,
-            PLACE,
-            modulation="learn",
-            name="right listening point",
-        ),
-        Parameter("seconds", "duration", (0.5, 12), 4.0, Taper(0.5, "{:.1f} s"), modulation="learn"),
-        # 1 is real time; a thousandth shows one period of a low string in seconds
-        Parameter(
-            "speed",
-            "slow-mo",
-            (0.001, 1),
-            0.004,
-            Taper(1.25, "× {:.3f}", True),
-            modulation="learn",
-            name="slow motion",
-        ),
-        Parameter("volume_db", "volume", (-60, 12), 6.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
-        Parameter("difference_gain_db", "difference", DIFFERENCE_GAIN_RANGE_DB, 20.0, Taper(10, "{:+.0f} dB")),
-    )
-}
-PARAMETERS: Mapping[str, Parameter] = {**OF_PATCHES, **OF_CHOICES}
+_OF_PATCHES = (
+    Parameter("tuning.a4_hz", "A4", (220, 880), 440, CONCERT_PITCH, PITCH, name="pitch of A4"),
+    Parameter(
+        "tuning.transpose", "transpose", (-48, 48), 0, Taper(1, "{:+.0f}"), PITCH, name="transposition", whole=True
+    ),
+    _knob("tension", "tension", (0.0625, 16.0), "N"),  # over which the length goes through its own range
+    _knob("length", "length", (0.25, 4.0), "mm", "string length", 2.0),
+    _knob("gauge", "gauge", (0.25, 4.0), "mm"),
+    _knob("density", "density", MULTIPLIER, "kg/m³"),
+    _knob("modulus", "modulus", MULTIPLIER, "GPa"),
+    _knob("stiffness", "stiffness", MULTIPLIER, ""),
+    _knob("decay", "decay", MULTIPLIER, "s"),
+    _knob("brightness_decay", "HF loss", MULTIPLIER, "s"),
+    Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
+    Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", wheel=1.0),
+    Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", wheel=0.5),
+    Parameter(
+        "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
+    ),
+    Parameter(
+        "pluck.width_hard",
+        "hard width",
+        WIDTH_RANGE,
+        0.06,
+        WIDTH,
+        PLUCK,
+        "wheel",
+        "width (high velocity)",
+        wheel=0.02,
+    ),
+    Parameter("pluck.softest_mm", "softest", AMPLITUDE_MM, 0.1, MM, PLUCK, "macro", "softest amplitude"),
+    Parameter(
+        "pluck.hardest_mm", "hardest", AMPLITUDE_MM, 3.0, MM, PLUCK, "wheel", "hardest amplitude", wheel_factor=2
+    ),
+    Parameter(
+        "pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", wheel=1.0
+    ),
+    Parameter("pluck.release_ms", "soft contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (low velocity)"),
+    Parameter(
+        "pluck.release_hard_ms", "hard contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (high velocity)"
+    ),
+    Parameter("javari.gap_um", "javari", (0, 200), 5, Taper(0.02, "{:.1f} µm", curve=100.0), "", "macro"),
+    Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
+    Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
+    Parameter("technique.harmonic", "harmonic", (1, 5), 1, COUNT, TECHNIQUE, "wheel", wheel=2, whole=True),
+    Parameter("technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, "wheel", wheel=40),
+    Parameter(
+        "technique.strokes",
+        "strokes",
+        (0, 2),
+        0,
+        COUNT,
+        TECHNIQUE,
+        "macro",
+        "strokes of strums",
+        whole=True,
+        words=STROKES,
+    ),
+    Parameter("technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, "wheel", wheel=12),
+    Parameter(
+        "technique.vibrato_cents", "vibrato", (0, 100), 0, CENTS, TECHNIQUE, "wheel", "vibrato depth", wheel=35
+    ),
+    Parameter("technique.vibrato_hz", "rate", (0.5, 12), 5.5, HERTZ, TECHNIQUE, "wheel", "vibrato rate", wheel=7),
+    Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
+    Parameter(
+        "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
+    ),
+    Parameter("amp.drive_db", "drive", AMP_DRIVE_DB, 0, Taper(1, "{:.0f} dB"), BODY, "macro", "amplifier drive"),
+    Parameter("amp.tone_db", "amp tone", AMP_TONE_DB, 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"),
+    Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", wheel=1.0),
+    Parameter("body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
+    Parameter("room.mix", "room", (0, 1), 0, PERCENT, BODY, "wheel", wheel=1.0),
+    Parameter("room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3),
+    Parameter("bend_semitones", "bend range", (0, 48), 2, Taper(1, "{:g} semitones")),
+    Parameter("level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro"),
+)
+_OF_CHOICES = (
+    Parameter("position", "position", POSITION_RANGE, 0.35, PLACE, modulation="learn", name="pluck position"),
+    Parameter(
+        "amplitude_mm", "amplitude", (0, LARGEST_AMPLITUDE_MM), 4.0, Taper(0.25, "{:.2f} mm"), modulation="learn"
+    ),
+    Parameter("width", "width", WIDTH_RANGE, 0.06, WIDTH, modulation="learn", name="pluck width"),
+    Parameter("listen", "listen", (0, 1), DEFAULT_LISTEN, PLACE, modulation="learn", name="listening point"),
+    Parameter(
+        "listen_right", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, modulation="learn", name="right listening point"
+    ),
+    Parameter("seconds", "duration", (0.5, 12), 4.0, Taper(0.5, "{:.1f} s"), modulation="learn"),
+    # 1 is real time; a thousandth shows one period of a low string in seconds
+    Parameter("speed", "slow-mo", (0.001, 1), 0.004, SPEED, modulation="learn", name="slow motion"),
+    Parameter("volume_db", "volume", (-60, 12), 6.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
+    Parameter("difference_gain_db", "difference", DIFFERENCE_GAIN_RANGE_DB, 20.0, Taper(10, "{:+.0f} dB")),
+)
+OF_PATCHES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_PATCHES}
+OF_CHOICES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_CHOICES}
 MOST_MACROS = 8  # of a patch
 MACROS: Mapping[str, Parameter] = {
     id: Parameter(id, label, (0, 1), 0.5, PERCENT, modulation="learn")

@@ -25,8 +25,7 @@ from app.playing.key_note import KeyNote
 from app.presets.library import Library
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
-from app.session.slots import missing_presets
-from app.session.through import through_words
+from app.session.slots import missing_presets, through_words
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.views.controls.app_menu import ENTRIES
@@ -419,7 +418,7 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
-        if names & {"instrument", "patch"}:
+        if names & {"patch", "single"}:
             self._show_kind()
         window.show_solo(choices.solo)
         window.show_through(*through_words(choices))

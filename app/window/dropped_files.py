@@ -14,12 +14,12 @@ from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, RecipeError, SoundRecipe, changed_notices, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
-from app.patches.instrument import SingleString
-from app.presets.install import SUFFIX, InstallError, install_preset
+from app.presets.install import SUFFIX, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
 from engine.folders import user_folder
 from engine.plain_text import name_text
+from engine.presets import PresetError
 from engine.result_file import WriteError
 
 SOUNDS = (*ENDINGS, ".ogg", ".oga", ".opus")
@@ -53,7 +53,7 @@ def receive(file: Path, library: Library) -> Dropped:
             return _other_sound(file)
     except NoRecipe:
         return _other_sound(file)
-    except (InstallError, RecipeError, WriteError) as error:
+    except (PresetError, RecipeError, WriteError) as error:
         return Dropped(notice=str(error))
     kinds = f"a preset ({SUFFIX}), an instrument, a string, a scale, a MIDI file, an exported WAV, a note, a body"
     return Dropped(notice=f"{file}: not a file that is used here; drop one of these: {kinds}")
@@ -82,27 +82,29 @@ def receive_body(file: Path) -> Dropped:
 
 
 def _preset(file: Path, library: Library) -> Dropped:
-    installed = install_preset(file, user_folder(), [entry.path for entry in library.entries])
+    path, was_there = install_preset(file, user_folder(), [entry.path for entry in library.entries])
     library.refresh()
-    entry = library.find(installed.name)
+    entry = library.find(name_text(path.stem))
     if entry is None:
-        return Dropped(notice=f"{installed.path}: cannot be used; check that the file still exists")
-    whose = "your own" if installed.path.parent == user_folder() else "the factory"
+        return Dropped(notice=f"{path}: cannot be used; check that the file still exists")
+    whose = "your own" if path.parent == user_folder() else "the factory"
     notice = f"{file.name} is {whose} preset “{entry.info.title}” already; nothing was copied."
-    return Dropped({"preset": entry.name}, notice if installed.was_there else "")
+    return Dropped({"preset": entry.name}, notice if was_there else "")
 
 
 def _drop_recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
-        instrument = (
-            SingleString(preset=name_text(path.stem)) if recipe.struck is None else recipe.struck.found()[0].patch
+        played: dict[str, Any] = (
+            {"single": name_text(path.stem)}
+            if recipe.struck is None
+            else {"instrument": recipe.struck.found()[0].patch}
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")
-    choices = {"instrument": instrument, **restored_choices(recipe)}
+    choices = {**played, **restored_choices(recipe)}
     if choices.get("seconds", recipe.seconds) != recipe.seconds:
         low, high = OF_CHOICES["seconds"].limits
         limits = f"the window's range ({low:g} … {high:g} s)"

@@ -13,16 +13,14 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
-from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings
+from app.instrument.strings import Strings, on_string
 from app.patches.drums import Drums
-from app.patches.instrument import SingleString
 from app.patches.patch import Patch, StringSet
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.playing.note import PluckVoices
+from app.playing.playback import Due
 from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import string_of
@@ -96,7 +94,7 @@ class Instruments(QObject):
     def choices_changed(self, names: frozenset[str]) -> None:
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
-        if "instrument" in names:
+        if names & {"patch", "single"}:
             self._chosen |= names & ShownString.model_fields.keys()
             self._own_timer.start()
 
@@ -227,7 +225,7 @@ class Instruments(QObject):
             pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
             self._performance.play_preset(name)
             with self._lock:
-                self._reported |= {"instrument": SingleString(preset=name)}
+                self._reported |= {"single": name}
             self.play(PluckAt(pluck))
             return
         self.play(self.by_hand(pluck))

@@ -10,23 +10,16 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QInputDialog
 
-from app.instrument.beyond_training import outside_of_key
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
-from app.instrument.events import (
-    HARMONICS,
-    KEYS,
-    LEGATO,
-    PORTAMENTO,
-    SLIDE_TIME,
-    STRUM,
-    TREMOLO,
-    ControlChange,
-    NoteOff,
-    NoteOn,
-    TimedEvent,
+from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.instrument.facts import (
+    facts_of,
+    facts_of_drum,
+    figures_of,
+    knob_for,
+    outside_of_key,
 )
-from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
@@ -61,6 +54,7 @@ from app.window.panels.string import outside_of_shown
 from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import SongPlayer
+from engine.kernels.midi import HARMONICS, LEGATO, PORTAMENTO, SLIDE_TIME, STRUM, TREMOLO
 from engine.plain_text import one_line
 from engine.result_file import WriteError
 from engine.schema import explained
@@ -389,15 +383,15 @@ class PatchDesk(BrowserDesk):
             self._panel.bar.show_comparing(False)
         if names & {"octave", "patch"}:
             self._keep_octave_in_range("octave" in names)
-        if names & {"octave", "velocity", "instrument", "patch"}:
+        if names & {"octave", "velocity", "patch", "single"}:
             choices, pitches = self._session.choices, self._session.choices.plays_patch
             self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
-        if names & {"instrument", "patch"}:
+        if names & {"patch", "single"}:
             self._judge_again()
-        if names & {"instrument", "patch", *Monitor.model_fields}:
+        if names & {"patch", "single", *Monitor.model_fields}:
             self._show_source()
 
     @property

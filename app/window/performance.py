@@ -15,13 +15,12 @@ from PySide6.QtCore import QObject, Signal
 from app.audio.sound import Sound
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.patches.instrument import SingleString
 from app.patches.patch import Patch
-from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
+from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
@@ -39,7 +38,7 @@ from engine.plain_text import name_text
 from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"instrument", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
+PLACED = {"single", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 @dataclass
@@ -265,8 +264,8 @@ class Performance(QObject):
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
             self._hear_dry()
-        if names & {"instrument", "patch"}:  # ends a comparison
-            self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+        if names & {"patch", "single"}:  # ends a comparison
+            self.notes.set_instrument(choices.patch, choices.ear, choices.single)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         request = self._request()
@@ -310,7 +309,7 @@ class Performance(QObject):
     def play_preset(self, name: str) -> None:
         """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
         choices = self._session.choices
-        self.notes.set_instrument(SingleString(preset=name), choices.ear, choices.patch)
+        self.notes.set_instrument(choices.patch, choices.ear, name)
 
     def handle(self, event: Event, due: Due | None = None) -> PluckVoices | KeyNote | None:
         """Play an event; the note that it began, or None. Any thread."""
@@ -332,7 +331,7 @@ class Performance(QObject):
         choices = self._session.choices
         if patch is not None:
             choices = choices.changed({"patch": patch})
-        self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+        self.notes.set_instrument(choices.patch, choices.ear, choices.single)
 
     def close(self) -> None:
         """End the threads; may be called again."""

@@ -16,7 +16,6 @@ from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
-from app.patches.instrument import PATCH, SINGLE
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
 from app.shared.value import Value
@@ -104,7 +103,7 @@ def _usable_settings(text: bytes) -> Settings | None:
                 return Settings.model_validate(data)
             except ValidationError as error:
                 location = error.errors(include_url=False, include_input=False)[0]["loc"]
-                path = [str(part) for part in location if part not in (PATCH, SINGLE)]
+                path = [str(part) for part in location]
             if path[:1] in ([], ["version"]):  # no settings, or those of another version
                 return None
             _drop(data, path)

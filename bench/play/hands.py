@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from random import Random
 
 from app.patches.drums import Drums
-from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from bench.play.screen import Screen
 
@@ -19,16 +18,16 @@ HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
-def octave_of(instrument: Instrument) -> int:
-    """The octave of the computer's keys in which most of them sound, the nearest to 0."""
-    if isinstance(instrument, SingleString):
+def octave_of(instrument: Patch | str) -> int:
+    """The octave of the computer's keys in which most of them sound, the nearest to 0; of a preset's string 0."""
+    if isinstance(instrument, str):
         return 0
     return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(instrument, octave)), -abs(octave)))
 
 
-def keys_of(instrument: Instrument) -> tuple[str, ...]:
+def keys_of(instrument: Patch | str) -> tuple[str, ...]:
     """The computer's keys that sound in that octave."""
-    if isinstance(instrument, SingleString):
+    if isinstance(instrument, str):
         return ROW
     return tuple(KEYS[place] for place in _sounding(instrument, octave_of(instrument)))
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.audio.choices import Buffer
-from app.patches.instrument import Instrument, SingleString
+from app.patches.patch import Patch
 from bench.play import analysis, hands
 from bench.play.calibration import Holding, transit
 from bench.play.children import child
@@ -128,10 +128,10 @@ def measure(
     buffer: Buffer,
     busy: bool,
     seed: int,
-    instrument: Instrument,
+    instrument: Patch | str,
     report: ProgressReport,
 ) -> dict[str, Any]:
-    """Play single plucks of an instrument, then for `seconds` so many notes per second."""
+    """Play single plucks of an instrument, or of a preset's string, then for `seconds` so many notes per second."""
     random, keys = Random(seed), hands.keys_of(instrument)
     with program(instrument, buffer, report, calibrated=True) as app:
         app.recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
@@ -143,7 +143,7 @@ def measure(
         report(0.85, "idle")
         idle_cores = _idle_cores(app)
         report(0.9, "analysis")
-        name = instrument.preset if isinstance(instrument, SingleString) else instrument.name
+        name = instrument if isinstance(instrument, str) else instrument.name
         return {"chosen": Chosen(name, buffer, plucks_hz, busy, load), "playing": _judged(app, played, idle_cores)}
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import psutil
 
 from app.audio.choices import Buffer, SoundChoice
-from app.patches.instrument import Instrument, SingleString
+from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.window.settings import Settings, save_settings
 from bench.play import hands
@@ -90,7 +90,7 @@ class Program:
 
 @contextlib.contextmanager
 def program(
-    instrument: Instrument, buffer: Buffer, report: ProgressReport, *, calibrated: bool = False
+    instrument: Patch | str, buffer: Buffer, report: ProgressReport, *, calibrated: bool = False
 ) -> Iterator[Program]:
     """Start the program with an instrument, and wait until its first key is heard. A single string is in the Lab.
 
@@ -102,8 +102,9 @@ def program(
         RuntimeError: the app did not open, or no sound of it was recorded.
     """
     need_programs(*PROGRAMS)
-    face = "lab" if isinstance(instrument, SingleString) else "play"
-    choices = Choices(instrument=instrument, octave=hands.octave_of(instrument), face=face)
+    alone = isinstance(instrument, str)
+    face, octave = "lab" if alone else "play", hands.octave_of(instrument)
+    choices = Choices().changed({"preset" if alone else "instrument": instrument, "octave": octave, "face": face})
     settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="play")))

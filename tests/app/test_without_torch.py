@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 OFFLINE = """
 import sys
-from app.instrument.events import NoteOn, TimedEvent
+from app.instrument.events import (NoteOn, TimedEvent)
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED, read_patch
 from engine.presets import find_preset, load_preset
@@ -29,7 +29,7 @@ assert "torch" not in sys.modules
 WINDOW = """
 import sys, threading
 from PySide6.QtCore import QTimer
-from app.instrument.events import NoteOn
+from app.instrument.events import (NoteOn)
 from app.window import main
 
 keys, drawn, loaded, timer = [45, 64], [], [], QTimer(interval=20)

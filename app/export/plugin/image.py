@@ -20,7 +20,7 @@ from app.export.plugin.layout import IMAGE, KINDS, MACRO, MOST_PARAMETERS, PARAM
 from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.string_keys import StringKeys
+from app.instrument.strings import StringKeys
 from app.instrument.table import WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch
@@ -149,7 +149,7 @@ def _control(id: str, knob: np.void) -> Control:
 
 def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
     try:
-        key_sound = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
+        key_sound = keys.of_key(key)
     except ValueError:
         return False
     return key_sound is not None

@@ -51,7 +51,7 @@ class DrumPanel(StagePanel):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         choices = self.session.choices
-        if names & {"instrument", "patch"} and choices.drums is not None and self._key is not None:
+        if names & {"patch", "single"} and choices.drums is not None and self._key is not None:
             self.show_key(self._key)
         if names & {"face", "volume_db", *LEGEND_FIELDS}:
             self._show_sources()

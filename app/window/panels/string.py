@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
-from app.instrument.beyond_training import outside_of_string
-from app.instrument.facts import by_two_numbers
+from app.instrument.facts import by_two_numbers, outside_of_string
 from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take

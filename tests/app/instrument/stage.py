@@ -111,12 +111,12 @@ class Stage:
             found = taken_up(self.player, self.mixer)
             if isinstance(event, NoteOn):
                 self.struck += [Note(self.player, each) for each in found if each.id == number]
-        self.reports += self.player.reports()
+        self.reports += self.player.compiled.reports()
         return self.struck
 
     def take(self, patch: Patch) -> None:
         """Another patch, or the same with a knob turned."""
-        self.player.take(self.player.tabled(self.player.keys_of(patch)))
+        self.player.take(self.player.keys_of(patch))
 
     def run(self, events: Sequence[tuple[int, Event]], frames: int, block: int = QUANTUM) -> Sound:
         """The sound (frames, 2), before it is rounded; each event is handed over with the block of its frame."""
@@ -127,7 +127,7 @@ class Stage:
                 self.player.handle(event, frame)
             rendered = self.mixer.render(block)
             sound.append(self.mixer.record["mix"].reshape(-1, 2).copy() if block == QUANTUM else rendered)
-            self.reports += self.player.reports()
+            self.reports += self.player.compiled.reports()
         return np.concatenate(sound)
 
     def left(self, frames: int) -> Sound:
@@ -136,7 +136,7 @@ class Stage:
     @property
     def begun(self) -> list[NoteReport]:
         """What began, in order."""
-        self.reports += self.player.reports()
+        self.reports += self.player.compiled.reports()
         return [each for each in self.reports if each.kind == of.BEGAN]
 
     @property

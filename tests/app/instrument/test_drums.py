@@ -118,10 +118,10 @@ def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, let_all_
 
     def sound() -> np.ndarray:
         stage = Stage(KIT, PRESET)
-        stage.player.take(stage.player.tabled(stage.player.keys_of(KIT, Ear((0.5,)))))
+        stage.player.take(stage.player.keys_of(KIT, Ear((0.5,))))
         stage.player.handle(NoteOn(key, 110))
         before = stage.left(4_800)
-        stage.player.take(stage.player.tabled(stage.player.keys_of(KIT, Ear((0.05,)))))
+        stage.player.take(stage.player.keys_of(KIT, Ear((0.05,))))
         return np.concatenate([before, stage.left(9_600)])
 
     resting = sound()

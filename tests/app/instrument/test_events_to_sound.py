@@ -13,11 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import (
+from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn, PatchTurned, parameter_set, release_all
+from app.patches.library import SHIPPED, read_patch
+from app.patches.patch import Course, Patch
+from engine.kernels import constants as of
+from engine.kernels.midi import (
+    COARSE_TUNING,
     DECREMENT,
     EXPRESSION,
     FINE_OTHER,
     FINE_REGISTERED,
+    FINE_TUNING,
     FINE_VALUE,
     HARMONICS,
     INCREMENT,
@@ -36,19 +42,7 @@ from app.instrument.events import (
     TREMOLO,
     VALUE,
     VOLUME,
-    Bend,
-    ControlChange,
-    Event,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
-    parameter_set,
-    release_all,
 )
-from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Course, Patch
-from engine.kernels import constants as of
-from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
 from engine.kernels.playing.channels import SLIDE_S, WIDEST_SEMITONES
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ

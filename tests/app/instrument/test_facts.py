@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.instrument.beyond_training import outside_of_key
 from app.instrument.events import NoteOn
-from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, reported, t60_s
+from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, outside_of_key, reported, t60_s
 from app.patches.patch import Fretted, Knobs, Patch
 from app.shared.parameters import OF_PATCHES
 from engine.presets import Preset

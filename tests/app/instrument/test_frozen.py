@@ -24,6 +24,7 @@ from app.instrument import events
 from app.instrument.events import KEYS, Bend, ControlChange, Event, NoteOff, NoteOn, PatchTurned
 from app.patches.library import read_patch
 from app.patches.patch import Patch, Pickup
+from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
 from engine.presets import Preset
 from engine.values.string import Losses, Polarisations
@@ -59,8 +60,8 @@ def shipped() -> dict[str, Patch]:
 
 
 CONTROLLERS = (
-    *(events.SUSTAIN, events.MOD_WHEEL, events.SLIDE, events.RESET, events.NOTES_OFF),
-    *(events.REGISTERED, events.FINE_REGISTERED, events.VALUE, events.FINE_VALUE, events.OTHER),
+    *(midi.SUSTAIN, midi.MOD_WHEEL, midi.SLIDE, midi.RESET, midi.NOTES_OFF),
+    *(midi.REGISTERED, midi.FINE_REGISTERED, midi.VALUE, midi.FINE_VALUE, midi.OTHER),
 )
 KNOBS = ("knobs.tension", "knobs.gauge", "knobs.decay", "knobs.stiffness", "damping.release_t60_s", "pluck.position")
 
@@ -86,10 +87,10 @@ def drawn(patch: Patch, other: Patch, seed: int, seconds: float, count: int = 60
             found.append((frame, Bend(float(draw.uniform(-1.2, 1.2)), channel)))
         elif kind < 0.97:
             number = int(draw.choice(CONTROLLERS))
-            chooses = number in (events.REGISTERED, events.FINE_REGISTERED)
+            chooses = number in (midi.REGISTERED, midi.FINE_REGISTERED)
             found.append((frame, ControlChange(number, 0 if chooses else value, channel)))
         elif kind < 0.98:
-            found.append((frame, ControlChange(events.SOUND_OFF, 0, channel)))
+            found.append((frame, ControlChange(midi.SOUND_OFF, 0, channel)))
         else:
             name = str(draw.choice(KNOBS))
             turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
@@ -106,7 +107,7 @@ def released_once(played: list[tuple[int, Event]]) -> list[tuple[int, Event]]:
             strokes[event.key, event.channel] += 1
         elif isinstance(event, NoteOff):
             found += [(frame, event)] * (strokes.pop((event.key, event.channel), 1) - 1)
-        elif isinstance(event, ControlChange) and event.number == events.RESET:
+        elif isinstance(event, ControlChange) and event.number == midi.RESET:
             event = replace(event, value=events.AT_REST)
         found.append((frame, event))
     return found
@@ -171,7 +172,7 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[s
         elif number % 3 == 0:
             burst.append((frame, Bend(float(draw.uniform(-1, 1)))))
         else:
-            burst.append((frame, ControlChange(int(draw.choice([events.MOD_WHEEL, events.SUSTAIN])), number % 128)))
+            burst.append((frame, ControlChange(int(draw.choice([midi.MOD_WHEEL, midi.SUSTAIN])), number % 128)))
     assert compared("burst", patch, preset, released_once(burst), 100) < CLOSE
 
 

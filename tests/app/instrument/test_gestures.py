@@ -11,17 +11,7 @@ import pytest
 import scipy.signal
 from scipy.ndimage import uniform_filter1d
 
-from app.instrument.events import (
-    LEGATO,
-    MOD_WHEEL,
-    PORTAMENTO,
-    SLIDE_TIME,
-    SOFT,
-    ControlChange,
-    NoteOff,
-    NoteOn,
-    TimedEvent,
-)
+from app.instrument.events import ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
 from app.patches.library import SHIPPED, read_patch
@@ -29,6 +19,7 @@ from app.patches.patch import BodyChoice, Course, Fretted, Noise, Patch, Pickup
 from engine.excitation import blow_factor
 from engine.kernels import constants as of
 from engine.kernels.constants import PART_S, QUANTUM, REFERENCE_VELOCITY, WANTED_DB
+from engine.kernels.midi import LEGATO, MOD_WHEEL, PORTAMENTO, SLIDE_TIME, SOFT
 from engine.kernels.playing.channels import SLIDE_S
 from engine.kernels.playing.notes import PLUCK_STOPS_S, TOUCH_PERIODS
 from engine.kernels.pulses import spectrum

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.instrument.events import KEYS, LEGATO, SOUND_OFF, SUSTAIN, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import Fretted, Noise, Patch
 from engine.contact import CONTACTS
 from engine.kernels import constants as of
 from engine.kernels.constants import PART_S, WANTED_DB
+from engine.kernels.midi import LEGATO, SOUND_OFF, SUSTAIN
 from engine.presets import Preset
 from engine.values.ear import Ear
 from tests.app.instrument.conftest import STEEL
@@ -191,7 +192,7 @@ def test_a_solo_of_one_partial_is_without_noise(patch: Patch, preset: Preset) ->
     sounds = []
     for each in (changed(patch, noise=Noise(onset_db=6.0)), patch):
         stage = Stage(each, preset)
-        stage.player.take(stage.player.tabled(stage.player.keys_of(each, Ear((0.2,), solo=2))))
+        stage.player.take(stage.player.keys_of(each, Ear((0.2,), solo=2)))
         stage.player.handle(NoteOn(KEY, 100))
         sounds.append(stage.left(4_800))
     np.testing.assert_array_equal(*sounds)

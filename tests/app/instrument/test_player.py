@@ -23,7 +23,7 @@ from app.instrument.offline import (
     render_events,
     render_note,
 )
-from app.instrument.string_keys import StringKeys, on_string
+from app.instrument.strings import StringKeys, on_string
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import ASSIGNABLE, WHEEL, BodyChoice, Fretted, Knobs, Noise, Patch
@@ -31,6 +31,7 @@ from app.patches.tuning import TuningChoice
 from app.shared.parameters import OF_PATCHES
 from engine import bounds
 from engine.kernels import constants as of
+from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset, load_preset
@@ -69,7 +70,7 @@ def test_more_notes_than_there_are_places_all_begin(preset: Preset) -> None:
     begun = [each.id for each in stage.begun]
     assert begun == given[-len(begun) :] and len(begun) > 200
     assert np.isfinite(sound).all()
-    assert len(stage.player.ringing()) <= 40
+    assert len(stage.player.compiled.ringing()) <= 40
 
 
 def test_more_events_than_the_ring_holds_are_played_later(koto: Stage) -> None:
@@ -119,12 +120,12 @@ def test_a_single_note_can_be_released_and_its_events_cancelled(harp: Stage) -> 
     harp.player.release(one, 0.01)
     harp.player.release(other, 0.01, frame=5_000)
     harp.run((), 20 * QUANTUM)
-    assert [each.key for each in harp.player.ringing()] == [57]
+    assert [each.key for each in harp.player.compiled.ringing()] == [57]
     harp.player.cancel(other)
     later = harp.player.handle(NoteOn(60, 90), 6_000)
     harp.player.cancel(one)
     harp.run((), 120 * QUANTUM)
-    assert {each.key for each in harp.player.ringing()} == {57, 60}
+    assert {each.key for each in harp.player.compiled.ringing()} == {57, 60}
     assert later in [each.id for each in harp.begun]
 
 
@@ -174,7 +175,7 @@ def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(preset: Preset, na
             stage.handle(NoteOn(sum(patch.range) // 2, 100), 0)
         if adds:
             stage.mixer.add(Voice.of_samples(plain_program(RATE_HZ), strangers))
-        return stage.render(RATE_HZ // 2).astype(np.float64)
+        return stage.mixer.render(RATE_HZ // 2).astype(np.float64)
 
     both, own, alone = mixed(True, True), mixed(True, False), mixed(False, True)
     np.testing.assert_allclose(both, own + alone, atol=1e-6)
@@ -215,7 +216,7 @@ def test_reports_say_what_was_plucked(preset: Preset) -> None:
     for report in stage.begun:
         event = struck[report.frame]
         assert (report.key, report.channel, report.velocity) == (event.key, event.channel, event.velocity)
-        found = stage.player.keys.string_of(event.key, report.string if report.string >= 0 else None)
+        found = stage.player.keys.of_key(event.key, report.string if report.string >= 0 else None)
         assert found is not None and report.parameters == found.parameters and report.gain > 0
         assert report.modes == found.modes + (min(of.MOST_PAIRS, found.modes) if patch.polarisations else 0)
         pluck = on_string(found, patch.pluck.pluck(event.velocity))
@@ -243,8 +244,8 @@ def test_a_harmonic_is_plucked_short_of_its_first_node(patch: Patch, preset: Pre
 
 def test_slide_moves_the_pluck_until_all_is_released(patch: Patch, preset: Preset) -> None:
     stage, on = Stage(changed(patch, mode="mpe"), preset), NoteOn(57, 60, 1)
-    stage.play(ControlChange(events.SLIDE, 127, 1), on)
-    stage.play(ControlChange(events.RESET, 0, 1), on)  # RP-015: it is a sound controller
+    stage.play(ControlChange(midi.SLIDE, 127, 1), on)
+    stage.play(ControlChange(midi.RESET, 0, 1), on)  # RP-015: it is a sound controller
     stage.play(*release_all([1]), on)
     assert [each.position for each in stage.begun] == [pytest.approx(0.5)] * 2 + [patch.pluck.position]
 
@@ -259,7 +260,7 @@ def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
     patch = shipped(name, pluck={"variation": 0.0})
     one, other = Stage(patch, preset), Stage(patch, preset)
     assert isinstance(one.player.keys, StringKeys)
-    found = one.player.keys.string_of(key)
+    found = one.player.keys.of_key(key)
     assert found is not None
     by_hand = NoteOn(key, 1, pluck=on_string(found, patch.pluck.pluck(90)))
     sound, alike = one.run([(0, NoteOn(key, 90))], 6_400), other.run([(0, by_hand)], 6_400)
@@ -282,7 +283,7 @@ def test_a_pluck_by_hand_is_exactly_itself(preset: Preset, shape: Shape) -> None
 
 
 @pytest.mark.parametrize(
-    ("switch", "moves_to"), [(ControlChange(events.TREMOLO, 127), 52), (ControlChange(events.LEGATO, 127), 53)]
+    ("switch", "moves_to"), [(ControlChange(midi.TREMOLO, 127), 52), (ControlChange(midi.LEGATO, 127), 53)]
 )
 def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(
     preset: Preset, switch: ControlChange, moves_to: int
@@ -313,15 +314,13 @@ def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
     stage = Stage(patch, preset)
     assert stage.player.at_hand == [] and stage.player.heard_through == patch
     stage.player.set_gains({"model": 0.25})
-    chosen = [ControlChange(events.REGISTERED, 0, 1), ControlChange(events.FINE_REGISTERED, 0, 1)]
-    switches = [
-        ControlChange(number, 127, events.KEYS) for number in (events.HARMONICS, events.TREMOLO, events.STRUM)
-    ]
-    given = [*chosen, ControlChange(events.VALUE, 5, 1), ControlChange(events.FINE_VALUE, 50, 1), Bend(0.25, 1)]
+    chosen = [ControlChange(midi.REGISTERED, 0, 1), ControlChange(midi.FINE_REGISTERED, 0, 1)]
+    switches = [ControlChange(number, 127, events.KEYS) for number in (midi.HARMONICS, midi.TREMOLO, midi.STRUM)]
+    given = [*chosen, ControlChange(midi.VALUE, 5, 1), ControlChange(midi.FINE_VALUE, 50, 1), Bend(0.25, 1)]
     given += [
-        ControlChange(events.SUSTAIN, 127),
-        ControlChange(events.SLIDE, 9, 2),
-        ControlChange(events.MOD_WHEEL, 127, 3),
+        ControlChange(midi.SUSTAIN, 127),
+        ControlChange(midi.SLIDE, 9, 2),
+        ControlChange(midi.MOD_WHEEL, 127, 3),
     ]
     stage.run([(0, event) for event in (*given, *switches)], QUANTUM)
     made, mixer = stage.player.again(44_100), Mixer(44_100)
@@ -338,7 +337,7 @@ def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
     assert made.at_hand == stage.player.at_hand and set(switches) < set(made.at_hand)
     assert (made.rate_hz, made.compiled.source_gain(0)) == (44_100, 0.25)
     assert stage.player.heard_through == made.heard_through != patch and made.compiled.wheel == (127, 3)
-    stage.player.handle(ControlChange(events.RESET, 0, 3), 0)
+    stage.player.handle(ControlChange(midi.RESET, 0, 3), 0)
     assert stage.player.heard_through == patch
 
 
@@ -349,7 +348,7 @@ def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: st
     def heard(value: int) -> object:
         wheel = changed(patch, mod_wheel=field, body=BodyChoice(name="guitar"), room=Room(mix=0.1))
         stage = Stage(wheel, preset)
-        stage.play(ControlChange(events.MOD_WHEEL, value))
+        stage.play(ControlChange(midi.MOD_WHEEL, value))
         for key, velocity in ((50, 20), (52, 110)):
             stage.play(NoteOn(key, velocity), NoteOff(key))
         plucks = [(each.position, each.amplitude_mm, each.width) for each in stage.begun]
@@ -362,11 +361,11 @@ def test_the_wheel_brings_the_room(patch: Patch, preset: Preset) -> None:
     wheel = changed(patch, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
 
     def tail(value: int) -> float:
-        played = [(0.0, ControlChange(events.MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
+        played = [(0.0, ControlChange(midi.MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
         return float(np.abs(play(wheel, preset, 1.6, *played)[round(1.2 * RATE_HZ) :]).max())
 
     assert tail(0) < 1e-5 and tail(127) > 1e-4
-    turned, still = ([TimedEvent(0.0, ControlChange(events.MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
+    turned, still = ([TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
     assert [channels_played(wheel, each) for each in (turned, still)] == [2, 1], "its echo has two sides"
 
 
@@ -449,7 +448,7 @@ def test_a_file_ends_with_its_last_note_whatever_controllers_follow(patch: Patch
     late = [TimedEvent(time_s, ControlChange(11, 90)) for time_s in (30.0, 50.0)]
     alone, followed = (sum(map(len, render_events(patch, preset, each, RATE_HZ))) for each in (timed, timed + late))
     assert followed == alone < 20 * RATE_HZ
-    pedal = [TimedEvent(0.05, ControlChange(events.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(events.SUSTAIN, 0))]
+    pedal = [TimedEvent(0.05, ControlChange(midi.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(midi.SUSTAIN, 0))]
     sound = np.concatenate(list(render_events(patch, preset, timed + pedal, RATE_HZ)))
     assert RATE_HZ < len(sound) < 2 * RATE_HZ  # the pedal after it is followed
     assert level_db(sound[:, 0], 0.8, 0.95) > -60

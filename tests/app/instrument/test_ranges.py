@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.events import HARMONICS, MOD_WHEEL, SLIDE, ControlChange, Event, NoteOn, PatchTurned
+from app.instrument.events import ControlChange, Event, NoteOn, PatchTurned
 from app.instrument.strings import KNOBS
 from app.instrument.table import wheeled
 from app.patches.drums import Drums
@@ -20,6 +20,7 @@ from app.shared.parameters import OF_PATCHES
 from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
 from engine.kernels import strings
+from engine.kernels.midi import HARMONICS, MOD_WHEEL, SLIDE
 from engine.kernels.playing.plucks import vary
 from engine.pluck import Pluck
 from engine.presets import Preset

@@ -8,8 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from app.instrument.string_keys import on_string
-from app.instrument.strings import KNOBS, Strings, decay_rates
+from app.instrument.strings import KNOBS, Strings, decay_rates, on_string
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Fretted, Knobs, OpenString, Patch, StringSet
 from app.patches.tuning import TuningChoice

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from app.instrument.events import PluckAt
-from app.patches.instrument import SingleString
 from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
@@ -116,7 +115,7 @@ class Lab:
     def play_string(self) -> PluckRange:
         """Let a single string be the instrument; return its reach."""
         self.notes.choose(self.pluck_of())
-        self.notes.set_instrument(SingleString(preset="bank"), EAR)
+        self.notes.set_instrument(None, EAR, "bank")
         return PluckRange.of(self.entry.info)
 
     def hear(self, seconds: float) -> np.ndarray:

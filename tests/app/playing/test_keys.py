@@ -14,8 +14,18 @@ import pytest
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_curves
-from app.instrument.events import (
-    KEYS,
+from app.instrument.events import KEYS, Bend, ControlChange, NoteOff, NoteOn, PatchTurned
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import BodyChoice, Patch
+from app.playing import recorder
+from app.playing.key_note import KeyNote
+from app.playing.notes import Notes
+from app.playing.playback import Due
+from app.playing.sources import Sources
+from engine.effects import Effects
+from engine.kernels import constants as of
+from engine.kernels.midi import (
     LEGATO,
     MOD_WHEEL,
     NOTES_OFF,
@@ -26,23 +36,7 @@ from app.instrument.events import (
     STRUM,
     SUSTAIN,
     TREMOLO,
-    Bend,
-    ControlChange,
-    NoteOff,
-    NoteOn,
-    PatchTurned,
 )
-from app.patches.instrument import SingleString
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
-from app.patches.patch import BodyChoice, Patch
-from app.playing import recorder
-from app.playing.due import Due
-from app.playing.key_note import KeyNote
-from app.playing.notes import Notes
-from app.playing.sources import Sources
-from engine.effects import Effects
-from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 from engine.voices import Mixer
@@ -72,10 +66,10 @@ class Played:
         self.keys, self.handle = self.notes.keys, self.notes.handle
         self.choose(PATCH)
 
-    def choose(self, patch: Patch | SingleString, beside: Patch | None = None) -> None:
+    def choose(self, patch: Patch, single: str | None = None) -> None:
         """Another instrument, and wait until its keys sound and its effects are set."""
-        self.notes.set_instrument(patch, EAR, beside)
-        if isinstance(patch, Patch):
+        self.notes.set_instrument(patch, EAR, single)
+        if single is None:
             self.wait(lambda: self.keys.player is not None and self.keys.player.patch == patch)
         self.settle()
 
@@ -198,7 +192,7 @@ def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch
         held.wait(30)
         return body_curves(*args)
 
-    monkeypatch.setattr("app.instrument.string_keys.body_curves", slow)
+    monkeypatch.setattr("app.instrument.strings.body_curves", slow)
     knob = Thread(target=played.notes.set_instrument, args=(PATCH.with_value("knobs.stiffness", 3.0), EAR))
     key = Thread(target=lambda: struck.append(played.handle(NoteOn(52, 60))))
     knob.start()
@@ -229,7 +223,7 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
     fresh = InstrumentPlayer(exact.patch, exact.preset, 48_000, {"model": 1.0}, exact.ear)
     fresh.handle(NoteOn(45, 60))
     fresh.compiled.catch_up(Mixer(48_000).address)
-    assert played.strike(NoteOn(45, 60)).gain == fresh.reports()[0].gain
+    assert played.strike(NoteOn(45, 60)).gain == fresh.compiled.reports()[0].gain
     last = [event for event in played.recorded() if isinstance(event, PatchTurned)][-1].patch
     assert (last.knobs.stiffness, last.pickup.points, last.pickup.kind) == (3.0, (0.1, 0.2), "velocity")
 
@@ -267,10 +261,10 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
 
 def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
     held = Event()
-    played.notes.set_instrument(SingleString(), EAR)
+    played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)
     played.notes.set_instrument(PATCH, EAR)
-    played.notes.set_instrument(SingleString(), EAR)
+    played.notes.set_instrument(None, EAR, "")
     held.set()
     played.settle()
     assert played.keys.player is None
@@ -297,7 +291,7 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
 
 
 def test_a_patch_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(played: Played) -> None:
-    played.choose(SingleString(preset="gone"), PATCH)
+    played.choose(PATCH, "gone")
     assert played.handle(NoteOn(45, 60)) is None and played.handle(NoteOff(45)) is None
     played.notes.set_instrument(PATCH, EAR)
     played.strike(NoteOn(45, 60))
@@ -346,7 +340,7 @@ def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are
         played.notes.hear_dry(dry)
         played.settle()
         assert (played.effects[-1] is None) == dry
-    played.choose(SingleString(), WOODEN)
+    played.choose(WOODEN, "")
     assert played.effects[-1] is None
     played.choose(WOODEN)
     assert played.effects[-1] is not None

@@ -23,12 +23,11 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
-from app.playing.dropping import DROPPED
-from app.playing.due import Due
-from app.playing.key_note import KeyNote
+from app.playing.key_note import DROPPED, KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
+from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
 from engine.kernels.constants import AHEAD, QUANTUM

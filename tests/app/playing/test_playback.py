@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from app.instrument.events import KEYS, Bend, Event, NoteOff, NoteOn, TimedEvent, release_all
-from app.playing.due import Due
-from app.playing.playback import AHEAD_S, Playback
+from app.playing.playback import AHEAD_S, Due, Playback
 from engine.voices import Mixer
 
 RATE_HZ = 48_000

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn
-from app.instrument.midi_file import messages_of
+from app.instrument.midi_file import message_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 
@@ -42,15 +42,27 @@ def tried(work: Callable[[], Any]) -> Any:
             time.sleep(0.05)
 
 
+def virtual_output(name: str) -> Any:
+    """An output that other programs find as an input."""
+    import supriya_midi
+
+    systems = {supriya_midi.get_api_name(api): api for api in supriya_midi.get_compiled_apis()}
+    output = supriya_midi.MidiOut(systems[os.environ[VARIABLE]], "Learned Strings")
+    try:
+        return output.open_virtual_port(name)
+    except (supriya_midi.RtMidiError, RuntimeError) as error:
+        output.delete()
+        raise OSError(str(error)) from error
+
+
 def measured(backend: RtMidi) -> dict[str, Any]:
     came: list[Event] = []
     ended, found = threading.Event(), dict[str, Any]()
-    midi, output = MidiInput(came.append), tried(lambda: backend.virtual_output("hands"))
+    midi, output = MidiInput(came.append), tried(lambda: virtual_output("hands"))
 
     def send(*events: Event) -> None:
         for event in events:
-            for message in messages_of(event):
-                output.send_message(message.bytes())
+            output.send_message(message_of(event))
 
     def stream() -> None:
         while not ended.is_set():
@@ -80,13 +92,13 @@ def measured(backend: RtMidi) -> dict[str, Any]:
     finally:
         ended.set()
         streaming.join()
-    other = backend.virtual_output("other")
+    other = virtual_output("other")
     midi.open(port("other"))
     found["looks"] = [midi.look()]
     other.delete()
     until(lambda: found["looks"][-1] or found["looks"].append(midi.look()))
     found["looks"].append(midi.look())
-    other = backend.virtual_output("other")
+    other = virtual_output("other")
     until(lambda: found["looks"][-1] or found["looks"].append(midi.look()))
     came.clear()
     until(lambda: other.send_message([0x90, 60, 100]) or came)

@@ -15,15 +15,15 @@ from pytestqt.qtbot import QtBot
 from app.export.choices import ExportChoices
 from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
-from app.patches.instrument import SingleString
-from app.presets.install import InstallError, install_preset
+from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
-from app.shared.parameters import PARAMETERS
+from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, load_preset, preset_digest
+from engine.presets import SHIPPED, PresetError, load_preset, preset_digest
+from engine.result_file import WriteError
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
@@ -76,13 +76,12 @@ def test_a_preset_is_installed_and_a_taken_name_gets_a_number(
 ) -> None:
     given = other_preset(small_preset, tmp_path / "first.safetensors")
     present = [entry.path for entry in library.entries]
-    installed = install_preset(given, own, present)
-    assert (installed.name, installed.was_there) == ("first_2", False)
-    assert installed.path.read_bytes() == given.read_bytes()
-    again = install_preset(given, own, [*present, installed.path])
-    assert (again.name, again.was_there) == ("first_2", True)
+    path, was_there = install_preset(given, own, present)
+    assert (path.name, was_there) == ("first_2.safetensors", False)
+    assert path.read_bytes() == given.read_bytes()
+    assert install_preset(given, own, [*present, path]) == (path, True)
     assert files(own) == ["first_2.safetensors"]
-    assert install_preset(small_preset, own, present).was_there
+    assert install_preset(small_preset, own, present)[1]
 
 
 @pytest.mark.parametrize("data", [b"", b"no preset", None])
@@ -91,14 +90,14 @@ def test_what_is_no_preset_is_refused_and_leaves_nothing(
 ) -> None:
     given = tmp_path / "bad.safetensors"
     given.write_bytes(small_preset.read_bytes()[:-9] if data is None else data)
-    with pytest.raises(InstallError, match=r"bad\.safetensors: not a whole safetensors file"):
+    with pytest.raises(PresetError, match=r"bad\.safetensors: not a whole safetensors file"):
         install_preset(given, own, [])
     assert not own.exists()
 
 
 def test_a_folder_that_cannot_be_made_is_reported(small_preset: Path, own: Path) -> None:
     own.write_text("in the way")
-    with pytest.raises(InstallError, match="cannot be written"):
+    with pytest.raises(WriteError, match="cannot be written"):
         install_preset(small_preset, own, [])
 
 
@@ -127,7 +126,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     dropped = receive(tmp_path / "b.WAV", library)
     assert dropped.notice == ""
     assert dropped.choices == {
-        "instrument": SingleString(preset="second"),
+        "single": "second",
         "string": None,
         "position": 0.61,
         "amplitude_mm": 2.5,
@@ -159,7 +158,7 @@ def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
     """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
     export, preset = ExportChoices(), load_preset(preset_folder / "first.safetensors")
     assert export.until_decayed
-    assert export.longest_s > PARAMETERS["seconds"].limits[1]
+    assert export.longest_s > OF_CHOICES["seconds"].limits[1]
     request = SoundRequest(preset, Pluck(0.5, 2.0), 0.3, export.longest_s, decay_db=export.decay_db)
     export_sound(request, tmp_path / "a.wav")
     dropped = receive(tmp_path / "a.wav", library)

@@ -2,7 +2,6 @@
 
 import pytest
 
-from app.patches.instrument import SingleString
 from app.patches.patch import Fretted, Patch, Pickup
 from app.session.choices import Choices, Session
 from engine.values.string import StringParameters
@@ -85,16 +84,16 @@ def test_keys_play_what_was_chosen_last() -> None:
     session = Session(Choices(instrument=patch, string=string))
     session.update(preset="one")
     choices = session.choices
-    assert (choices.instrument, choices.patch, choices.string) == (SingleString(preset="one"), patch, None)
+    assert (choices.single, choices.patch, choices.string) == ("one", patch, None)
     session.update(preset="many")
-    assert (session.choices.instrument, session.choices.kept) == (patch, None), "it is the preset of the instrument"
+    assert (session.choices.instrument, session.choices.single) == (patch, None), "it is the preset of the instrument"
     session.update(preset="one")
     session.play_patch()
     assert (session.choices.preset, session.choices.plays_patch) == ("many", True)
     session.play(string=string)
     session.play_string()
     choices = session.choices
-    assert (choices.instrument, choices.patch, choices.string) == (SingleString(preset="many"), patch, string)
+    assert (choices.single, choices.patch, choices.string) == ("many", patch, string)
     session.update(patch=patch.model_copy(update={"name": "turned"}))
     assert (session.choices.plays_patch, session.choices.patch and session.choices.patch.name) == (False, "turned")
 
@@ -106,10 +105,20 @@ def test_choices_from_before_the_instrument_are_understood(plays: str | None, pr
     old = {"preset": preset, "patch": patch.model_dump(), "string": STRING, "position": 0.4}
     choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
     assert (choices.patch, choices.position) == (patch, 0.4)
-    assert choices.instrument == (SingleString(preset=preset) if plays == "place" else patch)
+    assert choices.single == (preset if plays == "place" else None)
     assert (choices.string is None) == (preset == "one" and plays != "place"), "it is no string of that preset"
-    assert Choices.model_validate({"preset": preset}).instrument == SingleString(preset=preset)
+    assert Choices.model_validate({"preset": preset}).single == preset
     assert Choices.model_validate_json(choices.model_dump_json()) == choices
+
+
+def test_choices_of_two_kinds_of_instruments_are_understood() -> None:
+    patch = played_patch(0.2).model_dump()
+    played = Choices.model_validate({"instrument": patch, "kept": None, "position": 0.4})
+    assert (played.instrument, played.single, played.preset) == (played_patch(0.2), None, "many")
+    beside = Choices.model_validate({"instrument": {"preset": "one"}, "kept": patch, "string": STRING})
+    assert (beside.instrument, beside.single, beside.patch) == (None, "one", played_patch(0.2))
+    assert beside.string is not None
+    assert Choices.model_validate({"instrument": {"preset": "one"}, "kept": None}).patch is None
 
 
 def test_what_a_note_changes_is_reported_as_played_before_it_is_reported_as_changed() -> None:
@@ -150,7 +159,7 @@ def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
     session.update(patch=played_patch(0.6, 0.8))  # the other way
     choices = session.choices
     assert (choices.listen, choices.listen_right, choices.stereo, choices.pickup) == (0.6, 0.8, True, "displacement")
-    assert seen == [frozenset({"instrument", "patch", "listen", "listen_right", "stereo", "pickup"})]
+    assert seen == [frozenset({"patch", "listen", "listen_right", "stereo", "pickup"})]
 
 
 def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:

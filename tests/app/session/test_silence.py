@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.patches.instrument import SingleString
 from app.presets.library import Library, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
@@ -32,8 +31,7 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
     library = Library(list_presets(SHIPPED)[0])
     for name, solo, words in (("nylon_e2", 60, ""), ("piano_c4", 55, "this string has 53")):
         string = read_string(find_string(name))
-        many = SingleString(preset="studio_any_string")
-        found = why_silent(Choices(instrument=many, string=string, solo=solo, position=0.113), library)
+        found = why_silent(Choices(single="studio_any_string", string=string, solo=solo, position=0.113), library)
         assert words in found
         assert bool(found) == bool(words)
 
@@ -58,7 +56,7 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
     ],
 )
 def test_the_reason_is_named(library: Library, changes: dict[str, object], words: str) -> None:
-    found = why_silent(Choices(instrument=SingleString(preset="small"), **changes), library)
+    found = why_silent(Choices(single="small", **changes), library)
     assert words in found
     assert bool(found) == bool(words)
 

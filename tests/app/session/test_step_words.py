@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch
 from app.patches.tuning import TuningChoice
@@ -25,8 +24,8 @@ def harp() -> Patch:
     return read_patch(SHIPPED / "concert_harp.json")
 
 
-def words(before: Patch | SingleString, after: Patch | SingleString) -> str:
-    return step_words({"instrument": before}, {"instrument": after})
+def words(before: Patch, after: Patch) -> str:
+    return step_words({"patch": before}, {"patch": after})
 
 
 def with_part(patch: Patch, **parts: Any) -> Patch:
@@ -36,9 +35,9 @@ def with_part(patch: Patch, **parts: Any) -> Patch:
 def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
     assert words(guitar, guitar) == ""
     assert words(guitar, harp) == f"instrument {harp.name}"
-    assert words(SingleString(), guitar) == "instrument Classical guitar"
-    assert words(guitar, SingleString(preset="nylon")) == "preset nylon"
-    assert step_words({"kept": guitar}, {"kept": guitar.with_value("knobs.stiffness", 2.0)}) == "stiffness"
+    string, played = {"patch": guitar, "single": "nylon"}, {"patch": guitar, "single": None}
+    assert step_words(string, played) == "instrument Classical guitar"
+    assert step_words(played, string) == "preset nylon"
     assert words(guitar, with_part(guitar, name="Mine")) == "name of the instrument"
     assert words(guitar, guitar.with_value("knobs.stiffness", 2.0)) == "stiffness"
     assert words(guitar, guitar.with_value("pluck.position", 0.31)) == "pluck position"
@@ -76,12 +75,13 @@ def test_choices_of_the_pluck() -> None:
     start = {
         "position": 0.3,
         "amplitude_mm": 2.0,
-        "instrument": SingleString(preset="a"),
+        "patch": None,
+        "single": "a",
         "string": None,
         "width": 0.1,
     }
     assert step_words(start, {**start, "position": 0.5}) == "pluck position"
     assert step_words(start, {**start, "position": 0.5, "amplitude_mm": 4.0}) == "pluck position and amplitude"
-    assert step_words(start, {**start, "instrument": SingleString(preset="b")}) == "preset b"
-    every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"instrument", "kept"}}
+    assert step_words(start, {**start, "single": "b"}) == "preset b"
+    every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"patch", "single"}}
     assert all(reported and "_" not in reported for reported in every.values()), every

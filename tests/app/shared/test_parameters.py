@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.shared.parameters import OF_CHOICES, OF_PATCHES, PARAMETERS, Parameter
+from app.shared.parameters import OF_CHOICES, OF_PATCHES, Parameter
 
 
 @pytest.mark.parametrize("id", [id for id, each in OF_PATCHES.items() if each.words])
@@ -29,7 +29,7 @@ def test_help_explains_each_parameter(parameter: Parameter) -> None:
     assert parameter.tip
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda parameter: parameter.id)
+@pytest.mark.parametrize("parameter", {**OF_PATCHES, **OF_CHOICES}.values(), ids=lambda parameter: parameter.id)
 def test_a_knob_goes_through_its_whole_range_and_back(parameter: Parameter) -> None:
     low, high = parameter.limits
     values = [parameter.value(share / 10) for share in range(11)]

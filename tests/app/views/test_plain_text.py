@@ -15,7 +15,6 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
-from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
@@ -70,7 +69,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
     dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
     patch = read_patch(SHIPPED / "classical_guitar.json")
-    note = heard_note(Choices(instrument=SingleString(preset=entry.name)), Library([entry]), None)
+    note = heard_note(Choices(single=entry.name), Library([entry]), None)
     dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})
     views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
     for view in views:

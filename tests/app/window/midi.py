@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from app.instrument.events import Event, NoteOn
-from app.instrument.midi_file import messages_of
+from app.instrument.midi_file import message_of
 from app.views.dialogs.midi_dialog import MidiDialog
 from tests.app.window.driver import CONTROL, KEY, Window
 
@@ -41,11 +41,10 @@ class FakeBackend:
         """Send events, or the bytes of a message."""
         assert self.callback is not None
         for event in events:
-            messages = [event] if isinstance(event, bytes) else [each.bytes() for each in messages_of(event)]  # type: ignore[arg-type]
-            for message in messages:
-                thread = threading.Thread(target=self.callback, args=(message,))
-                thread.start()
-                thread.join()
+            message = event if isinstance(event, bytes) else message_of(event)  # type: ignore[arg-type]
+            thread = threading.Thread(target=self.callback, args=(message,))
+            thread.start()
+            thread.join()
 
     def play(self, w: Window, notes: str, *events: NoteOn) -> None:
         """Choose an input in the window's dialog, and what notes do; then send some."""

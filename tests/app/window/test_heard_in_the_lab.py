@@ -241,7 +241,7 @@ def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it
     qtbot.waitUntil(lambda: lab.session.choices.string is not None)
     lab.session.play_string()
     string = lab.session.choices.string
-    assert string is not None and lab.session.choices.instrument.preset == "studio_any_string"
+    assert string is not None and lab.session.choices.single == "studio_any_string"
     lab.performance.stop()
     qtbot.waitUntil(lambda: lab.performance.at_hand)
     while np.abs(take(lab, 0.1)).max() > 1e-8:

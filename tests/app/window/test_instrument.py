@@ -14,9 +14,7 @@ from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
 
 from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
-from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings
-from app.patches.instrument import SingleString
+from app.instrument.strings import Strings, on_string
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, MacroTarget, Patch, Pickup
@@ -503,7 +501,7 @@ def test_notes_of_midi_choose_places_and_presets_and_a_pluck_after_them_is_of_th
     instruments.play(PluckAt(Pluck(0.6, 2.5)))
     assert path_of(guitar.struck[-1].request.preset).stem == "second"
     guitar.wait(lambda: (guitar.choices.preset, guitar.choices.position) == ("second", 0.6))
-    assert guitar.choices.instrument == SingleString(preset="second") and guitar.choices.amplitude_mm == 2.5
+    assert guitar.choices.single == "second" and guitar.choices.amplitude_mm == 2.5
     guitar.wait(lambda: all(each.seconds > 0 or each.cut for each in guitar.struck[-2:]))
     assert not guitar.struck[-1].cut and "cannot" not in guitar.window.notices.text
 

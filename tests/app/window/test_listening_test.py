@@ -16,6 +16,7 @@ from app.instrument.offline import render_events
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window import controller
 from app.window.settings import load_settings
+from engine.kernels import midi
 from engine.pluck import Pluck
 from engine.presets import load_preset
 from tests.app.window.conftest import Open
@@ -86,7 +87,7 @@ def test_the_test_keeps_its_pluck_and_volume_and_all_comes_back_as_it_was(
     taken: list[object] = []
     handle = heard.notes.handle
     monkeypatch.setattr(heard.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
-    released = [events.NoteOff(52), events.ControlChange(events.SUSTAIN, 0)]
+    released = [events.NoteOff(52), events.ControlChange(midi.SUSTAIN, 0)]
     for event in (PluckAt(Pluck(0.6, 8.0)), events.NoteOn(60, 90), *released):
         heard.controller.instruments.play(event)  # a MIDI keyboard
     heard.key(KEY.Key_Space)

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs PO
 RECORDING = """
 import json
 from PySide6.QtCore import QTimer
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import (Bend, ControlChange, NoteOff, NoteOn, PatchTurned)
 from app.window import main
 
 EVENTS = [NoteOn(60, 100), ControlChange(64, 127), Bend(0.25), NoteOff(60), NoteOn(64, 80)]
@@ -60,7 +60,7 @@ import json, sys
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
-from app.instrument.events import NoteOn
+from app.instrument.events import (NoteOn)
 from app.window import main
 
 def watch(controller):
@@ -133,7 +133,7 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
 ) -> None:
     times_s = recorded(tmp_path, end)
     if end != signal.SIGKILL:
-        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["instrument"]["level_db"] == -7.5
+        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["patch"]["level_db"] == -7.5
     (journal,) = left_journals(tmp_path / "left")
     played = journal.read()
     journal.close()

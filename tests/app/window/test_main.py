@@ -42,7 +42,7 @@ OPENING = """
 import json, sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
-from app.instrument.events import NoteOn
+from app.instrument.events import (NoteOn)
 from app.window import main
 
 def watch(controller):
@@ -99,5 +99,5 @@ def test_start_and_close(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
     saved = json.loads(settings.read_text())
-    assert (ROOT / "presets" / f"{saved['choices']['instrument']['preset']}.safetensors").is_file()
+    assert (ROOT / "presets" / f"{saved['choices']['patch']['preset']}.safetensors").is_file()
     assert saved["window_geometry"]

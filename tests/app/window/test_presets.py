@@ -15,7 +15,6 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from app.audio.sound import Sound
 from app.export.sound import SoundRequest
 from app.instrument.bodies import own_bodies
-from app.patches.instrument import SingleString
 from app.patches.library import find_patch
 from app.patches.tuning import Tuning
 from app.views.controls.browser import Browser
@@ -247,7 +246,7 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
     guitar.drop(tmp_path / "a.wav")
     choices = guitar.choices
     assert (choices.pluck.position, choices.listen, choices.stereo) == (0.3, 0.22, False)
-    assert (choices.instrument, choices.patch) == (SingleString(preset=entry.name), before.patch)
+    assert (choices.single, choices.patch) == (entry.name, before.patch)
     guitar.session.play_patch()
     choices = guitar.choices
     assert (choices.stereo, choices.listen, choices.patch) == (True, before.listen, before.patch)

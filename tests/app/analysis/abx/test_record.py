@@ -10,7 +10,6 @@ import pytest
 from pydantic import ValidationError
 
 from app.analysis.abx.record import AbxRecord, material_of, p_text, save_record
-from app.patches.instrument import SingleString
 from app.presets.library import list_presets
 from app.session.choices import Choices
 from engine.result_file import WriteError
@@ -64,7 +63,7 @@ def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     entry = list_presets(preset_folder)[0][0]
     string = StringParameters()
     for stereo, chosen in ((False, None), (True, string)):
-        choices = Choices(instrument=SingleString(preset=entry.name), position=0.3, string=chosen, stereo=stereo)
+        choices = Choices(single=entry.name, position=0.3, string=chosen, stereo=stereo)
         pluck = material_of(entry, choices, "").pluck
         assert pluck["position"] == 0.3
         assert pluck["string"] == (chosen and asdict(chosen))

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
-from app.instrument.events import HARMONICS, STRUM, TREMOLO, ControlChange, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import ControlChange, NoteOn, PatchTurned, TimedEvent
 from app.instrument.offline import render_events
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch, Technique
 from app.shared.parameters import OF_PATCHES
+from engine.kernels.midi import HARMONICS, STRUM, TREMOLO
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import (
     IN_FILE,

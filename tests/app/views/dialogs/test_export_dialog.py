@@ -21,7 +21,6 @@ from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
 from app.export.struck import Struck
 from app.instrument.events import NoteOn
-from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Patch
@@ -48,7 +47,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
     library = Library(list_presets(folder)[0])
 
     def note(heard: dict[str, object]) -> HeardNote | None:
-        choices = Choices(instrument=SingleString(preset="small"), position=0.4).changed(heard)
+        choices = Choices(single="small", position=0.4).changed(heard)
         struck = Struck(choices.instrument, NoteOn(59, 100)) if isinstance(choices.instrument, Patch) else None
         return heard_note(choices, library, struck)
 
@@ -222,7 +221,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     ("heard", "words"),
     [
         # the instrument is kept, as is its page then
-        ({"instrument": SingleString(preset="small"), "kept": GUITAR}, "None: the string alone, as it is heard"),
+        ({"single": "small", "patch": GUITAR}, "None: the string alone, as it is heard"),
         ({"instrument": GUITAR, "a": "difference"}, "without amplifier, body and room, as a difference is heard"),
     ],
 )
