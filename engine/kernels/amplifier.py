@@ -12,19 +12,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
-from engine.kernels.mixer_records import (
-    LAGS,
-    LARGEST,
-    OVERSAMPLING,
-    SHAPED_FRAMES,
-    SMALLEST,
-    Amplifier,
-    Mixer,
-)
+from engine.kernels.mixer_records import LAGS, LARGEST, OVERSAMPLING, SHAPED_FRAMES, SMALLEST, Amplifier, Mixer
 
 NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 BIAS = 0.25  # in the shape's own unit: 1 is where it bends most
@@ -38,7 +28,7 @@ REST_QUANTA = 400  # without input, after which all has died away
 TAPS = LAGS * OVERSAMPLING
 
 
-@njit(**COMPILED)
+@kernel
 def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer, see `engine.values.effects.Amp`; a tone of the peak NOMINAL keeps its level.
 
@@ -51,7 +41,7 @@ def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> Non
     amp.wanted_drive = factor / level if on else 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def amplify(mixer: Mixer) -> None:
     """Replace the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
     amp = mixer.amplifier
@@ -77,7 +67,7 @@ def amplify(mixer: Mixer) -> None:
     _give(mixer, amp, goal if first else share, reached)
 
 
-@njit(**COMPILED)
+@kernel
 def _begin(amp: Amplifier) -> None:
     """Reset the amplifier, as if there had never been any input.
 
@@ -104,7 +94,7 @@ def _begin(amp: Amplifier) -> None:
     amp.quiet = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _bessel(x: float) -> float:
     """I₀."""
     total = term = 1.0
@@ -114,7 +104,7 @@ def _bessel(x: float) -> float:
     return total
 
 
-@njit(**COMPILED)
+@kernel
 def _take(mixer: Mixer, amp: Amplifier) -> bool:
     """The next input behind the last one, through the high-pass. Returns whether there is any."""
     sounds = False
@@ -135,7 +125,7 @@ def _take(mixer: Mixer, amp: Amplifier) -> bool:
     return sounds
 
 
-@njit(**COMPILED)
+@kernel
 def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
     last = LAGS
@@ -170,7 +160,7 @@ def _shape(amp: Amplifier) -> None:
     amp.last = before
 
 
-@njit(**COMPILED)
+@kernel
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
     last = LAGS

@@ -14,10 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import behind
 from engine.kernels.mixer_records import MOST_LATENTS, SCRATCH_ROWS
@@ -33,7 +32,7 @@ STRAIGHT = 5e-6  # radians and nepers of a segment that may come from a cubic te
 _TWO_PI = 2 * math.pi
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _turn(angle: float) -> tuple[float, float]:
     """Cosine and sine of any angle to 1e-8, as arithmetic that becomes vector instructions."""
     x = (angle - _TWO_PI * np.floor(angle / _TWO_PI + 0.5)) * 0.25
@@ -44,7 +43,7 @@ def _turn(angle: float) -> tuple[float, float]:
     return 1 - 2 * s * s, 2 * s * c
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _exp(x: float) -> float:
     """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64.
 
@@ -62,7 +61,7 @@ def _exp(x: float) -> float:
     return e * e
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _tanh(x: float) -> float:
     y = 0.5 * (-18.0 if x < -18 else 18.0 if x > 18 else x)
     s = y * y
@@ -70,7 +69,7 @@ def _tanh(x: float) -> float:
     return 2 * t / (1 + t * t)
 
 
-@njit(**COMPILED)
+@kernel
 def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -> None:
     """E_m (modes,) at a time in trained samples."""
     n = program.modes
@@ -80,7 +79,7 @@ def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -
         out[m] = start[m] * _exp(-2 * sigma[m] * time)
 
 
-@njit(**COMPILED)
+@kernel
 def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """f(E) - K E, (2 modes,)."""
     n = program.modes
@@ -147,7 +146,7 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
             out[n + j] += omega[j] * (math.sqrt(1 + 2 * max(share[j], -0.4)) - 1 - linear[j])
 
 
-@njit(**COMPILED)
+@kernel
 def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
     """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
     n = program.modes
@@ -173,13 +172,13 @@ def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
         _integrate_from(voice, program, 0, scratch)
 
 
-@njit(**COMPILED)
+@kernel
 def _width(node: int) -> int:
     """Nodes from this one to the next that is used: what is left to change does so ever more slowly."""
     return 1 if node < 16 else 2 if node < 64 else 4 if node < 256 else 8
 
 
-@njit(**COMPILED)
+@kernel
 def _integrate_from(voice: Voice, program: BankProgram, node: int, scratch: np.ndarray) -> None:
     """The higher orders at a node, half-way and at the next."""
     n = program.modes
@@ -190,7 +189,7 @@ def _integrate_from(voice: Voice, program: BankProgram, node: int, scratch: np.n
         higher_orders(program, energy, rows(voice, at.AT_LEFT + 2 * half, 2), more)
 
 
-@njit(**COMPILED)
+@kernel
 def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
     """Move on to the node before a time."""
     n = program.modes
@@ -215,7 +214,7 @@ def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.n
         higher_orders(program, energy, right, more)
 
 
-@njit(**COMPILED)
+@kernel
 def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
     """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
     n = program.modes
@@ -247,7 +246,7 @@ def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray
         change[j] = -grown if change[j] < 0 else grown
 
 
-@njit(**COMPILED)
+@kernel
 def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
     n = program.modes
@@ -299,7 +298,7 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
         _change(program, level, alive, out[4 * n :], scratch)
 
 
-@njit(**COMPILED)
+@kernel
 def generate(
     voice: Voice, program: BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
@@ -359,7 +358,7 @@ def generate(
     voice.audible_count = alive
 
 
-@njit(**COMPILED)
+@kernel
 def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
     """Keep the state at which the next segment begins."""
     n = program.modes
@@ -371,15 +370,9 @@ def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarr
     voice.segment_valid = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _segment(
-    voice: Voice,
-    program: BankProgram,
-    first: int,
-    length: int,
-    alive: int,
-    z: np.ndarray,
-    scratch: np.ndarray,
+    voice: Voice, program: BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
     n = program.modes
@@ -458,7 +451,7 @@ def _segment(
         next_change[m] = end[4 * n + m]
 
 
-@njit(**COMPILED)
+@kernel
 def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """Add Re Σ w z at each frame of the quantum."""
     n, alive = voice.modes, voice.audible_count
@@ -475,7 +468,7 @@ def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, s
         out[frame] += total + constant
 
 
-@njit(**COMPILED)
+@kernel
 def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
     """Find the latents whose modulation can be heard, and those whose squares are heard in it.
 
@@ -522,15 +515,9 @@ def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray
         voice.modulated = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _modulate(
-    voice: Voice,
-    program: BankProgram,
-    z: np.ndarray,
-    fading: bool,
-    points: int,
-    out: np.ndarray,
-    scratch: np.ndarray,
+    voice: Voice, program: BankProgram, z: np.ndarray, fading: bool, points: int, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """Add what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
     n = program.modes

@@ -21,10 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import address_of, attack_at, behind, mixed, mixer_at, player_at, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
@@ -42,7 +41,7 @@ WINDINGS_M, LOWEST_SLIDE_HZ = 2_500.0, 200.0
 LEFT_DB = -80.0  # of the burst as it ends
 
 
-@njit(**COMPILED)
+@kernel
 def attack_of(table: Table) -> Attack:
     """The recorded attack of a table that has one."""
     return attack_at(address_of(table) + 8 * table.attack)
@@ -72,7 +71,7 @@ class Touch(NamedTuple):
     slides_s: float
 
 
-@njit(**COMPILED)
+@kernel
 def touch(player: Player, table: Table, by: Touch) -> None:
     """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
     if not by.level_db > OFF_DB:
@@ -129,14 +128,14 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     noise.left = int(max(pulse_frames, falls)) + 1
 
 
-@njit(**COMPILED)
+@kernel
 def hush(player: Player, quanta: int) -> None:
     """Let all noises fade out."""
     for number in range(of.MOST_NOISES):
         player.noises[number].stops = quanta
 
 
-@njit(**COMPILED)
+@kernel
 def sound(player_address: int, mixer_address: int) -> None:
     """Add all noises to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
@@ -177,7 +176,7 @@ def sound(player_address: int, mixer_address: int) -> None:
             noise.left = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
     """Add a force to a frame of the mix, at a gain between two quanta.
 
@@ -191,15 +190,8 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
     mix[frame, 1] += level * force
 
 
-@njit(**COMPILED)
-def _run(
-    noise: Noise,
-    begin: int,
-    end: int,
-    before: float,
-    gain: float,
-    mix: np.ndarray,
-) -> None:
+@kernel
+def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np.ndarray) -> None:
     """Add a noise to frames of the mix, while its gain goes from `before` to `gain`."""
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
@@ -234,16 +226,8 @@ def _run(
     noise.done = done
 
 
-@njit(**COMPILED)
-def _play(
-    player: Player,
-    attack: Attack,
-    noise: Noise,
-    begin: int,
-    end: int,
-    before: float,
-    mix: np.ndarray,
-) -> None:
+@kernel
+def _play(player: Player, attack: Attack, noise: Noise, begin: int, end: int, before: float, mix: np.ndarray) -> None:
     """Add a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
     gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz

@@ -24,11 +24,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import lanes, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import MOST_PAIRS, QUANTUM
 from engine.kernels.memory import fence, tension_program_at, truth_program_at, voice_at
 from engine.kernels.mixer_records import MOST_COURSE, CourseString, Mixer
@@ -40,7 +39,7 @@ SHARED = 2 * MOST_PAIRS  # modes of a string that have a part in the bridge, at 
 PARTS = lanes.PARTS * SHARED  # slots of all their parts
 
 
-@njit(**COMPILED)
+@kernel
 def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
     """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
     if voice.course != course or voice.course_done == now + 1:
@@ -51,7 +50,7 @@ def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
     return voice.state == at.SOUNDING and voice.late == late
 
 
-@njit(**COMPILED)
+@kernel
 def add(mixer: Mixer, place: int, now_s: float) -> int:
     """Add the next quantum of the course of an active voice, by its place, to the mix.
 
@@ -94,13 +93,13 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
     return first_voice.state
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _string(mixer: Mixer, number: int) -> CourseString:
     """A string that is generated now, by its number."""
     return mixer.course[mixer.generated[number]]
 
 
-@njit(**COMPILED)
+@kernel
 def _generate(mixer: Mixer, strings: int, first: bool) -> None:
     """The next quantum of the strings that are generated now.
 
@@ -136,7 +135,7 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
             remember(voice, audible, first, out)
 
 
-@njit(**COMPILED)
+@kernel
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
     """A quantum of latents that share a tension."""
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
@@ -156,7 +155,7 @@ def _ring(mixer: Mixer, strings: int, shared: int) -> None:
             lanes.meet_3(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
 
 
-@njit(**COMPILED)
+@kernel
 def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> None:
     """A quantum of strings that are solved."""
     scratch = mixer.scratch[:]
@@ -181,13 +180,13 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
                 speeds[mode] -= parts[mode] * sums[mode]
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _speeds(voice: Voice, shared: int) -> np.ndarray:
     """Speeds of a solved string's first modes."""
     return row(voice, 1)[: min(voice.modes, shared)]
 
 
-@njit(**COMPILED)
+@kernel
 def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
     """Prepare a string for a quantum, with its parts and modes from a slot of the scratch on.
 
@@ -224,7 +223,7 @@ def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int,
     return first + lanes.slots(max(voice.modes, SHARED))
 
 
-@njit(**COMPILED)
+@kernel
 def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> None:
     """Compute the parts of strings' modes in the bridge's motion, and what that takes from them in a frame.
 
@@ -257,7 +256,7 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
                 parts[2, mode] = part / omega * (2 * step_s / (1 + step_s * sums[mode]))
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
     first = string.first
@@ -284,7 +283,7 @@ def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int
     string.stretch, string.second = sums
 
 
-@njit(**COMPILED)
+@kernel
 def _put_back(string: CourseString, voice: Voice, scratch: np.ndarray) -> None:
     """A string as it is after a quantum."""
     order = row(voice, at.ORDER).view(np.int64)[: voice.heard]

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes, loudness, velocities
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, voice_at, wholes
 from engine.kernels.modes import TOO_HIGH, row, weights
 from engine.kernels.playing import channels, slots
@@ -29,38 +28,38 @@ SQUARE, SIGMA, _COUPLING, _STRETCH, STRUCK, WEIGHTS = range(6)  # rows of a drum
 UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
-@njit(**COMPILED)
+@kernel
 def has_drum(table: Table, key: int) -> bool:
     """Return True if a table of drums has one for a key."""
     return wholes(address_of(table))[table.drums + key] != 0
 
 
-@njit(**COMPILED)
+@kernel
 def drum_of(table: Table, key: int) -> Drum:
     """The drum of a key that has one."""
     address = address_of(table)
     return drum_at(address + 8 * wholes(address)[table.drums + key])
 
 
-@njit(**COMPILED)
+@kernel
 def rows_of(drum: Drum) -> np.ndarray:
     """The rows (DRUM_ROWS, modes) of a drum."""
     return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
 
 
-@njit(**COMPILED)
+@kernel
 def _speed(drum: Drum, share: float) -> float:
     """The speed of a mallet at a share of the velocities, in m/s."""
     return velocities.between(drum.softest_m_s, drum.hardest_m_s, share)
 
 
-@njit(**COMPILED)
+@kernel
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
     return _speed(drum, velocities.share(velocity, player.values[of.CURVE]))
 
 
-@njit(**COMPILED)
+@kernel
 def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple[float, float]:
     """Strength and hardness of a blow on a key's drum, for the noise of the contact; see `engine.kernels.contact`."""
     drum = drum_of(table, key)
@@ -68,14 +67,14 @@ def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple
     return _speed_of(player, drum, velocity) / reference, min(FIRM_S / drum.contact_s, MOST_HARDER)
 
 
-@njit(**COMPILED)
+@kernel
 def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
     """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives."""
     masses_kg = drum.mass_kg, drum.mallet_kg
     drum_modes.blow(rows_of(drum)[SQUARE], struck, drum.contact_s, masses_kg, speed, out[: drum.modes])
 
 
-@njit(**COMPILED)
+@kernel
 def gain_of(player: Player, table: Table, key: int) -> float:
     """The factor that makes a key as loud as others.
 
@@ -118,7 +117,7 @@ def gain_of(player: Player, table: Table, key: int) -> float:
     return player.gains[key, 0]
 
 
-@njit(**COMPILED)
+@kernel
 def strike(player: Player, table: Table, event: Event, number: int) -> float:
     """Make the voices of one of the player's notes; their gain, 0: no drum."""
     if not has_drum(table, event.key):
@@ -139,7 +138,7 @@ def strike(player: Player, table: Table, event: Event, number: int) -> float:
     return gain
 
 
-@njit(**COMPILED)
+@kernel
 def _make(
     player: Player, table: Table, address: int, drum: Drum, struck: np.ndarray, speed: float, source: int
 ) -> None:
@@ -168,7 +167,7 @@ def _make(
     voice.peak, voice.limit = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
 
 
-@njit(**COMPILED)
+@kernel
 def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
     """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
     highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum)
@@ -180,7 +179,7 @@ def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) ->
             imaginary[mode] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def hear(player: Player, table: Table, note: Note) -> None:
     """Let a note follow the gains of sources and the places where the drum is heard."""
     if table.drums == 0 or not has_drum(table, note.key):

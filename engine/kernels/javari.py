@@ -36,12 +36,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import lanes, strings, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import tension_program_at, truth_program_at
 from engine.kernels.modes import damped, following, row, weights
@@ -51,7 +50,7 @@ from engine.kernels.voice_records import TensionProgram, TruthProgram, Voice
 PHASE, MOST_STEPS = 0.15, 6
 
 
-@njit(**COMPILED)
+@kernel
 def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
     """Give a voice that has not begun an edge of its bridge.
 
@@ -73,7 +72,7 @@ def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz:
     voice.javari.loss, voice.javari.mass_kg = edge[2], mass
 
 
-@njit(**COMPILED)
+@kernel
 def force(before: float, free: float, give: float, stiffness: float, loss: float) -> float:
     """The force of the edge within a step, in N.
 
@@ -96,7 +95,7 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
     return (moved - (b + math.sqrt(max(b * b - 4 * a * half * before * before, 0.0))) / (2 * a)) / give
 
 
-@njit(**COMPILED)
+@kernel
 def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
     if voice.kind == at.TRUTH:
@@ -112,7 +111,7 @@ def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch
     voice.generated += QUANTUM
 
 
-@njit(**COMPILED)
+@kernel
 def _prepare(voice: Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
     shapes = row(voice, at.JAVARI)
@@ -130,7 +129,7 @@ def _prepare(voice: Voice, step_s: float) -> None:
     voice.javari.give = give
 
 
-@njit(**COMPILED)
+@kernel
 def _ring(
     voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
@@ -204,7 +203,7 @@ def _ring(
     voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
-@njit(**COMPILED)
+@kernel
 def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
     sub_steps = truth.set_up(voice, program)

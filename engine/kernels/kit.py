@@ -6,11 +6,10 @@ The blocks of keys are written again when these are struck or heard.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as drums
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import KEYS
 from engine.kernels.drum_modes import D1, D3, DRUM, HARDEST, MODULUS, ORDERS, ROWS, SOFTEST, SURFACE
 from engine.kernels.kit_records import FOLLOWED, KIT, KIT_DRUM
@@ -25,7 +24,7 @@ MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)  #
 kit_at, kit_drum_at = record_at(KIT), record_at(KIT_DRUM)
 
 
-@njit(**COMPILED)
+@kernel
 def begin(kit_address: int, table_address: int) -> None:
     """Write all keys' blocks into an instrument's table."""
     values = table_at(table_address).values
@@ -37,7 +36,7 @@ def begin(kit_address: int, table_address: int) -> None:
     kit_at(kit_address).stale = 0
 
 
-@njit(**COMPILED)
+@kernel
 def follow(kit_address: int, which: int, value: float) -> None:
     """Follow the change of one of the instrument's values."""
     kit = kit_at(kit_address)
@@ -49,7 +48,7 @@ def follow(kit_address: int, which: int, value: float) -> None:
                 kit.keys[key].stale |= MOVES[number]
 
 
-@njit(**COMPILED)
+@kernel
 def prepare(kit_address: int, table_address: int, player_address: int) -> None:
     """Prepare the drums that are struck or heard in the next quantum: they follow changed values."""
     kit, player = kit_at(kit_address), player_at(player_address)
@@ -68,19 +67,19 @@ def prepare(kit_address: int, table_address: int, player_address: int) -> None:
                 _update(kit_address, table_address, key)
 
 
-@njit(**COMPILED)
+@kernel
 def _bessels(kit_address: int) -> np.ndarray:
     kit = kit_at(kit_address)
     return matrix(reals(kit_address), kit.bessels, kit.steps, kit.columns)
 
 
-@njit(**COMPILED)
+@kernel
 def _strike(kit_address: int, table_address: int, event: Event) -> None:
     if event.kind == of.NOTE_ON:
         _update(kit_address, table_address, event.key)
 
 
-@njit(**COMPILED)
+@kernel
 def _possible(drum: np.ndarray) -> bool:
     """Return True if `DrumParameters` would take the drum, as far as knobs and tuning change it."""
     for value in range(1, drums.X):
@@ -90,7 +89,7 @@ def _possible(drum: np.ndarray) -> bool:
     return drum[drums.THICKNESS] <= (length if drum[drums.SHAPE] == drums.BAR else min(length, width)) / 10
 
 
-@njit(**COMPILED)
+@kernel
 def _update(kit_address: int, table_address: int, key: int) -> None:
     """Write the block of a key that is stale."""
     kit = kit_at(kit_address)

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.mixer_records import MOST_EARS
 
 # mypy: disable-error-code="no-untyped-def"
@@ -32,18 +32,18 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _WHOLE, _LANE = ir.IntType(64), ir.IntType(32)
 
 
-@njit(**COMPILED)
+@kernel
 def place(number: int) -> int:
     """Slot of the first row of the mode with this number, from the first block on; rows are LANES apart."""
     return number // LANES * BLOCK + number % LANES
 
 
-@njit(**COMPILED)
+@kernel
 def blocks_of(modes: int) -> int:
     return (modes + LANES - 1) // LANES
 
 
-@njit(**COMPILED)
+@kernel
 def slots(modes: int) -> int:
     """Room for the blocks of so many modes in two groups, wherever the memory begins."""
     return (blocks_of(modes) + 2) * BLOCK
@@ -159,7 +159,7 @@ _sum, _sum_1, _sum_2, _sum_4 = (_sweep(False, ears) for ears in (0, 1, 2, 4))
 _turn, _turn_1, _turn_2, _turn_4 = (_sweep(True, ears) for ears in (0, 1, 2, 4))
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def turn(
     memory: np.ndarray,
     first: int,
@@ -187,7 +187,7 @@ def turn(
     return _turn_4(memory, first, near, far, linear, squared, at_points)
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def add_up(
     memory: np.ndarray, first: int, near: int, far: int, ears: int, at_points: np.ndarray
 ) -> tuple[float, float]:

@@ -10,9 +10,7 @@ as in G. Luff, "Designing a straightforward limiter", Signalsmith Audio, 2022.
 
 from __future__ import annotations
 
-from numba import njit
-
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.mixer_records import Mixer
 
@@ -22,7 +20,7 @@ _SIDE = AHEAD // 2 + 1  # frames of either average
 STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
 
 
-@njit(**COMPILED)
+@kernel
 def limit(mixer: Mixer) -> None:
     """Take the mix, (QUANTUM, 2), and leave there what is `AHEAD` frames older, within ±`CEILING`.
 
@@ -46,7 +44,7 @@ def limit(mixer: Mixer) -> None:
         peaks[frame], gains[frame] = peaks[QUANTUM + frame], gains[QUANTUM + frame]
 
 
-@njit(**COMPILED)
+@kernel
 def _reduce(mixer: Mixer) -> None:
     mix = mixer.mix[:]
     waiting = mixer.waiting[:]

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, types
 
 from engine.kernels import courses
 from engine.kernels import voice_records as at
 from engine.kernels.amplifier import amplify
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import COMPILED, inlined, kernel
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.contact import sound
 from engine.kernels.convolver import convolve
@@ -31,7 +31,7 @@ TONE_FADE_S = 0.020
 UNDERFLOW = 4  # PortAudio's flag
 
 
-@njit(**COMPILED)
+@kernel
 def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
     """The next frames, float32 (frames * channels,)."""
     channels = mixer.channels
@@ -57,7 +57,7 @@ def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
         done += count
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _quantum(mixer: Mixer, now_s: float) -> None:
     here = address_of(mixer)
     player = mixer.player
@@ -89,7 +89,7 @@ def _quantum(mixer: Mixer, now_s: float) -> None:
     _finish(mixer)
 
 
-@njit(**COMPILED)
+@kernel
 def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
     """Add the next quantum of an instrument's voices (1), or of all others (0), to the mix."""
     kept = 0
@@ -108,7 +108,7 @@ def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
     mixer.active = kept
 
 
-@njit(**COMPILED)
+@kernel
 def _take_up(mixer: Mixer) -> None:
     """Voices that were handed over; beyond the last place they are refused, and over."""
     pushed = mixer.pushed
@@ -124,7 +124,7 @@ def _take_up(mixer: Mixer) -> None:
         mixer.taken += 1
 
 
-@njit(**COMPILED)
+@kernel
 def _finish(mixer: Mixer) -> None:
     """Volume, test tone, limiter and meter."""
     mix = mixer.mix[:]

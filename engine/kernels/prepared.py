@@ -6,12 +6,12 @@ A plug-in computes the responses beside the sound, and mixes their partitions a 
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
 from engine.kernels import bodies, responses, rooms
 from engine.kernels import constants as of
 from engine.kernels.bodies import given_frames, rung_frames
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.convolver import BEHIND_IMPULSE, convolver_slots, partition, partitioned_slots
 from engine.kernels.fields import slots
@@ -37,7 +37,7 @@ CURVES_HZ = float(of.CURVES_HZ)
 BODY_SLOTS, RESPONSES_SLOTS = slots(BODY), slots(RESPONSES)
 
 
-@njit(**COMPILED)
+@kernel
 def body_frames(body: Body, size: float, rate_hz: float) -> int:
     """The length of a body's response; 0: there is none."""
     if body.frames > 0:
@@ -45,14 +45,14 @@ def body_frames(body: Body, size: float, rate_hz: float) -> int:
     return rung_frames(body.seconds, size, rate_hz) if body.modes > 0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def longest(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The length of body and room in series."""
     room = resampled_frames(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz)
     return room + max(body_frames(body, size, rate_hz) - 1, 0)
 
 
-@njit(**COMPILED)
+@kernel
 def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The width of a work space for responses of a body and a room."""
     slots = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
@@ -65,7 +65,7 @@ def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     return power_of_two(slots)
 
 
-@njit(**COMPILED)
+@kernel
 def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_address: int) -> None:
     """Write the memory that `prepare` needs."""
     body, needs = body_at(body_address), needs_at(needs_address)
@@ -77,7 +77,7 @@ def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_
     needs.convolver = convolver_slots(needs.frames)
 
 
-@njit(**COMPILED)
+@kernel
 def prepare(
     body_address: int,
     noise_address: int,
@@ -129,7 +129,7 @@ def prepare(
         responses.curves(work, response, prepared.curves)
 
 
-@njit(**COMPILED)
+@kernel
 def _respond(
     work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, response: np.ndarray
 ) -> None:
@@ -148,13 +148,13 @@ def _respond(
     bodies.respond_as(work, recorded, body.hz, size, rate_hz, response)
 
 
-@njit(**COMPILED)
+@kernel
 def weigh(found_address: int, body_mix: float, room_mix: float, weights_address: int) -> None:
     """Write the weights (4,) of a mix."""
     responses.weigh(responses_at(found_address).powers, body_mix, room_mix, part(reals(weights_address), 0, 4))
 
 
-@njit(**COMPILED)
+@kernel
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
     """Write some slots of a mix of responses as the convolver reads it."""
     prepared = responses_at(found_address)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import behind, fence, pointer
 from engine.kernels.voice_records import RenderedProgram, Voice
 
 
-@njit(**COMPILED)
+@kernel
 def generate(voice: Voice, program: RenderedProgram, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM). Where the samples are not there yet it fades out, stands still, and counts."""
     taps = program.taps

@@ -19,11 +19,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import strings
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import mixer_at, player_at, table_at
 from engine.kernels.mixer_records import LARGEST
@@ -36,7 +35,7 @@ STOPS = 0.98  # what is left in a frame of a string that is touched
 NOTHING = 1e-12  # of full scale: below it all rest
 
 
-@njit(**COMPILED)
+@kernel
 def tune(player: Player, table: Table) -> None:
     """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
     string_row, bank = player.own, player.sympathy
@@ -74,7 +73,7 @@ def tune(player: Player, table: Table) -> None:
     bank.partials = count
 
 
-@njit(**COMPILED)
+@kernel
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
     count = bank.partials
@@ -98,7 +97,7 @@ def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     return largest
 
 
-@njit(**COMPILED)
+@kernel
 def sympathise(player_address: int, mixer_address: int) -> None:
     """Add what strings ring that are not played to the mixer's quantum, both channels alike."""
     player = player_at(player_address)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import lanes
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import slots
 from engine.kernels.memory import behind
@@ -29,7 +28,7 @@ FEWER_QUANTA = 64  # from one look at whether a string's modes that still move n
 BEHIND_PROGRAM = slots(TENSION_PROGRAM)
 
 
-@njit(**COMPILED)
+@kernel
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
     """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
@@ -48,7 +47,7 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
                 memory[slot + row * lanes.LANES] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def load_weights(point_weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
     """Copy the weights of one ear into the blocks that `load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
@@ -56,7 +55,7 @@ def load_weights(point_weights: np.ndarray, order: np.ndarray, memory: np.ndarra
         memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
     """Copy modes back from their blocks."""
     for number in range(len(order)):
@@ -64,7 +63,7 @@ def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, fi
         x[order[number]], y[order[number]] = memory[slot], memory[slot + lanes.LANES]
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def node(
     memory: np.ndarray,
     first: int,
@@ -88,7 +87,7 @@ def node(
     return lanes.turn(memory, first, near, far, ears, linear, squared, at_points)
 
 
-@njit(**COMPILED)
+@kernel
 def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
     """Hold Σ ω² |z|² of blocks below the largest; return Σ |z|², and whether anything has changed."""
     total, energy = lanes.energies(memory, first, blocks)
@@ -108,7 +107,7 @@ def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> 
     return total, held
 
 
-@njit(**COMPILED)
+@kernel
 def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
     """Lay the highest modes to rest that are silent; those left."""
     while moving > 1:
@@ -123,7 +122,7 @@ def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: flo
     return moving
 
 
-@njit(**COMPILED)
+@kernel
 def advance(
     x: np.ndarray,
     y: np.ndarray,
@@ -174,7 +173,7 @@ def advance(
         save(x[string], y[string], order, memory, first)
 
 
-@njit(**COMPILED)
+@kernel
 def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
     """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
 
@@ -190,7 +189,7 @@ def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
     return (nodes + steps - 1) // steps * steps
 
 
-@njit(**COMPILED)
+@kernel
 def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
     if voice.steps == 1 or program.unheard > 0:
@@ -208,7 +207,7 @@ def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     return _nodes(voice, program, kick) < voice.steps
 
 
-@njit(**COMPILED)
+@kernel
 def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
     """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
     n, rate = voice.modes, program.rate_hz
@@ -259,7 +258,7 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
     voice.javari.give = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def _turn(voice: Voice, mode: int, sign: float) -> None:
     """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
 
@@ -275,7 +274,7 @@ def _turn(voice: Voice, mode: int, sign: float) -> None:
     x[mode], y[mode] = cosine * x[mode] - sine * y[mode], sine * x[mode] + cosine * y[mode]
 
 
-@njit(**COMPILED)
+@kernel
 def _fall(voice: Voice) -> None:
     """Modes that rest because nobody hears or feels them decay to the present."""
     frames = voice.rested * QUANTUM
@@ -301,7 +300,7 @@ def _fall(voice: Voice) -> None:
     voice.rested = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _wake(voice: Voice) -> None:
     """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
@@ -313,7 +312,7 @@ def _wake(voice: Voice) -> None:
     voice.felt = voice.moving
 
 
-@njit(**COMPILED)
+@kernel
 def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray) -> None:
     """Order the modes of a drum: those that are heard, others that stretch it, and those that rest.
 
@@ -382,7 +381,7 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
     voice.refresh = LOOKS_QUANTA
 
 
-@njit(**COMPILED)
+@kernel
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
     """Apply half of the kick that `node` begins with to y in place, forward or back."""
     first = second = 0.0
@@ -396,7 +395,7 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
         y[m] += sign * 0.5 * rows[2, m] * (linear - rows[4, m] * squared) * x[m]
 
 
-@njit(**COMPILED)
+@kernel
 def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     n = voice.modes
@@ -428,7 +427,7 @@ def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
         v[m] = v[m] * (1 + rows[5, m] * tension) + 2 * rows[5, m] * q[m] * moved
 
 
-@njit(**COMPILED)
+@kernel
 def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
@@ -468,7 +467,7 @@ def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     _half_kick(rows, x, voice.largest_stretch, y, -1.0)
 
 
-@njit(**COMPILED)
+@kernel
 def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
     n = voice.modes
@@ -504,7 +503,7 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     voice.prepared = 1
 
 
-@njit(**COMPILED)
+@kernel
 def generate(
     voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:

@@ -8,17 +8,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.modes import damped, glide, gliding, rest_above, rest_silent, row, table, turn, weights
 from engine.kernels.rotation import rotation
 from engine.kernels.voice_records import TruthProgram, Voice
 
 
-@njit(**COMPILED)
+@kernel
 def _sub_steps(voice: Voice, program: TruthProgram) -> int:
     """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
     n = voice.modes
@@ -31,7 +30,7 @@ def _sub_steps(voice: Voice, program: TruthProgram) -> int:
     return count if steps == 0 else (count + steps - 1) // steps * steps
 
 
-@njit(**COMPILED)
+@kernel
 def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
     """The exact damped rotations between kicks, of half the palindrome."""
     n = voice.modes
@@ -48,7 +47,7 @@ def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
     voice.javari.give = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def set_up(voice: Voice, program: TruthProgram) -> int:
     """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     changed = gliding(voice)
@@ -61,22 +60,16 @@ def set_up(voice: Voice, program: TruthProgram) -> int:
     return sub_steps
 
 
-@njit(**COMPILED)
+@kernel
 def advance(
-    voice: Voice,
-    program: TruthProgram,
-    sub_steps: int,
-    frame: int,
-    fading: bool,
-    audible: bool,
-    out: np.ndarray,
+    voice: Voice, program: TruthProgram, sub_steps: int, frame: int, fading: bool, audible: bool, out: np.ndarray
 ) -> None:
     """Advance by one frame of a quantum, after it is heard."""
     hear(voice, program, frame, fading, audible, out)
     ring(voice, program, sub_steps, max(sub_steps, 1))
 
 
-@njit(**COMPILED)
+@kernel
 def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The output of a frame.
 
@@ -100,7 +93,7 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible:
         voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
-@njit(**COMPILED)
+@kernel
 def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
     moving = voice.moving
@@ -116,7 +109,7 @@ def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> Non
             stretch = turn(q, v, moving, table(voice, first, 4), kick, couplings, stretches)
 
 
-@njit(**COMPILED)
+@kernel
 def generate(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     sub_steps = set_up(voice, program)

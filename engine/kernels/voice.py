@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import bank, javari, rendered, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import (
     bank_program_at,
@@ -30,7 +29,7 @@ FLUX_CURVES = 2.0  # e-folds up to which the flux is a curve: its series rises e
 WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 
-@njit(**COMPILED)
+@kernel
 def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     kind = voice.kind
@@ -51,7 +50,7 @@ def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scra
         move_points(voice, audible, rate_hz, out)
 
 
-@njit(**COMPILED)
+@kernel
 def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
     """Fade what a quantum is at its points to what it is at others."""
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
@@ -72,7 +71,7 @@ def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) ->
         voice.next_weights = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _velocity(
     voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
 ) -> None:
@@ -84,13 +83,13 @@ def _velocity(
     differentiate(voice, out, taps)
 
 
-@njit(**COMPILED)
+@kernel
 def is_first(voice: Voice) -> bool:
     """Return True if a voice is not yet ahead of what was heard of it."""
     return voice.generated == voice.frame
 
 
-@njit(**COMPILED)
+@kernel
 def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
     """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
@@ -117,7 +116,7 @@ def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
             voice.warm = WARMED - 1
 
 
-@njit(**COMPILED)
+@kernel
 def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
     """The velocity of the quantum before the latest, (2, QUANTUM) of `out`."""
     for point in range(voice.points):
@@ -129,7 +128,7 @@ def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
             out[point, frame] = total
 
 
-@njit(**COMPILED)
+@kernel
 def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
     """Take over the string of the voice before: stop its motion as this one begins, or add this pluck to it.
 
@@ -152,14 +151,14 @@ def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
     voice.previous_voice = earlier
 
 
-@njit(**COMPILED)
+@kernel
 def _never_begin(voice: Voice) -> None:
     """A voice that waits ends without a sound."""
     voice.gain = voice.gain_to = voice.wanted_gain = 0.0
     voice.release = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
     """The pluck is added to the motion of the voice before, which fades as this one begins.
 
@@ -198,7 +197,7 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
         voice.joins = joins
 
 
-@njit(**COMPILED)
+@kernel
 def _past(voice: Voice, before: Voice) -> None:
     """Displacement before the pluck: the motion so far, and the string held where the pluck begins."""
     pulled = row(voice, 0)
@@ -211,13 +210,13 @@ def _past(voice: Voice, before: Voice) -> None:
             history[frame] = other[frame] + held
 
 
-@njit(**COMPILED)
+@kernel
 def _eased(share: float) -> float:
     """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
     return share * share * (3 - 2 * share)
 
 
-@njit(**COMPILED)
+@kernel
 def _look_at_wishes(voice: Voice, now: int) -> None:
     """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     latest = voice.resonator
@@ -231,7 +230,7 @@ def _look_at_wishes(voice: Voice, now: int) -> None:
         address = wish.next
 
 
-@njit(**COMPILED)
+@kernel
 def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
     """Add the next quantum of a voice to the mix, (QUANTUM, 2). Return its state, which it leaves to the caller."""
     state = begin(voice, mixer)
@@ -251,12 +250,12 @@ def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
     return end(voice, mixer, now_s, out, voice.generated > generated)
 
 
-@njit(**COMPILED)
+@kernel
 def is_heard(voice: Voice) -> bool:
     return voice.gain != 0 or voice.gain_to != 0
 
 
-@njit(**COMPILED)
+@kernel
 def begin(voice: Voice, mixer: Mixer) -> int:
     """Begin a voice's next quantum before it is generated.
 
@@ -287,7 +286,7 @@ def begin(voice: Voice, mixer: Mixer) -> int:
     return at.SOUNDING
 
 
-@njit(**COMPILED)
+@kernel
 def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
     """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
 
@@ -347,7 +346,7 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
     return at.SOUNDING
 
 
-@njit(**COMPILED)
+@kernel
 def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
     """Note one more silence that nobody asked for."""
     gap = mixer.gaps[mixer.gap_count % GAPS]
@@ -358,7 +357,7 @@ def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
     mixer.gap_count += 1
 
 
-@njit(**COMPILED)
+@kernel
 def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
     """Let a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
     quanta = (frames + QUANTUM // 2) // QUANTUM

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import contact
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import voice_at
 from engine.kernels.modes import rows, wished_rows
 from engine.kernels.playing import channels, keys, slots, voices
@@ -19,7 +17,7 @@ DAMPER_S = 0.012  # of the glide to other modes
 LANDS = 0.03  # strength of what lands on a string at rest: an estimate
 
 
-@njit(**COMPILED)
+@kernel
 def landing(table: Table, note: Note) -> float:
     """The strength of the noise of what lands on a note's string.
 
@@ -32,15 +30,8 @@ def landing(table: Table, note: Note) -> float:
     return max(LANDS, voices.swing_m(note) / note.swing_m)
 
 
-@njit(**COMPILED)
-def retune(
-    player: Player,
-    table: Table,
-    note: Note,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def retune(player: Player, table: Table, note: Note, seconds: float, frame: int, now: int) -> None:
     """Let a note glide to its string as knobs, wheels and damper have changed it, where they have."""
     string, changed = player.bent, False
     if note.drum != 0:
@@ -73,14 +64,8 @@ def retune(
                 target_rows[place] = others[place]
 
 
-@njit(**COMPILED)
-def damp(
-    player: Player,
-    table: Table,
-    note: Note,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def damp(player: Player, table: Table, note: Note, frame: int, now: int) -> None:
     """Put the damper on a string or a drum that nothing holds."""
     held = note.held + note.kept + note.damped
     if held != 0 or table.let_ring != 0:
@@ -110,7 +95,7 @@ def damp(
                 target_rows[place] += math.log(1000.0) / t60_s
 
 
-@njit(**COMPILED)
+@kernel
 def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
     """Put the damper on strings that a pedal kept, and keep no longer."""
     for number in range(of.MOST_NOTES):
@@ -122,15 +107,8 @@ def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
             damp(player, table, note, frame, now)
 
 
-@njit(**COMPILED)
-def glide(
-    player: Player,
-    table: Table,
-    channel: int,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def glide(player: Player, table: Table, channel: int, seconds: float, frame: int, now: int) -> None:
     """Let strings follow the wheels of a channel; -1: all, whatever has changed."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]

@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import midi
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.records import Event, Player, Table
 
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
@@ -27,7 +25,7 @@ WIDEST_SEMITONES = 96.0  # that messages may ask for
 HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another key; of a slide, at times of 0 and 127
 
 
-@njit(**COMPILED)
+@kernel
 def rest(player: Player, number: int, pedal: int, plays: int) -> None:
     """A channel as if nobody had moved anything on it, except for these."""
     channel = player.channels[number]
@@ -42,7 +40,7 @@ def rest(player: Player, number: int, pedal: int, plays: int) -> None:
     channel.fine_tuning = 0
 
 
-@njit(**COMPILED)
+@kernel
 def reset(player: Player, number: int) -> None:
     """Reset wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
     channel = player.channels[number]
@@ -55,7 +53,7 @@ def reset(player: Player, number: int) -> None:
         channel.switches[switch] = 0
 
 
-@njit(**COMPILED)
+@kernel
 def begin(player: Player, number: int) -> None:
     """Put a channel in the state in which nobody has played on it."""
     reset(player, number)
@@ -63,7 +61,7 @@ def begin(player: Player, number: int) -> None:
     player.channels[number].volume = of.USUAL_VOLUME
 
 
-@njit(**COMPILED)
+@kernel
 def loudness(player: Player, mode: int, channel: int) -> float:
     """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
     share = 1.0
@@ -74,13 +72,13 @@ def loudness(player: Player, mode: int, channel: int) -> float:
     return share * share
 
 
-@njit(**COMPILED)
+@kernel
 def loudness_db(player: Player, mode: int, channel: int) -> float:
     """The same in dB."""
     return 20 * math.log10(max(loudness(player, mode, channel), 1e-9))
 
 
-@njit(**COMPILED)
+@kernel
 def is_master(mode: int, channel: int, other: int) -> bool:
     """Return True if the channel is the other's master in MPE, or the other itself.
 
@@ -89,13 +87,13 @@ def is_master(mode: int, channel: int, other: int) -> bool:
     return channel == other or (mode == of.MPE and channel == of.FIRST and other != of.ON_SCREEN)
 
 
-@njit(**COMPILED)
+@kernel
 def acts_on(mode: int, channel: int, other: int) -> bool:
     """Return True if wheel and pedal of a channel hold for what was struck on another."""
     return channel == other or (channel == of.FIRST and (mode == of.MPE or other == of.ON_SCREEN))
 
 
-@njit(**COMPILED)
+@kernel
 def pedal_down(player: Player, mode: int, channel: int) -> bool:
     """Return True if a pedal holds what was struck on a channel."""
     down = False
@@ -104,7 +102,7 @@ def pedal_down(player: Player, mode: int, channel: int) -> bool:
     return down
 
 
-@njit(**COMPILED)
+@kernel
 def semitones(player: Player, mode: int, channel: int) -> float:
     """The bend by pitch wheels of what was struck on a channel, plus its tuning, in semitones."""
     total = 0.0
@@ -117,12 +115,12 @@ def semitones(player: Player, mode: int, channel: int) -> float:
     return total
 
 
-@njit(**COMPILED)
+@kernel
 def _is_member(mode: int, number: int) -> bool:
     return mode == of.MPE and number != of.FIRST and number != of.ON_SCREEN
 
 
-@njit(**COMPILED)
+@kernel
 def _bend_range(player: Player, mode: int, number: int) -> float:
     """Semitones of a whole bend of a channel."""
     wide = player.channels[number].range_semitones
@@ -131,7 +129,7 @@ def _bend_range(player: Player, mode: int, number: int) -> float:
     return MPE_BEND_SEMITONES if _is_member(mode, number) else player.values[of.BEND_SEMITONES]
 
 
-@njit(**COMPILED)
+@kernel
 def set_parameter(player: Player, mode: int, number: int, controller: int, value: int) -> bool:
     """Follow the controllers that choose a registered parameter and set it; whether they set one that counts here.
 
@@ -176,7 +174,7 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def _is_string(player: Player, table: Table, channel: int) -> bool:
     """Return True if a channel is one string of a guitar. The first one is, once another string has played."""
     if table.mode != of.GUITAR:
@@ -190,7 +188,7 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
     return channel < count and others > 0
 
 
-@njit(**COMPILED)
+@kernel
 def place_of(player: Player, table: Table, event: Event) -> int:
     """The string of the instrument that an event's note has.
 
@@ -204,19 +202,19 @@ def place_of(player: Player, table: Table, event: Event) -> int:
     return (256 * (channel + 1) if table.mode == of.MPE else 0) + event.key + 1
 
 
-@njit(**COMPILED)
+@kernel
 def hold(player: Player, channel: int, key: int, down: bool) -> None:
     """Note whether a key is down."""
     player.channels[channel].held[key] = down
 
 
-@njit(**COMPILED)
+@kernel
 def strike(player: Player, channel: int, key: int) -> None:
     """Count a stroke of a key."""
     player.channels[channel].strokes[key] += 1
 
 
-@njit(**COMPILED)
+@kernel
 def release_latest(player: Player, channel: int, key: int) -> bool:
     """Take a release of a key for its earliest stroke that has none; return whether that is the latest."""
     strokes = player.channels[channel].strokes
@@ -224,26 +222,26 @@ def release_latest(player: Player, channel: int, key: int) -> bool:
     return strokes[key] == 0
 
 
-@njit(**COMPILED)
+@kernel
 def is_down(player: Player, channel: int, key: int) -> bool:
     return player.channels[channel].held[key] != 0
 
 
-@njit(**COMPILED)
+@kernel
 def release_key(player: Player, channel: int, key: int) -> None:
     """A key is not down, and none of its strokes awaits a release."""
     hold(player, channel, key, False)
     player.channels[channel].strokes[key] = 0
 
 
-@njit(**COMPILED)
+@kernel
 def release_keys(player: Player, channel: int) -> None:
     """Release all keys of a channel."""
     for key in range(of.KEYS):
         release_key(player, channel, key)
 
 
-@njit(**COMPILED)
+@kernel
 def switched(player: Player, mode: int, channel: int, which: int) -> bool:
     """Return True if a footswitch, by its number, holds for a channel."""
     down = False
@@ -252,7 +250,7 @@ def switched(player: Player, mode: int, channel: int, which: int) -> bool:
     return down
 
 
-@njit(**COMPILED)
+@kernel
 def moves_in_s(player: Player, mode: int, channel: int) -> float:
     """The time in which a note moves to another key of its channel."""
     for number in range(of.CHANNELS):

@@ -6,10 +6,9 @@ Its first note begins at once, the others wait their turns in the queue.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import copy, table_at
 from engine.kernels.playing import channels, keys, notes, slots
 from engine.kernels.records import Event, Player, Table
@@ -18,7 +17,7 @@ CHORD_S = 0.03  # in which notes come that are one chord: an estimate
 USUAL_STRUM_MS = 12.0  # of its footswitch
 
 
-@njit(**COMPILED)
+@kernel
 def _height(player: Player, table: Table, event: Event) -> int:
     """Rises from the lowest note of a chord to the highest: by strings where these are given, else by keys."""
     place = channels.place_of(player, table, event)
@@ -26,7 +25,7 @@ def _height(player: Player, table: Table, event: Event) -> int:
     return string * of.KEYS + event.key
 
 
-@njit(**COMPILED)
+@kernel
 def _strums_in(player: Player, table: Table, event: Event) -> int:
     """The frames from string to string of the chord of an event's note; 0: notes begin as they come."""
     note_on = event.kind == of.NOTE_ON and event.value > 0.0
@@ -39,21 +38,21 @@ def _strums_in(player: Player, table: Table, event: Event) -> int:
     return slots.frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def _continues(player: Player, frame: int) -> bool:
     """Return True if a note that comes at a frame belongs to the latest chord."""
     since = frame - player.chord_began
     return player.chord != 0 and 0 <= since <= slots.frames(player, CHORD_S)
 
 
-@njit(**COMPILED)
+@kernel
 def _goes_up(player: Player, table: Table) -> bool:
     """Return True if the next strum goes from the highest note to the lowest."""
     strokes = round(keys.value_of(player, table, of.STROKES))
     return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 
 
-@njit(**COMPILED)
+@kernel
 def _swap(player: Player, first: Event, second: Event) -> None:
     """Exchange two events; each place keeps its frame."""
     kept = player.kept_event
@@ -65,7 +64,7 @@ def _swap(player: Player, first: Event, second: Event) -> None:
     first.frame, second.frame = frame, other_frame
 
 
-@njit(**COMPILED)
+@kernel
 def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) -> None:
     """Let the first string of a chord come first, of notes that come at the same frame.
 
@@ -90,7 +89,7 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
     _swap(player, event, best)
 
 
-@njit(**COMPILED)
+@kernel
 def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     """Let a note wait for its turn in a chord; False: it begins now."""
     chord = player.chord
@@ -131,7 +130,7 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def waits(player: Player, event: Event, now: int) -> bool:
     """Put what is meant for a note behind it where that waits for its turn in a chord.
 
@@ -157,7 +156,7 @@ def waits(player: Player, event: Event, now: int) -> bool:
     return False
 
 
-@njit(**COMPILED)
+@kernel
 def forget_turns(player: Player, mode: int, channel: int) -> None:
     """Forget notes that wait for their turns in a chord: those of a channel, or all, -1."""
     for place in range(player.queued):
@@ -169,7 +168,7 @@ def forget_turns(player: Player, mode: int, channel: int) -> None:
             event.kind = of.NOTHING
 
 
-@njit(**COMPILED)
+@kernel
 def queue(player: Player, event: Event) -> None:
     """Put an event behind those of its frame and of earlier ones."""
     place = player.queued

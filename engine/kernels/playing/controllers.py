@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import contact, midi
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.playing import changes, channels, chords, hands, slots, voices
 from engine.kernels.records import Player, Table
 
 KNOB_S = 0.04  # of the glide to other modes
 
 
-@njit(**COMPILED)
+@kernel
 def stop(player: Player, seconds: float, frame: int) -> None:
     """Let all strings fade out, those too that nobody plays, and forget their places."""
     for number in range(of.MOST_NOTES):
@@ -29,16 +27,8 @@ def stop(player: Player, seconds: float, frame: int) -> None:
     contact.hush(player, slots.quanta(player, max(seconds, hands.STOP_S)))
 
 
-@njit(**COMPILED)
-def controller(
-    player: Player,
-    table: Table,
-    channel: int,
-    number: int,
-    value: int,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def controller(player: Player, table: Table, channel: int, number: int, value: int, frame: int, now: int) -> None:
     mode = table.mode
     state = player.channels[channel]
     wheel = table.wheel

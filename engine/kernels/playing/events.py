@@ -7,11 +7,9 @@ before it: slots, channels, keys, plucks, voices, gains, changes, notes, hands, 
 
 from __future__ import annotations
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import drums, midi
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
 from engine.kernels.mixer_records import Mixer
@@ -19,7 +17,7 @@ from engine.kernels.playing import changes, channels, chords, controllers, gains
 from engine.kernels.records import Event, Player
 
 
-@njit(**COMPILED)
+@kernel
 def _take_table(player: Player, address: int, frame: int, now: int) -> None:
     """Play another instrument, or the same with a knob turned; strings that ring glide to it.
 
@@ -40,7 +38,7 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
     player.serial = table.serial  # those before may be freed from here on
 
 
-@njit(**COMPILED)
+@kernel
 def _cancel(player: Player, id: int, now: int) -> None:
     """Forget the events whose frames are to come; but a table counts at once, for later events go by it.
 
@@ -60,7 +58,7 @@ def _cancel(player: Player, id: int, now: int) -> None:
     player.queued = kept
 
 
-@njit(**COMPILED)
+@kernel
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
     """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
     kind = event.kind
@@ -130,7 +128,7 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
         changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def _superseded(event: Event, following: Event) -> bool:
     """Return True if an event and the next move the same wheel: a burst costs one glide."""
     kind, key = event.kind, event.key
@@ -140,7 +138,7 @@ def _superseded(event: Event, following: Event) -> bool:
     return kind == of.BEND or (kind == of.CONTROLLER and key == midi.MOD_WHEEL)
 
 
-@njit(**COMPILED)
+@kernel
 def play(player_address: int, mixer_address: int) -> None:
     """Play all events that are due in the mixer's next quantum, before it is rendered."""
     player, mixer = player_at(player_address), mixer_at(mixer_address)
@@ -180,7 +178,7 @@ def play(player_address: int, mixer_address: int) -> None:
     voices.hear(player)
 
 
-@njit(**COMPILED)
+@kernel
 def begin(player_address: int) -> None:
     """Put all wheels and pedals of a new player at rest, and number its notes."""
     player = player_at(player_address)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import loudness, recorded, strings, velocities
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import behind
 from engine.kernels.playing import keys, plucks, voices
 from engine.kernels.records import Player, Table
@@ -19,7 +18,7 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 LEAST_SWING_M = 1e-9
 
 
-@njit(**COMPILED)
+@kernel
 def forget_gains(player: Player) -> None:
     """Gains of keys are computed again, each with the next note of its key."""
     player.limit = 0.0
@@ -28,7 +27,7 @@ def forget_gains(player: Player) -> None:
             player.gains[key, which] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def _sound(player: Player, table: Table, key: int, string: int) -> int:
     """Fill the sound of a key at the reference velocity, see `loudness`.
 
@@ -97,13 +96,13 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
     return modes
 
 
-@njit(**COMPILED)
+@kernel
 def _body(player: Player, table: Table) -> tuple[np.ndarray, float]:
     """The curves of the body, and how much of it is heard."""
     return behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def _look_at_peaks(player: Player, table: Table) -> None:
     """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
     share = plucks.reference_share(player)
@@ -123,7 +122,7 @@ def _look_at_peaks(player: Player, table: Table) -> None:
     player.limit = loudness.limit(highest)
 
 
-@njit(**COMPILED)
+@kernel
 def gain_of(player: Player, table: Table, key: int, string: int) -> float:
     """The factor that makes a key as loud as others on a string of a set.
 

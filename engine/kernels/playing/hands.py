@@ -13,11 +13,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import contact, strings
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import clear, table_at
 from engine.kernels.mixer_records import Mixer
@@ -31,15 +29,8 @@ USUAL_TREMOLO_HZ = 10.0  # of its footswitch
 VIBRATO_QUANTA = 8  # of a glide, of which a vibrato is made
 
 
-@njit(**COMPILED)
-def _move(
-    player: Player,
-    table: Table,
-    note: Note,
-    key: int,
-    frame: int,
-    now: int,
-) -> bool:
+@kernel
+def _move(player: Player, table: Table, note: Note, key: int, frame: int, now: int) -> bool:
     """Shorten or lengthen the string of a note for another key; False where it cannot play that key."""
     count, mode = table.strings, table.mode
     pitch_hz, string = keys.pitch_of(table, key), note.string
@@ -74,16 +65,8 @@ def _move(
     return True
 
 
-@njit(**COMPILED)
-def _move_others(
-    player: Player,
-    table: Table,
-    first: Note,
-    before: int,
-    key: int,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def _move_others(player: Player, table: Table, first: Note, before: int, key: int, frame: int, now: int) -> None:
     """Let the other strings of a course follow the first, a note that has moved."""
     id, channel = first.id, first.channel
     for number in range(of.MOST_NOTES):
@@ -94,7 +77,7 @@ def _move_others(
             _move(player, table, note, key, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) -> bool:
     """Give a key the latest note that is held on its channel, where legato is on.
 
@@ -138,14 +121,8 @@ def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) 
     return True
 
 
-@njit(**COMPILED)
-def _pull_off(
-    player: Player,
-    table: Table,
-    note: Note,
-    frame: int,
-    now: int,
-) -> bool:
+@kernel
+def _pull_off(player: Player, table: Table, note: Note, frame: int, now: int) -> bool:
     """Give the note of a released key to the highest key that is down and has none.
 
     Returns True if there is one.
@@ -166,14 +143,8 @@ def _pull_off(
     return False
 
 
-@njit(**COMPILED)
-def note_off(
-    player: Player,
-    table: Table,
-    event: Event,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def note_off(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
     channel, key = event.channel, event.key
     place = channels.place_of(player, table, event)
     for turn in range(2 * of.MOST_NOTES):  # first strings of courses first, which the others follow
@@ -190,7 +161,7 @@ def note_off(
             changes.damp(player, table, note, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def _is_meant(event: Event, note: Note) -> bool:
     """Return True if an event is for a note.
 
@@ -204,7 +175,7 @@ def _is_meant(event: Event, note: Note) -> bool:
     return channel in (of.ANY, note.channel) and key in (of.ANY, note.key)
 
 
-@njit(**COMPILED)
+@kernel
 def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
     """Bend single notes."""
     semitones = min(max(event.value, -channels.WIDEST_SEMITONES), channels.WIDEST_SEMITONES)
@@ -215,7 +186,7 @@ def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> No
             changes.retune(player, table, note, BEND_S, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def choke(player: Player, event: Event, frame: int) -> None:
     """Let single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
     id = event.id
@@ -236,7 +207,7 @@ def choke(player: Player, event: Event, frame: int) -> None:
             channels.release_key(player, held // of.KEYS, held % of.KEYS)
 
 
-@njit(**COMPILED)
+@kernel
 def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
     """Let a note glide to where its vibrato is some quanta later; all strings of a course alike."""
     depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
@@ -249,7 +220,7 @@ def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
     changes.retune(player, table, note, seconds, 0, now)
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
     """Lift fingers from strings that they touch, and pluck again what a tremolo plucks, in the next quantum."""
     address = player.table
@@ -277,14 +248,8 @@ def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
             _pluck_again(player, table, mixer, note, max(due, now))
 
 
-@njit(inline="always", **COMPILED)
-def _pluck_again(
-    player: Player,
-    table: Table,
-    mixer: Mixer,
-    note: Note,
-    frame: int,
-) -> None:
+@inlined
+def _pluck_again(player: Player, table: Table, mixer: Mixer, note: Note, frame: int) -> None:
     """Pluck the string of a note again: another note with its number, which ends without a report of its own."""
     event = player.again
     clear(event)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import recorded, strings
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import address_of, behind, recorded_at
 from engine.kernels.playing import channels
 from engine.kernels.records import RECORDED, Note, Player, Recorded, Table
@@ -16,7 +15,7 @@ RECORDED_SLOTS = RECORDED.itemsize // 8
 USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimate, as those of other techniques
 
 
-@njit(**COMPILED)
+@kernel
 def value_of(player: Player, table: Table, which: int) -> float:
     """The instrument's value of that number, as the modulation wheel turns it."""
     value, wheel = player.values[which], player.wheel
@@ -25,7 +24,7 @@ def value_of(player: Player, table: Table, which: int) -> float:
     return value
 
 
-@njit(**COMPILED)
+@kernel
 def mute_of(player: Player, table: Table, channel: int) -> float:
     """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
     share = value_of(player, table, of.MUTE)
@@ -35,15 +34,8 @@ def mute_of(player: Player, table: Table, channel: int) -> float:
     return share
 
 
-@njit(**COMPILED)
-def technique_of(
-    player: Player,
-    table: Table,
-    channel: int,
-    which: int,
-    switch: int,
-    usual: float,
-) -> float:
+@kernel
+def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
     """The value of a technique for a channel.
 
     It is the usual one where its footswitch is down and the value is off.
@@ -54,7 +46,7 @@ def technique_of(
     return value
 
 
-@njit(**COMPILED)
+@kernel
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
     """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
     switch = of.HARMONICS
@@ -62,15 +54,9 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
     return node if 1 < node <= partials else 0
 
 
-@njit(**COMPILED)
+@kernel
 def string_of(
-    player: Player,
-    table: Table,
-    key: int,
-    number: int,
-    pitch_hz: float,
-    wheeled: bool,
-    out: np.ndarray,
+    player: Player, table: Table, key: int, number: int, pitch_hz: float, wheeled: bool, out: np.ndarray
 ) -> tuple[int, float]:
     """The string of a key, before bends.
 
@@ -95,7 +81,7 @@ def string_of(
     return modes, out[of.LENGTH] / whole[of.LENGTH]
 
 
-@njit(**COMPILED)
+@kernel
 def has_octave(table: Table, key: int, number: int) -> bool:
     """Return True if a key's course has octave strings, on a string of a set.
 
@@ -105,18 +91,18 @@ def has_octave(table: Table, key: int, number: int) -> bool:
     return octaves > 0 and (number if number >= 0 else strings.chosen(table.open, count, key)) >= count - octaves
 
 
-@njit(**COMPILED)
+@kernel
 def _recorded(table: Table) -> Recorded:
     return recorded_at(address_of(table) + 8 * table.recorded)
 
 
-@njit(**COMPILED)
+@kernel
 def modes_of(table: Table, partials: int) -> int:
     """The number of modes of so many partials of a recorded string."""
     return min(2 * partials, _recorded(table).modes)
 
 
-@njit(**COMPILED)
+@kernel
 def additions(table: Table) -> recorded.Additions:
     """The additions of a recording to a string's law, of a table that has them."""
     recorded_rows = _recorded(table)
@@ -126,7 +112,7 @@ def additions(table: Table) -> recorded.Additions:
     return recorded_rows.pitch_hz, recorded_rows.rest, smooth[0], smooth[1], rows
 
 
-@njit(**COMPILED)
+@kernel
 def pitch_of(table: Table, key: int) -> float:
     """The pitch of a key in Hz; 0: it is silent."""
     if not table.low <= key <= table.high:
@@ -134,7 +120,7 @@ def pitch_of(table: Table, key: int) -> float:
     return table.pitches_hz[key]
 
 
-@njit(**COMPILED)
+@kernel
 def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> None:
     """Write the string of a note with the present knobs, wheels and damper.
 

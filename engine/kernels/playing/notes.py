@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import contact, drums, recorded, strings, velocities
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import clear, copy, fence, voice_at
 from engine.kernels.mixer_records import MOST_VOICES, Mixer
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
@@ -35,7 +34,7 @@ MEMBERS_APART = 1 << 16  # places of the strings of a course
 COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 
 
-@njit(**COMPILED)
+@kernel
 def report(player: Player, kind: int, id: int, channel: int, key: int, frame: int, velocity: float) -> Report:
     """The next report, for the caller to complete. `reported` publishes it."""
     made = player.reports[player.reported % of.REPORTS]
@@ -48,20 +47,20 @@ def report(player: Player, kind: int, id: int, channel: int, key: int, frame: in
     return made
 
 
-@njit(**COMPILED)
+@kernel
 def reported(player: Player) -> None:
     fence()
     player.reported += 1
 
 
-@njit(**COMPILED)
+@kernel
 def refuse(player: Player, event: Event) -> None:
     """Report a note that no string can play, or that was cancelled."""
     report(player, of.REFUSED, event.id, event.channel, event.key, event.frame, event.value)
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def _forget(player: Player, note: Note, frame: int) -> None:
     """A note has ended: its place is free."""
     note.state = of.FREE
@@ -71,7 +70,7 @@ def _forget(player: Player, note: Note, frame: int) -> None:
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def _begun(note: Note) -> bool:
     """Return True if any voice of a note has sounded."""
     for source in range(of.MOST_SOURCES):
@@ -81,7 +80,7 @@ def _begun(note: Note) -> bool:
     return False
 
 
-@njit(**COMPILED)
+@kernel
 def free_note(player: Player, mixer: Mixer) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
     best, best_rank = player.notes[0], 3
@@ -104,7 +103,7 @@ def free_note(player: Player, mixer: Mixer) -> Note:
     return best
 
 
-@njit(**COMPILED)
+@kernel
 def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
     """A note has the string of the one before, which is stopped, or whose motion continues in it."""
     stops = slots.frames(player, PLUCK_STOPS_S)
@@ -119,7 +118,7 @@ def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
         voice_at(address).stops_in = stops if table.stops != 0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def _cost(note: Note) -> int:
     """The notes that one counts as: two with a string that may meet its bridge, whose steps cost many times more."""
     for source in range(of.MOST_SOURCES):
@@ -129,7 +128,7 @@ def _cost(note: Note) -> int:
     return 1
 
 
-@njit(**COMPILED)
+@kernel
 def _make_room(player: Player) -> None:
     """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
     while True:
@@ -149,7 +148,7 @@ def _make_room(player: Player) -> None:
         voices.release_note(player, oldest, STOLEN_S if _begun(oldest) or _cost(oldest) == 1 else 0.0, 0)
 
 
-@njit(**COMPILED)
+@kernel
 def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     """Play all strings of a key's course, one after the other; the first is the one that is reported."""
     note_on(player, table, mixer, event, 0)
@@ -162,7 +161,7 @@ def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     event.frame = frame
 
 
-@njit(**COMPILED)
+@kernel
 def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: int) -> None:
     """Play a note, of a course one string. A string that is impossible is refused, unless another sounds.
 
@@ -203,7 +202,7 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
     report_began(player, table, event, note, note.own)
 
 
-@njit(**COMPILED)
+@kernel
 def _identify(player: Player, table: Table, event: Event, member: int, note: Note) -> None:
     """Set the note's identity, and the string that it is played on."""
     note.state, note.held = of.RINGS, 1
@@ -224,7 +223,7 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
     note.octave = member > 0 and keys.has_octave(table, note.key, note.string)
 
 
-@njit(**COMPILED)
+@kernel
 def _take_string(player: Player, table: Table, note: Note) -> bool:
     """The string of a note's key with its modes and its gain; False: it is impossible."""
     pitch_hz, string_row = keys.pitch_of(table, note.key), note.own
@@ -243,7 +242,7 @@ def _take_string(player: Player, table: Table, note: Note) -> bool:
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
     shortened = note.shortened
@@ -293,7 +292,7 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
         note.modes += note.pairs
 
 
-@njit(**COMPILED)
+@kernel
 def _keep_of_table(player: Player, table: Table, note: Note) -> None:
     """Keep in a note what it needs of the table that it was struck by."""
     key, member = note.key, note.member
@@ -321,7 +320,7 @@ def _keep_of_table(player: Player, table: Table, note: Note) -> None:
         note.string_now[place] = note.own[place]
 
 
-@njit(**COMPILED)
+@kernel
 def _make_voices(player: Player, table: Table, note: Note) -> None:
     """The voices of a note, one of each source; those of a drum are made."""
     for source in range(table.sources):
@@ -337,7 +336,7 @@ def _make_voices(player: Player, table: Table, note: Note) -> None:
         note.voices[source] = address
 
 
-@njit(**COMPILED)
+@kernel
 def _take_place(player: Player, table: Table, note: Note) -> None:
     """A note is the latest of its place, and follows the one before."""
     for number in range(of.MOST_NOTES):
@@ -348,7 +347,7 @@ def _take_place(player: Player, table: Table, note: Note) -> None:
     note.has_place = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> None:
     """Hand the voices of a note to the mixer.
 
@@ -369,7 +368,7 @@ def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> Non
             voice_at(address).state = at.OVER
 
 
-@njit(**COMPILED)
+@kernel
 def report_began(player: Player, table: Table, event: Event, note: Note, string_row: np.ndarray) -> None:
     """Report the note of an event, and the string of its key."""
     if note.member != 0:
@@ -387,7 +386,7 @@ def report_began(player: Player, table: Table, event: Event, note: Note, string_
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def tend(player: Player, now: int) -> None:
     """Report notes that have ended."""
     for number in range(of.MOST_NOTES):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
 from engine.kernels import pulses, strings, velocities
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import behind, mixed
 from engine.kernels.records import Player, Table
 from engine.levels import MOST_PERIODS
@@ -24,16 +23,8 @@ VARIES_DB = 1.0
 VARIES_WIDTH = 0.12  # shares, dB
 
 
-@njit(**COMPILED)
-def pull(
-    player: Player,
-    table: Table,
-    shape: int,
-    modes: int,
-    position: float,
-    peak_m: float,
-    width: float,
-) -> float:
+@kernel
+def pull(player: Player, table: Table, shape: int, modes: int, position: float, peak_m: float, width: float) -> float:
     """The amplitudes of the modes of a pluck, and its highest point in m.
 
     They come from its shape on the grid, then sines.
@@ -76,7 +67,7 @@ def pull(
     return highest
 
 
-@njit(**COMPILED)
+@kernel
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
     """The amplitudes of the modes of a rounded triangle, up to its height `pulses.corner`.
 
@@ -105,7 +96,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
         player.amplitudes[mode] *= peak_m / highest
 
 
-@njit(**COMPILED)
+@kernel
 def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials: int, release_s: float) -> None:
     """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
 
@@ -120,13 +111,13 @@ def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials
         player.amplitudes[mode] *= pulses.spectrum(turns)
 
 
-@njit(**COMPILED)
+@kernel
 def varied(stroke: int, key: int, which: int) -> float:
     """A number in -1 … 1 for each stroke: the same for the same strokes."""
     return float(np.uint64(mixed(stroke * 4096 + key * 16 + which + 1)) >> np.uint64(12)) / 2.0**51 - 1
 
 
-@njit(**COMPILED)
+@kernel
 def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, float, float]:
     """Position, amplitude and width of the nearest pluck within the ranges of `engine.pluck.Pluck`."""
     return (
@@ -136,7 +127,7 @@ def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, 
     )
 
 
-@njit(**COMPILED)
+@kernel
 def vary(
     position: float, amplitude_mm: float, width: float, varies: float, stroke: int, key: int
 ) -> tuple[float, float, float]:
@@ -148,7 +139,7 @@ def vary(
     )
 
 
-@njit(**COMPILED)
+@kernel
 def split(player: Player, table: Table, partials: int, turned: float) -> int:
     """Split a pluck's partials into modes of both polarisations; how many partials have two.
 
@@ -170,7 +161,7 @@ def split(player: Player, table: Table, partials: int, turned: float) -> int:
     return pairs
 
 
-@njit(**COMPILED)
+@kernel
 def reference_share(player: Player) -> float:
     """The share of the velocities at which keys are equally loud."""
     return velocities.share(of.REFERENCE_VELOCITY, player.values[of.CURVE])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import clear, voice_at
 from engine.kernels.modes import rows
@@ -16,26 +15,26 @@ from engine.kernels.records import PLAYER, Note, Player, Table
 from engine.kernels.voice_records import WEIGHT_ROWS, Voice
 
 VOICES_AT = PLAYER.itemsize
-voice_bytes = njit(**COMPILED)(at.voice_bytes)
+voice_bytes = kernel(at.voice_bytes)
 
 
-@njit(**COMPILED)
+@kernel
 def frames(player: Player, seconds: float) -> int:
     return max(1, round(seconds * player.rate_hz))
 
 
-@njit(**COMPILED)
+@kernel
 def quanta(player: Player, seconds: float) -> int:
     return max(1, round(seconds * player.rate_hz / QUANTUM))
 
 
-@njit(**COMPILED)
+@kernel
 def voice_over(address: int) -> bool:
     state = voice_at(address).state
     return state == at.OVER or state == at.RUNAWAY
 
 
-@njit(**COMPILED)
+@kernel
 def over(note: Note) -> bool:
     """Return True if all voices of a note are over."""
     for source in range(of.MOST_SOURCES):
@@ -45,26 +44,26 @@ def over(note: Note) -> bool:
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def sounds(note: Note) -> bool:
     """Return True if a note has its place and rings."""
     return note.state == of.RINGS and note.has_place == 1 and not over(note)
 
 
-@njit(**COMPILED)
+@kernel
 def address_of_voice(player: Player, number: int, source: int) -> int:
     """The player's own voice for one of its notes and a source."""
     return player.here + VOICES_AT + (number * of.MOST_SOURCES + source) * voice_bytes(player.modes)
 
 
-@njit(**COMPILED)
+@kernel
 def set_gain(address: int, gain: float) -> None:
     """Set the gain of a voice that begins."""
     voice = voice_at(address)
     voice.wanted_gain = voice.gain = voice.gain_from = voice.gain_to = gain
 
 
-@njit(**COMPILED)
+@kernel
 def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> Voice:
     """A voice of a source at rest, with as many rows as are used set to zero."""
     voice, rate_hz = voice_at(address), player.rate_hz

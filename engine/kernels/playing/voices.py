@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drums, javari, recorded, strings, tension
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import fence, table_at, voice_at, wish_at
 from engine.kernels.mixer_records import Mixer
@@ -23,7 +22,7 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACT
 WISH_BYTES = WISH.itemsize
 
 
-@njit(**COMPILED)
+@kernel
 def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
     """The level at a listening point of a partial's amplitude of 1 m, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
@@ -33,7 +32,7 @@ def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: fl
     return averaged * math.sin(math.pi * partial * place) / FULL_SCALE_M
 
 
-@njit(**COMPILED)
+@kernel
 def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
     """Set one of the two sets of weights of a voice for the points of its note.
 
@@ -55,14 +54,8 @@ def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
     voice.javari.heard = note.heard[0] / FULL_SCALE_N if at_bridge else 0.0
 
 
-@njit(**COMPILED)
-def fill(
-    player: Player,
-    table: Table,
-    note: Note,
-    string: np.ndarray,
-    out: np.ndarray,
-) -> None:
+@kernel
+def fill(player: Player, table: Table, note: Note, string: np.ndarray, out: np.ndarray) -> None:
     """ω², σ, k, η² and the bridge's part of a note's modes, of its string as it is now."""
     losses = keys.value_of(player, table, of.DECAY)
     inside = keys.value_of(player, table, of.BRIGHTNESS_DECAY)
@@ -94,14 +87,8 @@ def fill(
     )
 
 
-@njit(**COMPILED)
-def make_voice(
-    player: Player,
-    table: Table,
-    address: int,
-    note: Note,
-    source: int,
-) -> None:
+@kernel
+def make_voice(player: Player, table: Table, address: int, note: Note, source: int) -> None:
     """A voice of the modes of a note's own string: as `Voice`.
 
     It sets out with the amplitudes of a pluck.
@@ -139,7 +126,7 @@ def make_voice(
         voice.limit = max(voice.limit, RUNAWAY_FACTOR * largest)
 
 
-@njit(**COMPILED)
+@kernel
 def swing_m(note: Note) -> float:
     """The swing of a note's string now: the root of its modes' summed squares. 0: it is over."""
     for source in range(of.MOST_SOURCES):
@@ -159,7 +146,7 @@ def swing_m(note: Note) -> float:
     return 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def release(address: int, frames: int) -> None:
     """Let a voice fade out; a release under way continues."""
     voice = voice_at(address)
@@ -167,7 +154,7 @@ def release(address: int, frames: int) -> None:
         voice.release = frames
 
 
-@njit(**COMPILED)
+@kernel
 def release_note(player: Player, note: Note, seconds: float, frame: int) -> None:
     """Let a note fade out; from a frame to come on, where that is above 0."""
     note.released = 1
@@ -179,7 +166,7 @@ def release_note(player: Player, note: Note, seconds: float, frame: int) -> None
             release(address, slots.frames(player, seconds))
 
 
-@njit(**COMPILED)
+@kernel
 def _due(address: int, now: int) -> int:
     """The latest frame for which modes count with a voice's next quantum."""
     voice = voice_at(address)
@@ -191,15 +178,8 @@ def _due(address: int, now: int) -> int:
     return due
 
 
-@njit(**COMPILED)
-def add_wish(
-    player: Player,
-    note: Note,
-    source: int,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> int:
+@kernel
+def add_wish(player: Player, note: Note, source: int, seconds: float, frame: int, now: int) -> int:
     """The address of a wish for the modes that a voice is to have from a frame on: linked, its rows to be filled.
 
     At most two are still to be reached: those that are due in this quantum, and those for the next.
@@ -241,7 +221,7 @@ def add_wish(
     return free
 
 
-@njit(**COMPILED)
+@kernel
 def take_out(mixer: Mixer, address: int) -> None:
     """Take a voice out of the mixer at once; it is over."""
     kept = 0
@@ -257,14 +237,14 @@ def take_out(mixer: Mixer, address: int) -> None:
     voice_at(address).state = at.OVER
 
 
-@njit(**COMPILED)
+@kernel
 def lag_of(player: Player, table: Table, member: int) -> int:
     """The frames from the stroke of a course's string to its beginning, in step with the first; 0: at once."""
     later = round(member * table.apart_s * player.rate_hz)
     return -later % QUANTUM if table.bridge > 0.0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def hear(player: Player) -> None:
     """Let notes follow the gains of sources and the listening points."""
     if player.table == 0:
@@ -286,7 +266,7 @@ def hear(player: Player) -> None:
             drums.hear(player, table, note)
 
 
-@njit(**COMPILED)
+@kernel
 def _listen(player: Player, table: Table, note: Note) -> None:
     """Let a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
     moved = note.solo != table.solo
