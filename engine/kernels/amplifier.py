@@ -107,10 +107,8 @@ def _bessel(x: float) -> float:
 @kernel
 def _take(mixer: Mixer, amp: Amplifier) -> bool:
     """The next input behind the last one, through the high-pass. Returns whether there is any."""
-    sounds = False
-    low = amp.low
-    raw = amp.input
-    mix = mixer.mix
+    sounds, low = False, amp.low
+    raw, mix = amp.input, mixer.mix
     follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer.rate_hz)
     for frame in range(LAGS):
         raw[frame] = raw[QUANTUM + frame]
@@ -128,31 +126,26 @@ def _take(mixer: Mixer, amp: Amplifier) -> bool:
 @kernel
 def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
-    last = LAGS
-    rows = OVERSAMPLING
-    filter = amp.filter
-    raw = amp.input
-    all_shaped = amp.shaped
-    drive, goal = amp.drive, amp.wanted_drive
-    if goal == 0.0:  # it is switched off: as it was
-        goal = drive
-    for row in range(rows):
+    filter, raw, all_shaped = amp.filter, amp.input, amp.shaped
+    drive = amp.drive
+    goal = amp.wanted_drive if amp.wanted_drive != 0.0 else drive  # it is switched off: as it was
+    for row in range(OVERSAMPLING):
         out = all_shaped[row]
-        for frame in range(last):
+        for frame in range(LAGS):
             out[frame] = out[QUANTUM + frame]
-        new = out[last:]
+        new = out[LAGS:]
         new[:] = 0.0
-        for lag in range(last):
-            tap = rows * filter[rows * lag + row]
-            delayed = raw[last - lag : last - lag + QUANTUM]
+        for lag in range(LAGS):
+            tap = OVERSAMPLING * filter[OVERSAMPLING * lag + row]
+            delayed = raw[LAGS - lag : LAGS - lag + QUANTUM]
             for frame in range(QUANTUM):
                 new[frame] += tap * delayed[frame]
         for frame in range(QUANTUM):
-            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / rows) / QUANTUM)
+            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / OVERSAMPLING) / QUANTUM)
     before = amp.last
     root = math.sqrt(1 + before * before)
-    for frame in range(last, SHAPED_FRAMES):
-        for row in range(rows):
+    for frame in range(LAGS, SHAPED_FRAMES):
+        for row in range(OVERSAMPLING):
             value = all_shaped[row, frame]
             following = math.sqrt(1 + value * value)
             all_shaped[row, frame] = (before + value) / (root + following)
@@ -163,28 +156,18 @@ def _shape(amp: Amplifier) -> None:
 @kernel
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
-    last = LAGS
-    rows = OVERSAMPLING
-    filter = amp.filter
-    out = amp.out
-    mix = mixer.mix
+    filter, out, mix = amp.filter, amp.out, mixer.mix
     out[:] = 0.0
-    for row in range(rows):
-        for lag in range(last):
-            tap = filter[rows * lag + rows - 1 - row]
-            shaped = amp.shaped[row, last - lag : last - lag + QUANTUM]
+    for row in range(OVERSAMPLING):
+        for lag in range(LAGS):
+            tap = filter[OVERSAMPLING * lag + OVERSAMPLING - 1 - row]
+            shaped = amp.shaped[row, LAGS - lag : LAGS - lag + QUANTUM]
             for frame in range(QUANTUM):
                 out[frame] += tap * shaped[frame]
-    drive = amp.drive
-    gain = amp.gain
-    tone = amp.tone
-    drive_to = amp.wanted_drive
-    gain_to = amp.wanted_gain
-    tone_to = amp.wanted_tone
-    if drive_to == 0.0:
-        drive_to = drive
-        gain_to = gain
-        tone_to = tone
+    gain, tone = amp.gain, amp.tone
+    if amp.wanted_drive != 0.0:  # else it is switched off: as it was
+        amp.drive, amp.gain, amp.tone = amp.wanted_drive, amp.wanted_gain, amp.wanted_tone
+    gain_to, tone_to = amp.gain, amp.tone
     blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer.rate_hz)
     follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer.rate_hz)
     mean, low = amp.mean, amp.low_out
@@ -200,6 +183,3 @@ def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
             dry = mix[frame, side]
             mix[frame, side] = value if wet == 1.0 else dry + wet * (value - dry)
     amp.mean, amp.low_out = mean, low if abs(low) >= SMALLEST else 0.0
-    amp.drive = drive_to
-    amp.gain = gain_to
-    amp.tone = tone_to

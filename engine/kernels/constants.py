@@ -122,8 +122,8 @@ CHANNELS = 17  # of MIDI, then the keys of the computer and the screen
 FIRST, ON_SCREEN = 0, 16
 TUNING_STEPS = 8192  # of fine tuning, of a semitone
 USUAL_VOLUME = 100  # General MIDI's: at this volume an instrument is as loud as it is without one
-LEGATO, SLIDES, HARMONICS, TREMOLO, STRUMS = range(5)  # footswitches
-SWITCHES = 5
+PEDAL, LEGATO, SLIDES, HARMONICS, TREMOLO, STRUMS = range(6)  # the pedal that sustains, and footswitches
+SWITCHES = 6
 
 # Notes
 FREE, RINGS = 0, 1

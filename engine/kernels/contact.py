@@ -76,15 +76,12 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
     if not by.level_db > OFF_DB:
         return
-    kind = table.contacts[by.which]
-    rate_hz = player.rate_hz
-    which = by.which
+    kind, rate_hz = table.contacts[by.which], player.rate_hz
     strength, hardness = by.strength, by.hardness
     energy = table.noise_level * rate_hz * 10.0 ** (by.level_db / 10)
     energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = player.noises[0], -1
-    for number in range(of.MOST_NOISES):
-        candidate = player.noises[number]
+    for candidate in player.noises:
         if candidate.left == 0:
             noise = candidate
             break
@@ -106,7 +103,7 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
     noise.frame = by.frame
     noise.done, noise.stops = 0, 0
-    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + which + 1)
+    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + by.which + 1)
     noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
     noise.pulse_frames = pulse_frames
     noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
@@ -116,9 +113,8 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     noise.b0 = passed
     noise.a1 = -2 * math.cos(turn) / (1 + alpha)
     noise.a2 = (1 - alpha) / (1 + alpha)
-    for place in range(4):
-        noise.past[place] = 0.0
-    noise.recorded = table.attack != 0 and which == of.STROKE
+    noise.past[:] = 0.0
+    noise.recorded = table.attack != 0 and by.which == of.STROKE
     if noise.recorded != 0:
         noise.pulse = math.sqrt(energy / rate_hz)
         attack = attack_of(table)
@@ -131,8 +127,8 @@ def touch(player: Player, table: Table, by: Touch) -> None:
 @kernel
 def hush(player: Player, quanta: int) -> None:
     """Let all noises fade out."""
-    for number in range(of.MOST_NOISES):
-        player.noises[number].stops = quanta
+    for noise in player.noises:
+        noise.stops = quanta
 
 
 @kernel
@@ -141,21 +137,17 @@ def sound(player_address: int, mixer_address: int) -> None:
     player = player_at(player_address)
     if player.table == 0:
         return
-    table = table_at(player.table)
-    gain = 0.0
-    sounding = 0
+    table, gain, sounding = table_at(player.table), 0.0, 0
     for source in range(table.sources):
         if player.source_gains[source] != 0.0:
             gain = player.source_gains[source]
             sounding += 1
     if sounding != 1 or table.solo != 0:
         gain = 0.0
-    before = player.noise_gain
-    player.noise_gain = gain
+    before, player.noise_gain = player.noise_gain, gain
     mixer = mixer_at(mixer_address)
     mix, now = mixer.mix[:], mixer.frames
-    for number in range(of.MOST_NOISES):
-        noise = player.noises[number]
+    for noise in player.noises:
         if noise.left == 0 or noise.frame >= now + QUANTUM:
             continue
         begin, gain_from = 0, before
@@ -178,10 +170,7 @@ def sound(player_address: int, mixer_address: int) -> None:
 
 @kernel
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
-    """Add a force to a frame of the mix, at a gain between two quanta.
-
-    It fades out where the noise stops.
-    """
+    """Add a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
     share = (frame + 1) / QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
@@ -196,17 +185,9 @@ def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
-    b0 = noise.b0
-    a1 = noise.a1
-    a2 = noise.a2
-    past = noise.past
-    x1 = past[0]
-    x2 = past[1]
-    y1 = past[2]
-    y2 = past[3]
-    seed = noise.seed
-    done = noise.done
-    stops = noise.stops
+    b0, a1, a2 = noise.b0, noise.a1, noise.a2
+    x1, x2, y1, y2 = noise.past[0], noise.past[1], noise.past[2], noise.past[3]
+    seed, done, stops = noise.seed, noise.done, noise.stops
     for frame in range(begin, end):
         x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
@@ -218,10 +199,7 @@ def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np
             force += pulse * (0.5 - 0.5 * math.cos(2 * math.pi * (done + 0.5) / pulse_frames))
         _add(mix, frame, force, before, gain, stops)
         done += 1
-    past[0] = x1
-    past[1] = x2
-    past[2] = y1
-    past[3] = y2
+    noise.past[0], noise.past[1], noise.past[2], noise.past[3] = x1, x2, y1, y2
     noise.envelope = envelope
     noise.done = done
 
@@ -232,15 +210,13 @@ def _play(player: Player, attack: Attack, noise: Noise, begin: int, end: int, be
     gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)
-    amplitude = noise.pulse
-    done = noise.done
-    stops = noise.stops
+    done, stops = noise.done, noise.stops
     for frame in range(begin, end):
         place = done * step
         number = int(place)
         if number < frames:
             after = samples[number + 1] if number + 1 < frames else 0.0
-            force = amplitude * (samples[number] + (place - number) * (after - samples[number]))
+            force = noise.pulse * (samples[number] + (place - number) * (after - samples[number]))
             _add(mix, frame, force, before, gain, stops)
         done += 1
     noise.done = done

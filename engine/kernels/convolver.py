@@ -182,10 +182,8 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
         for frame in range(half):
             signal[frame] = signal[half + frame]
     transform(re, im, re2, im2, convolver.cosines[:], convolver.sines[:])
-    left_re = spectra[0, 0]
-    left_im = spectra[0, 1]
-    right_re = spectra[1, 0]
-    right_im = spectra[1, 1]
+    left_re, left_im = spectra[0, 0], spectra[0, 1]
+    right_re, right_im = spectra[1, 0], spectra[1, 1]
     for k in range(half + 1):
         mirror = n - k if k > 0 else 0
         left_re[k], left_im[k] = 0.5 * (re[k] + re[mirror]), 0.5 * (im[k] - im[mirror])
@@ -195,9 +193,7 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
 @kernel
 def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
     """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
-    channels = impulse.channels
-    early = impulse.early
-    late = impulse.late
+    channels, early, late = impulse.channels, impulse.early, impulse.late
     spectra = reals(address_of(impulse))
     response, sums = shaped(spectra, BEHIND_IMPULSE, (early, channels, 2, QUANTUM + 1)), convolver.early_sums[:]
     count = min(early, convolver.early_filled)
@@ -260,10 +256,8 @@ def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> 
     half = goal.shape[1]
     n, bins = 2 * half, half + 1
     re, im, re2, im2 = _work(convolver, n)
-    left_re = spectra[0, 0]
-    left_im = spectra[0, 1]
-    right_re = spectra[1, 0]
-    right_im = spectra[1, 1]
+    left_re, left_im = spectra[0, 0], spectra[0, 1]
+    right_re, right_im = spectra[1, 0], spectra[1, 1]
     for k in range(bins):
         re[k], im[k] = left_re[k] - right_im[k], left_im[k] + right_re[k]
     for k in range(1, half):
@@ -282,10 +276,7 @@ def _work(convolver: Convolver, n: int) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 @kernel
 def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """The output: a lane, or the fade from one to the other.
-
-    A lane without a response is the mix itself.
-    """
+    """The output: a lane, or the fade from one to the other. A lane without a response is the mix itself."""
     step, lane = convolver.step, convolver.lane
     now, following = convolver.wet[lane], convolver.wet[1 - lane]
     done = (step - 1) * WINDOW + convolver.phase * QUANTUM
@@ -349,18 +340,13 @@ def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impu
         frames: of it with silence at the end.
         impulse: of `partitioned_slots`.
     """
-    channels = response.shape[1]
-    early = early_partitions(frames)
-    late = late_partitions(frames)
-    impulse.channels = channels
-    impulse.early = early
-    impulse.late = late
+    impulse.channels = response.shape[1]
+    impulse.early, impulse.late = early_partitions(frames), late_partitions(frames)
     memory = reals(address_of(impulse))
-    place = BEHIND_IMPULSE
-    first = 0
-    for number in range(early + late):
-        length = QUANTUM if number < early else WINDOW
-        for channel in range(channels):
+    place, first = BEHIND_IMPULSE, 0
+    for number in range(impulse.early + impulse.late):
+        length = QUANTUM if number < impulse.early else WINDOW
+        for channel in range(impulse.channels):
             re, im = row(work, ONE, 2 * length), row(work, ONE + 1, 2 * length)
             silence(work, ONE, 0, 2 * length)
             for frame in range(min(length, len(response) - first)):

@@ -31,7 +31,7 @@ from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import MOST_PAIRS, QUANTUM
 from engine.kernels.memory import fence, tension_program_at, truth_program_at, voice_at
 from engine.kernels.mixer_records import MOST_COURSE, CourseString, Mixer
-from engine.kernels.modes import following, row, weights
+from engine.kernels.modes import following, motion, row
 from engine.kernels.voice import begin, differentiate, end, is_first, is_heard, move_points, remember
 from engine.kernels.voice_records import Voice
 
@@ -52,9 +52,7 @@ def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
 
 @kernel
 def add(mixer: Mixer, place: int, now_s: float) -> int:
-    """Add the next quantum of the course of an active voice, by its place, to the mix.
-
-    Returns the state of that voice.
+    """Add the next quantum of the course of an active voice, by its place, to the mix; return that voice's state.
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
@@ -107,11 +105,8 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
         first: whether those that sense velocity are behind the others.
     """
     scratch = mixer.scratch[:]
-    place = lanes.aligned(scratch)
-    solved = False
-    shared = 0
-    sums = scratch[place : place + SHARED]
-    place += SHARED
+    sums = scratch[lanes.aligned(scratch) :][:SHARED]
+    place, solved, shared = lanes.aligned(scratch) + SHARED, False, 0
     for number in range(strings):
         voice = voice_at(_string(mixer, number).address)
         solved = voice.kind == at.TRUTH
@@ -139,20 +134,13 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
     """A quantum of latents that share a tension."""
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
-    one = _string(mixer, 0)
-    other = _string(mixer, min(1, strings - 1))
-    third = _string(mixer, strings - 1)
+    one, other, third = _string(mixer, 0), _string(mixer, min(1, strings - 1)), _string(mixer, strings - 1)
     parts, modes = (one.parts, other.parts, third.parts), (one.first, other.first, third.first)
     for frame in range(QUANTUM):
         for number in range(strings):
             string = _string(mixer, number)
             _advance(string, voice_at(string.address), scratch, frame, mixer.out[mixer.generated[number]])
-        if strings == 1:
-            lanes.meet_1(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
-        elif strings == 2:
-            lanes.meet_2(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
-        else:
-            lanes.meet_3(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
+        lanes.meet(scratch, blocks, strings, modes, parts)
 
 
 @kernel
@@ -163,10 +151,8 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
         for number in range(strings):
             string = _string(mixer, number)
             voice, out = voice_at(string.address), mixer.out[mixer.generated[number]]
-            program = truth_program_at(voice.program)
-            fading = voice.next_weights == 1
-            audible = is_heard(voice)
-            truth.advance(voice, program, string.sub_steps, frame, fading, audible, out)
+            program, fading = truth_program_at(voice.program), voice.next_weights == 1
+            truth.advance(voice, program, string.sub_steps, frame, fading, is_heard(voice), out)
         sums[:shared] = 0.0
         for number in range(strings):
             string = _string(mixer, number)
@@ -188,36 +174,26 @@ def _speeds(voice: Voice, shared: int) -> np.ndarray:
 
 @kernel
 def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
-    """Prepare a string for a quantum, with its parts and modes from a slot of the scratch on.
-
-    Returns the first slot behind them.
-    """
+    """Prepare a string for a quantum, its parts and modes from a slot of the scratch on; return the slot behind."""
     string.parts, string.first = place, place + PARTS
     if solved:
         string.sub_steps = truth.set_up(voice, truth_program_at(voice.program))
         return string.first
     program = tension_program_at(voice.program)
     tension.bring_up_to_date(voice, program)
-    moving = voice.moving
-    voice.heard = voice.felt = moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)[:moving]
+    moving = voice.heard = voice.felt = voice.moving
     first, near = string.first, lanes.blocks_of(moving)
-    tension.load(x, y, rows, order, scratch, first)
+    ears = tension.take(
+        voice, tension.order_of(voice)[:moving], voice.next_weights == 1, is_heard(voice), scratch, first
+    )
     for number in range(lanes.LANES * near, SHARED):  # these rest
         slot = first + lanes.place(number)
         scratch[slot] = scratch[slot + lanes.LANES] = 0.0
-    points = voice.points
-    ears = (2 if voice.next_weights == 1 else 1) * points if is_heard(voice) else 0
-    for ear in range(ears):
-        tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
     string.near = near
     string.moving = moving
     string.nodes = voice.steps
     string.ears = ears
-    string.apart = 2 if points == 1 else 1
+    string.apart = 2 if voice.points == 1 else 1
     string.stretch, string.second = lanes.add_up(scratch, first, near, 0, ears, string.heard[:])
     string.total, string.silence = 0.0, program.silence
     return first + lanes.slots(max(voice.modes, SHARED))
@@ -242,9 +218,7 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
         modes = min(shared, voice.bridged, voice.moving)
         parts = scratch[first : first + PARTS].reshape(lanes.PARTS, SHARED)
         parts[:] = 0.0
-        lost = row(voice, at.BRIDGE)
-        sigmas = row(voice, at.SIGMA)
-        squares = following(voice)[6]
+        lost, sigmas, squares = row(voice, at.BRIDGE), row(voice, at.SIGMA), following(voice)[6]
         if voice.kind == at.TRUTH:
             for mode in range(modes):
                 part = math.sqrt(lost[mode])
@@ -259,9 +233,7 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
 @inlined
 def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
-    first = string.first
-    near = string.near
-    ears = string.ears
+    first, near, ears = string.first, string.near, string.ears
     at_points, largest = string.heard[:], voice.largest_stretch
     sums, nothing = (string.stretch, string.second), (0.0, 0.0)
     for ear in range(ears):
@@ -286,7 +258,7 @@ def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int
 @kernel
 def _put_back(string: CourseString, voice: Voice, scratch: np.ndarray) -> None:
     """A string as it is after a quantum."""
-    order = row(voice, at.ORDER).view(np.int64)[: voice.heard]
-    tension.save(row(voice, 0), row(voice, 1), order, scratch, string.first)
+    x, y = motion(voice)
+    tension.save(x, y, tension.order_of(voice)[: voice.heard], scratch, string.first)
     voice.moving, loudness = string.moving, tension_program_at(voice.program).loudness
     voice.loudness = (0.5 * math.log(string.total) if string.total > 0 else -1e9) + loudness

@@ -43,7 +43,7 @@ from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import tension_program_at, truth_program_at
-from engine.kernels.modes import damped, following, row, weights
+from engine.kernels.modes import damped, following, motion, row
 from engine.kernels.rotation import rotation
 from engine.kernels.voice_records import TensionProgram, TruthProgram, Voice
 
@@ -102,7 +102,7 @@ def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch
         _ring_solved(voice, truth_program_at(voice.program), fading, audible, out)
     else:
         _ring(voice, tension_program_at(voice.program), fading, audible, out, scratch)
-    first, second = row(voice, 0), row(voice, 1)
+    first, second = motion(voice)
     for mode in range(voice.modes):  # or they would become denormal
         if first[mode] * first[mode] < tension.NOTHING:
             first[mode] = 0.0
@@ -114,12 +114,9 @@ def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch
 @kernel
 def _prepare(voice: Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
-    shapes = row(voice, at.JAVARI)
-    compliance = row(voice, at.GIVEN)
-    speeds = row(voice, at.GIVEN_SPEED)
-    squares = row(voice, at.OMEGA_SQUARED)
-    sigmas = row(voice, at.SIGMA)
-    give = 0.0
+    shapes, give = row(voice, at.JAVARI), 0.0
+    compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     for mode in range(voice.modes):
         sigma = sigmas[mode]
         omega, part = damped(squares[mode], sigma), shapes[mode] / voice.javari.mass_kg
@@ -135,21 +132,15 @@ def _ring(
 ) -> None:
     """A quantum of latents that share a tension."""
     tension.bring_up_to_date(voice, program)
-    n = voice.modes
-    points = voice.points
-    moving = voice.moving
-    steps = voice.javari.steps
+    moving, steps = voice.moving, voice.javari.steps
     step_s, nodes = 1 / (program.rate_hz * steps), voice.steps // steps
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
     voice.heard = voice.felt = moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)[:moving]
+    rows, order = following(voice), tension.order_of(voice)[:moving]
     first, near = lanes.aligned(scratch), lanes.blocks_of(moving)
-    tension.load(x, y, rows, order, scratch, first)
-    parts = first + lanes.slots(n)
+    ears = tension.take(voice, order, fading, audible, scratch, first)
+    parts = first + lanes.slots(voice.modes)
     ear_sums = scratch[parts + lanes.PRESSED * lanes.LANES * near :][: 2 * lanes.MOST_EARS]
     for number in range(lanes.LANES * near):
         slot = parts + number // lanes.LANES * lanes.PRESSED * lanes.LANES + number % lanes.LANES
@@ -160,16 +151,9 @@ def _ring(
             scratch[slot], scratch[slot + lanes.LANES] = row(voice, at.JAVARI)[number], compliance
             speed += row(voice, at.SIGMA)[number] * compliance
             scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
-    ears = (2 if fading else 1) * points if audible else 0
-    for ear in range(ears):
-        tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
-    largest = voice.largest_stretch
-    apart = 2 if points == 1 else 1
-    nothing = (0.0, 0.0)
-    total = 0.0
-    gap = voice.javari.gap_m
-    give = voice.javari.give
-    pushed = voice.javari.force
+    largest, apart = voice.largest_stretch, 2 if voice.points == 1 else 1
+    nothing, total = (0.0, 0.0), 0.0
+    gap, give, pushed = voice.javari.gap_m, voice.javari.give, voice.javari.force
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
@@ -198,6 +182,7 @@ def _ring(
             total, held = tension.hold(scratch, first, near, voice.largest_energy)
             if held:
                 sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
+    x, y = motion(voice)
     tension.save(x, y, order, scratch, first)
     voice.javari.force = pushed
     voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
@@ -207,16 +192,12 @@ def _ring(
 def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
     sub_steps = truth.set_up(voice, program)
-    points = voice.points
     steps = voice.javari.steps
     step_s = 1 / (program.rate_hz * steps)
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    gap = voice.javari.gap_m
-    give = voice.javari.give
-    moving = voice.moving
-    q = row(voice, 0)
-    v = row(voice, 1)
+    gap, give, moving = voice.javari.gap_m, voice.javari.give, voice.moving
+    q, v = motion(voice)
     shapes = row(voice, at.JAVARI)
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
     before, pushed = -gap, voice.javari.force
@@ -225,7 +206,7 @@ def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: boo
     for frame in range(QUANTUM):
         truth.hear(voice, program, frame, fading, audible, out)
         for which in range((2 if fading else 1) if audible else 0):
-            for point in range(points):
+            for point in range(voice.points):
                 out[2 * which + point, frame] -= voice.javari.heard * pushed
         pushed = 0.0
         for _ in range(steps):

@@ -26,10 +26,8 @@ def limit(mixer: Mixer) -> None:
 
     Where nothing within reach exceeds the ceiling, samples stay as they are.
     """
-    mix = mixer.mix[:]
-    waiting = mixer.waiting[:]
-    peaks = mixer.peaks[:]
-    gains = mixer.gains[:]
+    mix, waiting = mixer.mix[:], mixer.waiting[:]
+    peaks, gains = mixer.peaks[:], mixer.gains[:]
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
@@ -46,15 +44,11 @@ def limit(mixer: Mixer) -> None:
 
 @kernel
 def _reduce(mixer: Mixer) -> None:
-    mix = mixer.mix[:]
-    waiting = mixer.waiting[:]
-    peaks = mixer.peaks[:]
-    gains = mixer.gains[:]
-    level = mixer.limiter
-    release = mixer.release
-    reduction = mixer.reduction
+    mix, waiting = mixer.mix[:], mixer.waiting[:]
+    peaks, gains = mixer.peaks[:], mixer.gains[:]
+    level, reduction = mixer.limiter, mixer.reduction
     for frame in range(AHEAD, AHEAD + QUANTUM):
-        level *= release
+        level *= mixer.release
         for before in range(AHEAD + 1):
             level = max(level, peaks[frame - before])
         gains[frame] = min(1.0, CEILING / level)

@@ -41,6 +41,12 @@ def row(voice: Voice, which: int) -> np.ndarray:
 
 
 @kernel
+def motion(voice: Voice) -> tuple[np.ndarray, np.ndarray]:
+    """The two rows that move: amplitude and speed, or x and y."""
+    return row(voice, 0), row(voice, 1)
+
+
+@kernel
 def table(voice: Voice, first: int, count: int) -> np.ndarray:
     """The same as an array (count, modes)."""
     return matrix(reals(address_of(voice)), BEHIND_VOICE + (WEIGHT_ROWS + first) * voice.modes, count, voice.modes)
@@ -87,12 +93,8 @@ def damped(omega_squared: float, sigma: float) -> float:
 
 @kernel
 def run_up(voice: Voice, seconds: float) -> None:
-    """Advance amplitudes and speeds of a voice that has not begun by so long.
-
-    Each mode moves alone, at rest's tension.
-    """
-    q = row(voice, 0)
-    v = row(voice, 1)
+    """Advance a voice that has not begun by so long; each mode moves alone, at rest's tension."""
+    q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas, lost = row(voice, at.SIGMA), row(voice, at.BRIDGE)
     for m in range(voice.modes):
@@ -150,8 +152,7 @@ def rest_above(voice: Voice, rate: float) -> int:
     """Lay modes to rest that lie too high for the rate; the highest of the others."""
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas = row(voice, at.SIGMA)
-    first = row(voice, 0)
-    second = row(voice, 1)
+    first, second = motion(voice)
     last = voice.modes - 1
     while last > 0 and damped(squares[last], sigmas[last]) > TOO_HIGH * rate:
         last -= 1

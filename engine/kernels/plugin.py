@@ -35,18 +35,10 @@ def render(mixer_at: int, frames: int, out_at: int) -> None:
     mixer.render(record_of_mixer(mixer_at), frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
 
 
-@kernel
-def begin(player_at: int) -> None:
-    """Put the wheels and pedals of a new player at rest."""
-    events.begin(player_at)
-
-
-@kernel
-def play(player_at: int, mixer_at: int) -> None:
-    """Play the events that are due before the mixer's next quantum."""
-    events.play(player_at, mixer_at)
-
-
+begin = events.begin
+play = events.play
+sound = contact.sound
+sympathise = sympathy.sympathise
 kit_begin = kit.begin
 kit_follow = kit.follow
 kit_prepare = kit.prepare
@@ -66,15 +58,3 @@ def begin_convolver(convolver_at: int, rate_hz: float, frames: int) -> None:
 def drive(mixer_at: int, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer."""
     amplifier.drive(record_of_mixer(mixer_at), drive_db, tone_db, level_db)
-
-
-@kernel
-def sound(player_at: int, mixer_at: int) -> None:
-    """Add what touches strings and drums to the quantum."""
-    contact.sound(player_at, mixer_at)
-
-
-@kernel
-def sympathise(player_at: int, mixer_at: int) -> None:
-    """Add what rings along to the quantum."""
-    sympathy.sympathise(player_at, mixer_at)

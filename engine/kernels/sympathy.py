@@ -26,7 +26,7 @@ from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import mixer_at, player_at, table_at
 from engine.kernels.mixer_records import LARGEST
-from engine.kernels.playing.keys import string_of
+from engine.kernels.playing.keys import pitch_of, string_of
 from engine.kernels.records import Player, Sympathy, Table
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
@@ -39,19 +39,12 @@ NOTHING = 1e-12  # of full scale: below it all rest
 def tune(player: Player, table: Table) -> None:
     """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
     string_row, bank = player.own, player.sympathy
-    count = 0
-    rate_hz = player.rate_hz
+    count, rate_hz = 0, player.rate_hz
     everyone = table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
-        if everyone:
-            inside = table.low <= number <= table.high
-            key = number
-            string = -1
-            pitch_hz = table.pitches_hz[number] if inside else 0.0
-        else:
-            key = int(table.open[number].note)
-            string = number
-            pitch_hz = table.open[number].pitch_hz
+        key, string, pitch_hz = number, -1, pitch_of(table, number)
+        if not everyone:
+            key, string, pitch_hz = int(table.open[number].note), number, table.open[number].pitch_hz
         if not pitch_hz > 0.0:
             continue
         modes, _ = string_of(player, table, key, string, pitch_hz, False, string_row)
@@ -77,10 +70,8 @@ def tune(player: Player, table: Table) -> None:
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
     count = bank.partials
-    x = bank.x[:count]
-    y = bank.y[:count]
-    cosine = bank.cosine[:count]
-    sine = bank.sine[:count]
+    x, y = bank.x[:count], bank.y[:count]
+    cosine, sine = bank.cosine[:count], bank.sine[:count]
     gain, played = bank.gain[:count], bank.played[:count]
     for frame in range(len(force)):
         driven, total = force[frame], 0.0
@@ -112,11 +103,8 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     count = bank.partials
     if count == 0:
         return
-    mixer = mixer_at(mixer_address)
-    mix = mixer.mix[:]
-    force = mixer.scratch[:QUANTUM]
-    out = mixer.scratch[QUANTUM : 2 * QUANTUM]
-    driven = False
+    mixer, driven = mixer_at(mixer_address), False
+    mix, force, out = mixer.mix[:], mixer.scratch[:QUANTUM], mixer.scratch[QUANTUM : 2 * QUANTUM]
     for frame in range(QUANTUM):
         mono = 0.5 * (mix[frame, 0] + mix[frame, 1])
         force[frame] = mono if abs(mono) < LARGEST else 0.0  # also where it is not a number
@@ -131,15 +119,12 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if bank.stops > 0:
         bank.stops -= 1
         played[:] = 1.0
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.state != of.RINGS:
             continue
-        string = note.key
-        if not everyone:
-            string = note.string
-            if string < 0:
-                string = strings.chosen(table.open, table.strings, note.key)
+        string = note.key if everyone else note.string
+        if string < 0:
+            string = strings.chosen(table.open, table.strings, note.key)
         for n in range(count):
             if bank.owner[n] == string:
                 played[n] = 1.0

@@ -16,7 +16,7 @@ from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import slots
 from engine.kernels.memory import behind
-from engine.kernels.modes import damped, following, glide, gliding, rest_above, rest_silent, row, weights
+from engine.kernels.modes import damped, following, glide, gliding, motion, rest_above, rest_silent, row, weights
 from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
 from engine.kernels.voice_records import TENSION_PROGRAM, TensionProgram, Voice
 
@@ -48,11 +48,23 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
 
 
 @kernel
-def load_weights(point_weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
-    """Copy the weights of one ear into the blocks that `load` fills."""
-    for number in range(lanes.LANES * lanes.blocks_of(len(order))):
-        slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
-        memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
+def order_of(voice: Voice) -> np.ndarray:
+    """The numbers of a voice's modes, in the order in which they are taken."""
+    return row(voice, at.ORDER).view(np.int64)
+
+
+@kernel
+def take(voice: Voice, order: np.ndarray, fading: bool, audible: bool, memory: np.ndarray, first: int) -> int:
+    """Copy modes of a voice, in this order, and their weights into blocks; return the ears that hear them."""
+    x, y = motion(voice)
+    load(x, y, following(voice), order, memory, first)
+    ears = (2 if fading else 1) * voice.points if audible else 0
+    for ear in range(ears):
+        point_weights = weights(voice, ear // voice.points, ear % voice.points, 0)
+        for number in range(lanes.LANES * lanes.blocks_of(len(order))):
+            slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
+            memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
+    return ears
 
 
 @kernel
@@ -77,10 +89,8 @@ def node(
 ) -> tuple[float, float]:
     """The kick of the common tension and the turn to the next node, in place.
 
-    It leads from S and R here to those there. It takes each number by itself, so that all stay in registers.
-
     Args:
-        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.
+        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks there.
     """
     tension = min(sums[0] + rest[0], largest_stretch)
     linear, squared = tension * (1 - 2 * (sums[1] + rest[1])), tension * tension
@@ -198,9 +208,7 @@ def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     if voice.refresh > 0:
         return False
     voice.refresh = FEWER_QUANTA
-    x = row(voice, 0)
-    y = row(voice, 1)
-    kick = 0.0
+    (x, y), kick = motion(voice), 0.0
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     for m in range(voice.moving):
         kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
@@ -249,7 +257,7 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
     if drum or not voice.prepared:
         voice.refresh = 0 if drum else FEWER_QUANTA
     voice.decay = math.exp(-2 * slowest / rate)
-    order = row(voice, at.ORDER).view(np.int64)
+    order = order_of(voice)
     for m in range(n):
         order[m] = m
     voice.heard = voice.felt = voice.moving
@@ -266,8 +274,7 @@ def _turn(voice: Voice, mode: int, sign: float) -> None:
     """
     if voice.nodes == 0:
         return
-    x = row(voice, 0)
-    y = row(voice, 1)
+    x, y = motion(voice)
     rows = following(voice)
     angle = voice.nodes * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice.stretched
     cosine, sine = math.cos(angle), sign * math.sin(angle)
@@ -280,10 +287,8 @@ def _fall(voice: Voice) -> None:
     frames = voice.rested * QUANTUM
     if frames == 0:
         return
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    x, y = motion(voice)
+    rows, order = following(voice), order_of(voice)
     steps = voice.steps * frames // 2  # a quantum is even
     for place in range(voice.felt, voice.moving):
         m = order[place]
@@ -304,7 +309,7 @@ def _fall(voice: Voice) -> None:
 def _wake(voice: Voice) -> None:
     """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    order = order_of(voice)
     if voice.felt < voice.moving:
         voice.refresh = 0
     for place in range(voice.felt, voice.moving):
@@ -324,13 +329,10 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
     """
     _fall(voice)
     moving = voice.moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    sigmas = row(voice, at.SIGMA)
-    stretches, order = rows[3], row(voice, at.ORDER).view(np.int64)
-    sizes = scratch[:moving]
-    largest_shares = scratch[moving : 2 * moving]
+    x, y = motion(voice)
+    rows, sigmas = following(voice), row(voice, at.SIGMA)
+    stretches, order = rows[3], order_of(voice)
+    sizes, largest_shares = scratch[:moving], scratch[moving : 2 * moving]
     rested = scratch[2 * moving : 3 * moving]
     for place in range(moving):
         rested[order[place]] = 1.0 if place >= voice.felt else 0.0
@@ -400,11 +402,10 @@ def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     n = voice.modes
     _wake(voice)
-    x, y = row(voice, 0), row(voice, 1)
+    x, y = motion(voice)
     rows = following(voice)
     sigmas, stretches = row(voice, at.SIGMA), row(voice, at.STRETCH)
-    for m in range(n):
-        v[m] = y[m]
+    v[:] = y
     _half_kick(rows, x, voice.largest_stretch, v, 1.0)
     tension = 0.0  # S₀ of x = q (1 + κ p S₀), by Newton's method
     for _ in range(NEWTON_STEPS):
@@ -437,11 +438,9 @@ def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
         bounded: the largest energy is there, and may only fall; otherwise it follows from the input.
     """
     n = voice.modes
-    x, y = row(voice, 0), row(voice, 1)
-    rows = following(voice)
-    sigmas = row(voice, at.SIGMA)
-    couplings = row(voice, at.COUPLING)
-    stretches = row(voice, at.STRETCH)
+    x, y = motion(voice)
+    rows, sigmas = following(voice), row(voice, at.SIGMA)
+    couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
         omega, square = math.sqrt(rows[6, m]), q[m] * q[m]
@@ -474,8 +473,7 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     fewer = voice.prepared and _needs_fewer_nodes(voice, program)
     if voice.prepared and not gliding(voice) and not fewer:
         return
-    q = row(voice, at.PHYSICAL)
-    v = row(voice, at.PHYSICAL + 1)
+    q, v = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1)
     squares = following(voice)[6]
     if voice.prepared:
         physical(voice, q, v)
@@ -509,31 +507,21 @@ def generate(
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     bring_up_to_date(voice, program)
-    n = voice.modes
-    nodes = voice.steps
-    points = voice.points
-    sets, rests = 2 if fading else 1, program.unheard > 0
-    ears = sets * points if audible else 0
-    rest = (0.0, 0.0)
+    nodes, points = voice.steps, voice.points
+    rests, rest = program.unheard > 0, (0.0, 0.0)
     if not rests:
         voice.heard = voice.felt = voice.moving
     elif fading or voice.refresh == 0:
-        _look(voice, program, sets, scratch)
+        _look(voice, program, 2 if fading else 1, scratch)
     if rests:
         rest = (voice.rest_stretch, voice.rest_second)
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    x, y = motion(voice)
+    order = order_of(voice)
     loud, quiet = order[: voice.heard], order[voice.heard : voice.felt]
-    first = lanes.aligned(scratch)
-    near = lanes.blocks_of(len(loud))
-    far = lanes.blocks_of(len(quiet))
-    ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
-    load(x, y, rows, loud, scratch, first)
-    load(x, y, rows, quiet, scratch, behind)
-    for ear in range(ears):
-        load_weights(weights(voice, ear // points, ear % points, 0), loud, scratch, first, ear)
+    first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
+    ear_sums, behind = scratch[first + lanes.slots(voice.modes) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
+    ears = take(voice, loud, fading, audible, scratch, first)
+    load(x, y, following(voice), quiet, scratch, behind)
     moving = len(loud)
     total = 0.0
     apart = 2 if points == 1 else 1

@@ -12,7 +12,7 @@ import numpy as np
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
-from engine.kernels.modes import damped, glide, gliding, rest_above, rest_silent, row, table, turn, weights
+from engine.kernels.modes import damped, glide, gliding, motion, rest_above, rest_silent, row, table, turn, weights
 from engine.kernels.rotation import rotation
 from engine.kernels.voice_records import TruthProgram, Voice
 
@@ -76,8 +76,7 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible:
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
     a contact may wake them they are not.
     """
-    q = row(voice, 0)
-    v = row(voice, 1)
+    q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
     silence = program.silence if voice.javari.steps == 0 else 0.0
     moving = voice.moving
@@ -97,8 +96,7 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible:
 def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
     moving = voice.moving
-    q = row(voice, 0)
-    v = row(voice, 1)
+    q, v = motion(voice)
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     step_s = 1 / (max(sub_steps, 1) * program.rate_hz)
     for _ in range(count):

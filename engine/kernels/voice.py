@@ -20,7 +20,7 @@ from engine.kernels.memory import (
     wish_at,
 )
 from engine.kernels.mixer_records import CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, REACH, Mixer
-from engine.kernels.modes import row, weights
+from engine.kernels.modes import motion, row, weights
 from engine.kernels.voice_records import Voice
 
 MOVE_S = 0.020  # the fade to another listening point
@@ -62,9 +62,7 @@ def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) ->
     if voice.weights_faded >= frames or not audible:
         for point in range(2):
             for part in range(2):
-                present, following = weights(voice, 0, point, part), weights(voice, 1, point, part)
-                for mode in range(voice.modes):
-                    present[mode] = following[mode]
+                weights(voice, 0, point, part)[:] = weights(voice, 1, point, part)
             voice.bias[0, point] = voice.bias[1, point]
         voice.weights_faded = 0
         fence()
@@ -96,23 +94,22 @@ def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `warm` has reached `WARMED`: at the pluck at once, else two quanta later.
     """
-    quantum = QUANTUM
     if first:
         voice.warm = 0
     voice.warm = min(voice.warm + 1, WARMED) if audible else 0
     for point in range(voice.points):
         past = voice.history[point]
-        for frame in range(2 * quantum):
-            past[frame] = past[frame + quantum]
+        for frame in range(2 * QUANTUM):
+            past[frame] = past[frame + QUANTUM]
         near = voice.nearness
-        for frame in range(quantum):
+        for frame in range(QUANTUM):
             moved = min(max(near * out[point, frame], -FLUX_CURVES), FLUX_CURVES)
             curved = 1.0 + moved * (0.5 + moved / 6)
-            past[2 * quantum + frame] = out[point, frame] * curved
+            past[2 * QUANTUM + frame] = out[point, frame] * curved
         if first and voice.frame == 0:
-            mirrored = 1 if voice.joins else quantum  # at rest before the pluck: the mirror of what follows
+            mirrored = 1 if voice.joins else QUANTUM  # at rest before the pluck: the mirror of what follows
             for frame in range(1, mirrored):
-                past[2 * quantum - frame] = past[2 * quantum + frame]
+                past[2 * QUANTUM - frame] = past[2 * QUANTUM + frame]
             voice.warm = WARMED - 1
 
 
@@ -135,10 +132,8 @@ def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
     One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
     the voice before that one, which is left as what is to be taken over.
     """
-    before = voice_at(voice.previous_voice)
-    stops = voice.stops_in
-    waits = before.state == at.WAITING
-    earlier = 0
+    before, stops = voice_at(voice.previous_voice), voice.stops_in
+    waits, earlier = before.state == at.WAITING, 0
     later = before.begin_at >= now + QUANTUM and before.joins == 0
     if waits and (later or stops > 0):
         _never_begin(before)
@@ -176,9 +171,8 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
         if voice.kind == at.TENSION and rings:
             tension.physical(before, q, v)
         else:
-            q[:], v[:] = row(before, 0), row(before, 1)
-        amplitudes = row(voice, 0)
-        speeds = row(voice, 1)
+            q[:], v[:] = motion(before)
+        amplitudes, speeds = motion(voice)
         squares = row(voice, at.OMEGA_SQUARED)
         widest = 0.0
         for mode in range(min(n, m)):
@@ -236,9 +230,7 @@ def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
     state = begin(voice, mixer)
     if state != at.SOUNDING:
         return state
-    out = mixer.out[0]
-    scratch = mixer.scratch[:]
-    rate_hz = mixer.rate_hz
+    out, scratch, rate_hz = mixer.out[0], mixer.scratch[:], mixer.rate_hz
     audible = is_heard(voice)
     was_dry, generated = voice.dry, voice.generated
     if voice.velocity:
@@ -257,10 +249,7 @@ def is_heard(voice: Voice) -> bool:
 
 @kernel
 def begin(voice: Voice, mixer: Mixer) -> int:
-    """Begin a voice's next quantum before it is generated.
-
-    Returns its state where none is: it waits, or is over.
-    """
+    """Begin a voice's next quantum before it is generated; return its state where none is: it waits, or is over."""
     mix, now = mixer.mix[:], mixer.frames
     if voice.state == at.WAITING:
         if voice.begin_at >= now + QUANTUM:
@@ -295,25 +284,19 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
     """
     mix = mixer.mix[:]
     left_over = voice.left_over[:]
-    quantum = QUANTUM
-    now = mixer.frames
-    points = voice.points
-    late = voice.late
-    release = voice.release
+    points, late, release = voice.points, voice.late, voice.release
     audible = is_heard(voice)
     if audible and (not voice.velocity or voice.warm == WARMED):
         limit = voice.limit
         for point in range(points):
-            for frame in range(quantum):
+            for frame in range(QUANTUM):
                 if not abs(out[point, frame]) <= limit:  # also where it is not a number
                     note_gap(mixer, mixer.frames, 0.0, CAUSE_RUNAWAY)
                     return at.RUNAWAY
         first, attack = voice.frame, voice.attack
-        source = voice.gain_from
-        goal = voice.gain_to
-        done = voice.gain_done
-        length = voice.fade_frames
-        for frame in range(quantum):
+        source, goal = voice.gain_from, voice.gain_to
+        done, length = voice.gain_done, voice.fade_frames
+        for frame in range(QUANTUM):
             gain = goal
             if done + frame < length:
                 gain = source + (goal - source) * _eased((done + frame + 1) / length)
@@ -323,21 +306,21 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
             place = frame + late
-            if place < quantum:
+            if place < QUANTUM:
                 mix[place, 0] += gain * out[0, frame]
                 mix[place, 1] += gain * out[points - 1, frame]
             else:
-                left_over[place - quantum, 0] = gain * out[0, frame]
-                left_over[place - quantum, 1] = gain * out[points - 1, frame]
-        voice.gain_done = min(done + quantum, length)
+                left_over[place - QUANTUM, 0] = gain * out[0, frame]
+                left_over[place - QUANTUM, 1] = gain * out[points - 1, frame]
+        voice.gain_done = min(done + QUANTUM, length)
         voice.gain = goal
-        if done + quantum < length:
-            voice.gain = source + (goal - source) * _eased((done + quantum) / length)
+        if done + QUANTUM < length:
+            voice.gain = source + (goal - source) * _eased((done + QUANTUM) / length)
     if moved:
         if voice.began_frame < 0:
-            voice.began_frame = now + late
+            voice.began_frame = mixer.frames + late
             voice.began_s = now_s
-        voice.frame += quantum
+        voice.frame += QUANTUM
     faded = voice.gain == 0 and voice.gain_to == 0 and late == 0
     if release > 0 and (not audible or faded):
         return at.OVER

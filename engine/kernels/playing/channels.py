@@ -26,14 +26,12 @@ HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another 
 
 
 @kernel
-def rest(player: Player, number: int, pedal: int, plays: int) -> None:
-    """A channel as if nobody had moved anything on it, except for these."""
+def rest(player: Player, number: int) -> None:
+    """A channel as if nobody had moved anything on it but pedals and footswitches."""
     channel = player.channels[number]
     channel.bend = 0.0
     channel.range_semitones = -1.0
-    channel.pedal = pedal
     channel.slide = -1
-    channel.plays = plays
     channel.coarse = midi.NO_PARAMETER
     channel.fine = midi.NO_PARAMETER
     channel.coarse_tuning = 0
@@ -45,19 +43,18 @@ def reset(player: Player, number: int) -> None:
     """Reset wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
     channel = player.channels[number]
     channel.bend = channel.mute = 0.0
-    channel.pedal = 0
     channel.coarse = midi.NO_PARAMETER
     channel.fine = midi.NO_PARAMETER
     channel.expression = 127
-    for switch in range(of.SWITCHES):
-        channel.switches[switch] = 0
+    channel.switches[:] = 0
 
 
 @kernel
 def begin(player: Player, number: int) -> None:
     """Put a channel in the state in which nobody has played on it."""
     reset(player, number)
-    rest(player, number, 0, 0)
+    rest(player, number)
+    player.channels[number].plays = 0
     player.channels[number].volume = of.USUAL_VOLUME
 
 
@@ -91,15 +88,6 @@ def is_master(mode: int, channel: int, other: int) -> bool:
 def acts_on(mode: int, channel: int, other: int) -> bool:
     """Return True if wheel and pedal of a channel hold for what was struck on another."""
     return channel == other or (channel == of.FIRST and (mode == of.MPE or other == of.ON_SCREEN))
-
-
-@kernel
-def pedal_down(player: Player, mode: int, channel: int) -> bool:
-    """Return True if a pedal holds what was struck on a channel."""
-    down = False
-    for number in range(of.CHANNELS):
-        down = down or (player.channels[number].pedal != 0 and acts_on(mode, number, channel))
-    return down
 
 
 @kernel
@@ -203,18 +191,6 @@ def place_of(player: Player, table: Table, event: Event) -> int:
 
 
 @kernel
-def hold(player: Player, channel: int, key: int, down: bool) -> None:
-    """Note whether a key is down."""
-    player.channels[channel].held[key] = down
-
-
-@kernel
-def strike(player: Player, channel: int, key: int) -> None:
-    """Count a stroke of a key."""
-    player.channels[channel].strokes[key] += 1
-
-
-@kernel
 def release_latest(player: Player, channel: int, key: int) -> bool:
     """Take a release of a key for its earliest stroke that has none; return whether that is the latest."""
     strokes = player.channels[channel].strokes
@@ -223,27 +199,21 @@ def release_latest(player: Player, channel: int, key: int) -> bool:
 
 
 @kernel
-def is_down(player: Player, channel: int, key: int) -> bool:
-    return player.channels[channel].held[key] != 0
-
-
-@kernel
 def release_key(player: Player, channel: int, key: int) -> None:
     """A key is not down, and none of its strokes awaits a release."""
-    hold(player, channel, key, False)
-    player.channels[channel].strokes[key] = 0
+    player.channels[channel].held[key] = player.channels[channel].strokes[key] = 0
 
 
 @kernel
 def release_keys(player: Player, channel: int) -> None:
     """Release all keys of a channel."""
-    for key in range(of.KEYS):
-        release_key(player, channel, key)
+    player.channels[channel].held[:] = 0
+    player.channels[channel].strokes[:] = 0
 
 
 @kernel
 def switched(player: Player, mode: int, channel: int, which: int) -> bool:
-    """Return True if a footswitch, by its number, holds for a channel."""
+    """Return True if the pedal or a footswitch, by its number, holds for a channel."""
     down = False
     for number in range(of.CHANNELS):
         down = down or (player.channels[number].switches[which] != 0 and acts_on(mode, number, channel))

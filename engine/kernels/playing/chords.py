@@ -28,13 +28,10 @@ def _height(player: Player, table: Table, event: Event) -> int:
 @kernel
 def _strums_in(player: Player, table: Table, event: Event) -> int:
     """The frames from string to string of the chord of an event's note; 0: notes begin as they come."""
-    note_on = event.kind == of.NOTE_ON and event.value > 0.0
-    channel = event.channel
-    by_hand = event.position > 0.0
-    if not note_on or by_hand or not 0 <= channel < of.CHANNELS or table.drums != 0:
+    strikes = event.kind == of.NOTE_ON and event.value > 0.0 and event.position <= 0.0
+    if not strikes or not 0 <= event.channel < of.CHANNELS or table.drums != 0:
         return 0
-    switch = of.STRUMS
-    milliseconds = keys.technique_of(player, table, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
+    milliseconds = keys.technique_of(player, table, event.channel, of.STRUM_MS, of.STRUMS, USUAL_STRUM_MS)
     return slots.frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
 
 
@@ -55,13 +52,10 @@ def _goes_up(player: Player, table: Table) -> bool:
 @kernel
 def _swap(player: Player, first: Event, second: Event) -> None:
     """Exchange two events; each place keeps its frame."""
-    kept = player.kept_event
-    frame = first.frame
-    other_frame = second.frame
-    copy(kept, first)
+    copy(player.kept_event, first)
     copy(first, second)
-    copy(second, kept)
-    first.frame, second.frame = frame, other_frame
+    copy(second, player.kept_event)
+    first.frame, second.frame = second.frame, first.frame
 
 
 @kernel
@@ -71,10 +65,10 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
     Args:
         ring: events (count,), of which `place` is played next, and `end` is the last one's successor.
     """
-    address, event = player.table, ring[place % len(ring)]
-    if address == 0 or event.chord != 0:
+    event = ring[place % len(ring)]
+    if player.table == 0 or event.chord != 0:
         return
-    table, frame = table_at(address), max(event.frame, now)
+    table, frame = table_at(player.table), max(event.frame, now)
     if _strums_in(player, table, event) == 0 or _continues(player, frame):
         return
     up, best = _goes_up(player, table), event
@@ -83,8 +77,7 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
         together = max(other.frame, now) == frame and other.chord == 0
         if not together or _strums_in(player, table, other) == 0:
             break
-        higher = _height(player, table, other) > _height(player, table, best)
-        if higher == up:
+        if (_height(player, table, other) > _height(player, table, best)) == up:
             best = other
     _swap(player, event, best)
 
@@ -132,25 +125,16 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
 
 @kernel
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Put what is meant for a note behind it where that waits for its turn in a chord.
-
-    Returns True if it does.
-    """
-    id = event.id
-    channel = event.channel
-    key = event.key
-    by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
+    """Put what is meant for a note behind it where that waits for its turn in a chord; return True if it does."""
+    by_id = event.id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):
         waiting = player.queue[place]
-        if waiting.chord == 0:
-            continue
-        meant = waiting.channel == channel and waiting.key == key
+        meant = waiting.channel == event.channel and waiting.key == event.key
         meant = meant and event.string in (0, waiting.string)
         if by_id:
-            meant = waiting.id == id
-        if meant and player.queued < of.QUEUED:
-            later = waiting.frame - waiting.came
-            event.frame = max(event.frame, now) + later
+            meant = waiting.id == event.id
+        if waiting.chord != 0 and meant and player.queued < of.QUEUED:
+            event.frame = max(event.frame, now) + waiting.frame - waiting.came
             queue(player, event)
             return True
     return False
@@ -161,8 +145,7 @@ def forget_turns(player: Player, mode: int, channel: int) -> None:
     """Forget notes that wait for their turns in a chord: those of a channel, or all, -1."""
     for place in range(player.queued):
         event = player.queue[place]
-        meant = channel < 0 or channels.is_master(mode, channel, event.channel)
-        if event.chord != 0 and meant:
+        if event.chord != 0 and (channel < 0 or channels.is_master(mode, channel, event.channel)):
             notes.refuse(player, event)
             event.chord = 0
             event.kind = of.NOTHING

@@ -8,7 +8,7 @@ before it: slots, channels, keys, plucks, voices, gains, changes, notes, hands, 
 from __future__ import annotations
 
 from engine.kernels import constants as of
-from engine.kernels import drums, midi
+from engine.kernels import midi
 from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
@@ -24,15 +24,13 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
     Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
     """
     table, before = table_at(address), player.table
-    for which in range(of.VALUES):
-        player.values[which] = table.values[which]
+    player.values = table.values
     player.table = address
     gains.forget_gains(player)
     if before != 0 and table_at(before).instrument != table.instrument:
         player.wheel = 0
         for channel in range(of.CHANNELS):
-            state = player.channels[channel]
-            channels.rest(player, channel, state.pedal, state.plays)
+            channels.rest(player, channel)
     changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
     fence()
     player.serial = table.serial  # those before may be freed from here on
@@ -94,19 +92,9 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
         if event.position > 0.0:  # by hand: no key is down
             notes.strike(player, table, mixer, event)
             return
-        channels.hold(player, channel, key, True)
-        if event.string == 0:
-            channels.strike(player, channel, key)
+        player.channels[channel].held[key] = 1
+        player.channels[channel].strokes[key] += event.string == 0
         if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
-            return
-        if table.drums != 0:
-            note = notes.free_note(player, mixer)
-            gain = drums.strike(player, table, event, note.number)
-            if gain == 0.0:
-                notes.refuse(player, event)
-                return
-            notes.note_on(player, table, mixer, event, 0)
-            note.gain = gain
             return
         notes.strike(player, table, mixer, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
@@ -114,7 +102,7 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
             return
         if event.string == 0 and not channels.release_latest(player, channel, key):
             return
-        channels.hold(player, channel, key, False)
+        player.channels[channel].held[key] = 0
         hands.note_off(player, table, event, frame, now)
     elif kind == of.BEND:
         player.channels[channel].bend = min(max(value, -1.0), 1.0)

@@ -35,11 +35,14 @@ def mute_of(player: Player, table: Table, channel: int) -> float:
 
 
 @kernel
-def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
-    """The value of a technique for a channel.
+def body_of(player: Player, table: Table) -> tuple[np.ndarray, float]:
+    """The curves of the body, and how much of it is heard."""
+    return behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
 
-    It is the usual one where its footswitch is down and the value is off.
-    """
+
+@kernel
+def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
+    """The value of a technique for a channel: the usual one where its footswitch is down and the value is off."""
     value, off = value_of(player, table, which), 1.0 if which == of.HARMONIC else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual
@@ -49,8 +52,7 @@ def technique_of(player: Player, table: Table, channel: int, which: int, switch:
 @kernel
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
     """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
-    switch = of.HARMONICS
-    node = round(technique_of(player, table, channel, of.HARMONIC, switch, USUAL_HARMONIC))
+    node = round(technique_of(player, table, channel, of.HARMONIC, of.HARMONICS, USUAL_HARMONIC))
     return node if 1 < node <= partials else 0
 
 
@@ -58,21 +60,15 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
 def string_of(
     player: Player, table: Table, key: int, number: int, pitch_hz: float, wheeled: bool, out: np.ndarray
 ) -> tuple[int, float]:
-    """The string of a key, before bends.
-
-    Returns its partials, 0 where there is none, and its share of the whole string.
+    """The string of a key, before bends. Return its partials, 0 where there is none, and its share of the whole.
 
     Args:
         number: on which of a set it is wanted, as of `strings.played`.
         wheeled: whether with the knob that the modulation wheel turns, as far as it does.
     """
-    whole = player.whole
-    knobs = player.knobs
-    count = table.strings
+    whole, knobs, count = player.whole, player.knobs, table.strings
     for which in range(of.KNOBS):
-        knobs[which] = player.values[which]
-        if wheeled:
-            knobs[which] = value_of(player, table, which)
+        knobs[which] = value_of(player, table, which) if wheeled else player.values[which]
     first = table.open[strings.played(table.open, count, key, number) if count > 0 else 0]
     slackened = pitch_hz / first.pitch_hz if count > 0 and key < first.note else 1.0
     if not strings.stop(first.string, knobs, slackened, pitch_hz, whole, out):
@@ -83,10 +79,7 @@ def string_of(
 
 @kernel
 def has_octave(table: Table, key: int, number: int) -> bool:
-    """Return True if a key's course has octave strings, on a string of a set.
-
-    -1: on the string that the key chooses.
-    """
+    """Return True if a key's course has octave strings, on a string of a set or, -1, the one that the key chooses."""
     count, octaves = table.strings, table.octaves
     return octaves > 0 and (number if number >= 0 else strings.chosen(table.open, count, key)) >= count - octaves
 
@@ -122,23 +115,17 @@ def pitch_of(table: Table, key: int) -> float:
 
 @kernel
 def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> None:
-    """Write the string of a note with the present knobs, wheels and damper.
-
-    Where there is none, it stays as it is.
-    """
-    key, mode = note.key, table.mode
-    pitch_hz, fits = pitch_of(table, key), True
+    """Write the string of a note with the present knobs, wheels and damper; where there is none, it stays."""
+    pitch_hz, fits = pitch_of(table, note.key), True
     if pitch_hz > 0.0:
-        number = note.string
         wheeled = player.wheel != 0 and 0 <= table.wheel < of.KNOBS
-        modes, _ = string_of(player, table, key, number, pitch_hz, wheeled, out)
+        modes, _ = string_of(player, table, note.key, note.string, pitch_hz, wheeled, out)
         if note.octave != 0:
             strings.thin(out, pitch_hz)
         fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
     else:
-        for place in range(of.STRING):
-            out[place] = note.own[place]
-    semitones = channels.semitones(player, mode, note.channel)
+        out[:] = note.own
+    semitones = channels.semitones(player, table.mode, note.channel)
     semitones += note.tuned + note.apart + note.vibrato
     ratio = 2.0 ** (semitones / 12)
     if fits and ratio != 1.0:
@@ -151,5 +138,4 @@ def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> Non
         out[of.D1] = strings.damped(out, value_of(player, table, of.RELEASE_S))
         fits = strings.possible(out)
     if not fits:
-        for place in range(of.STRING):
-            out[place] = note.string_now[place]
+        out[:] = note.string_now

@@ -8,9 +8,10 @@ import numpy as np
 
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
-from engine.kernels import pulses, strings, velocities
+from engine.kernels import pulses, recorded, strings, velocities
 from engine.kernels.compiled import kernel
 from engine.kernels.memory import behind, mixed
+from engine.kernels.playing import keys
 from engine.kernels.records import Player, Table
 from engine.levels import MOST_PERIODS
 
@@ -25,9 +26,7 @@ VARIES_WIDTH = 0.12  # shares, dB
 
 @kernel
 def pull(player: Player, table: Table, shape: int, modes: int, position: float, peak_m: float, width: float) -> float:
-    """The amplitudes of the modes of a pluck, and its highest point in m.
-
-    They come from its shape on the grid, then sines.
+    """The amplitudes of the modes of a pluck, from its shape on the grid by sines, and its highest point in m.
 
     Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
     """
@@ -74,13 +73,10 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
     It peaks where the force pulls: elsewhere it is straight.
     """
     turn = len(sines)
-    grid = len(sines) // 2 + 1
-    highest = 0.0
-    near = int((position - width / 2) * (grid - 1)) - 1
-    far = int((position + width / 2) * (grid - 1)) + 2
-    low, high = max(near, 1), min(far, grid - 2) + 1
-    for point in range(low, high):
-        player.pulled[point] = 0.0
+    grid = turn // 2 + 1
+    low = max(int((position - width / 2) * (grid - 1)) - 1, 1)
+    high = min(int((position + width / 2) * (grid - 1)) + 2, grid - 2) + 1
+    player.pulled[low:high] = 0.0
     for mode in range(1, grid - 1):
         amplitude, place = pulses.corner(mode, position, width), mode * low % turn
         for point in range(low, high):
@@ -90,8 +86,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
                 place -= turn
         if mode <= modes:
             player.amplitudes[mode - 1] = amplitude
-    for point in range(low, high):
-        highest = max(highest, player.pulled[point])
+    highest = max(player.pulled[low:high].max(), 0.0)
     for mode in range(modes):
         player.amplitudes[mode] *= peak_m / highest
 
@@ -140,12 +135,23 @@ def vary(
 
 
 @kernel
-def split(player: Player, table: Table, partials: int, turned: float) -> int:
-    """Split a pluck's partials into modes of both polarisations; how many partials have two.
+def split(player: Player, table: Table, string_row: np.ndarray, partials: int, turned: float) -> tuple[int, int]:
+    """Split a pluck's partials into modes of both polarisations; how many these are, and how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.
     """
+    if table.recorded == 0:
+        pairs = _polarise(player, table, partials, turned)
+        return partials + pairs, pairs
+    modes = keys.modes_of(table, partials)
+    recorded.split(keys.additions(table), string_row, modes, player.amplitudes[:modes])
+    return modes, (modes + 1) // 2
+
+
+@kernel
+def _polarise(player: Player, table: Table, partials: int, turned: float) -> int:
+    """Split partials of strings that were not recorded; how many have two modes."""
     pairs = min(table.pairs, partials)
     if pairs == 0:
         return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-
 from engine.kernels import constants as of
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
@@ -30,18 +29,17 @@ def quanta(player: Player, seconds: float) -> int:
 
 @kernel
 def voice_over(address: int) -> bool:
-    state = voice_at(address).state
-    return state == at.OVER or state == at.RUNAWAY
+    """Return True if there is no voice, or one that has ended."""
+    return address == 0 or voice_at(address).state in (at.OVER, at.RUNAWAY)
 
 
 @kernel
 def over(note: Note) -> bool:
     """Return True if all voices of a note are over."""
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address != 0 and not voice_over(address):
-            return False
-    return True
+    rings = False
+    for address in note.voices:
+        rings = rings or not voice_over(address)
+    return not rings
 
 
 @kernel
@@ -77,7 +75,5 @@ def blank_voice(player: Player, table: Table, address: int, source: int, modes: 
     voice.fade_frames = round(at.FADE_S * rate_hz)
     voice.ends_at, voice.ends_in = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice.silent = at.SILENT_DB * math.log(10.0) / 20
-    behind = rows(voice, -WEIGHT_ROWS, WEIGHT_ROWS + used)
-    for place in range(len(behind)):
-        behind[place] = 0.0
+    rows(voice, -WEIGHT_ROWS, WEIGHT_ROWS + used)[:] = 0.0
     return voice
