@@ -21,7 +21,6 @@ from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import behind
 from engine.kernels.mixer_records import MOST_LATENTS, SCRATCH_ROWS
 from engine.kernels.modes import row, rows, weights
-from engine.kernels.voice_records import BankProgram, Voice
 
 SHORT, LONG = 32, 64  # frames of a segment, at first and later
 INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
@@ -76,7 +75,7 @@ def _room(scratch: np.ndarray, row: int, count: int) -> np.ndarray:
 
 
 @kernel
-def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -> None:
+def energies(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray) -> None:
     """E_m (modes,) at a time in trained samples."""
     n = program.modes
     sigma = behind(program, program.sigma, n)
@@ -86,7 +85,7 @@ def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -
 
 
 @kernel
-def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+def higher_orders(program: at.BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """f(E) - K E, (2 modes,)."""
     n = program.modes
     omega = behind(program, program.omega, n)
@@ -148,7 +147,7 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
 
 
 @kernel
-def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
+def strike(voice: at.Voice, program: at.BankProgram, scratch: np.ndarray) -> None:
     """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
     n = program.modes
     sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
@@ -180,7 +179,7 @@ def _width(node: int) -> int:
 
 
 @kernel
-def _integrate_from(voice: Voice, program: BankProgram, first: int, scratch: np.ndarray) -> None:
+def _integrate_from(voice: at.Voice, program: at.BankProgram, first: int, scratch: np.ndarray) -> None:
     """The higher orders at the voice's node, half-way and at the next, from the first of these on that is new."""
     n = program.modes
     energy, more = _room(scratch, 4, n), scratch[5 * MOST_LATENTS :]
@@ -191,7 +190,7 @@ def _integrate_from(voice: Voice, program: BankProgram, first: int, scratch: np.
 
 
 @kernel
-def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
+def _integrate_to(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
     """Move on to the node before a time."""
     wanted = int(time / program.spacing)
     while voice.node + _width(voice.node) <= wanted:
@@ -208,7 +207,7 @@ def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.n
 
 
 @kernel
-def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
+def _change(program: at.BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
     """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
     n = program.modes
     weight = behind(program, program.change, n * n)  # transposed
@@ -240,7 +239,7 @@ def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray
 
 
 @kernel
-def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
+def _move(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
     n = program.modes
     sigma, omega = behind(program, program.sigma, n), behind(program, program.omega, n)
@@ -291,7 +290,7 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
 
 @kernel
 def generate(
-    voice: Voice, program: BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
@@ -343,7 +342,7 @@ def generate(
 
 
 @kernel
-def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
+def _keep_end(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
     """Keep the state at which the next segment begins."""
     n = program.modes
     end = _room(scratch, 8, 5 * n)
@@ -356,7 +355,7 @@ def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarr
 
 @kernel
 def _segment(
-    voice: Voice, program: BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
     n, ratio, limit = program.modes, program.ratio, program.limit
@@ -417,7 +416,7 @@ def _segment(
 
 
 @kernel
-def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+def _sum(voice: at.Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """Add Re Σ w z at each frame of the quantum."""
     n, alive = voice.modes, voice.audible_count
     reals, imaginaries = weights(voice, which, point, 0), weights(voice, which, point, 1)
@@ -434,7 +433,7 @@ def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, s
 
 
 @kernel
-def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
+def _look(voice: at.Voice, program: at.BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
     """Find the latents that are heard as modulated, and those whose squares are heard in that; there come no more."""
     n = program.modes
     alive = voice.audible_count
@@ -476,7 +475,7 @@ def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray
 
 @kernel
 def _modulate(
-    voice: Voice, program: BankProgram, z: np.ndarray, fading: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.BankProgram, z: np.ndarray, fading: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """Add what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
     n = program.modes

@@ -24,7 +24,6 @@ import numpy as np
 
 from engine.kernels import constants as of
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import address_of, attack_at, behind, mixed, mixer_at, player_at, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
 
@@ -125,13 +124,6 @@ def touch(player: Player, table: Table, by: Touch) -> None:
 
 
 @kernel
-def hush(player: Player, quanta: int) -> None:
-    """Let all noises fade out."""
-    for noise in player.noises:
-        noise.stops = quanta
-
-
-@kernel
 def sound(player_address: int, mixer_address: int) -> None:
     """Add all noises to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
@@ -148,12 +140,12 @@ def sound(player_address: int, mixer_address: int) -> None:
     mixer = mixer_at(mixer_address)
     mix, now = mixer.mix[:], mixer.frames
     for noise in player.noises:
-        if noise.left == 0 or noise.frame >= now + QUANTUM:
+        if noise.left == 0 or noise.frame >= now + of.QUANTUM:
             continue
         begin, gain_from = 0, before
         if noise.done == 0:
             begin, gain_from = max(0, noise.frame - now), gain
-        end = min(QUANTUM, begin + noise.left)
+        end = min(of.QUANTUM, begin + noise.left)
         if noise.recorded == 0:
             _run(noise, begin, end, gain_from, gain, mix)
         elif table.attack != 0:
@@ -171,7 +163,7 @@ def sound(player_address: int, mixer_address: int) -> None:
 @kernel
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
     """Add a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
-    share = (frame + 1) / QUANTUM
+    share = (frame + 1) / of.QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
         level *= 1 - share / stops

@@ -35,6 +35,7 @@ from engine.kernels.mixer_records import (
     Impulse,
     Mixer,
 )
+from engine.kernels.modes import eased
 
 _SUMMING = WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
 _SHARE = -(-(WINDOW + 1) // _SUMMING)  # frequencies in each
@@ -159,7 +160,7 @@ def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
     for side in range(2):
         early, late = early_input[side], late_input[side, WINDOW + phase * QUANTUM :]
         for frame in range(QUANTUM):
-            share = _way((phase * QUANTUM + frame + 1) / WINDOW) if softly else 1.0
+            share = eased((phase * QUANTUM + frame + 1) / WINDOW) if softly else 1.0
             early[QUANTUM + frame] = late[frame] = share * mix[frame, side]
     place = (convolver.early_place + 1) % EARLY
     _analyse(convolver, early_input, convolver.early[place])
@@ -287,14 +288,8 @@ def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -
             value = now[side, frame] if wet_now else dry
             if step > 0:
                 other = following[side, frame] if wet_next else dry
-                value += _way((done + frame + 1) / frames) * (other - value)
+                value += eased((done + frame + 1) / frames) * (other - value)
             mix[frame, side] = value
-
-
-@kernel
-def _way(share: float) -> float:
-    """The smooth way from 0 to 1, without a corner."""
-    return share * share * (3 - 2 * share)
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Strings of a course that stand on one bridge, and ring in step: energy passes between them, both ways.
+"""Voices in the mix, alone or as strings of a course on one bridge, in step: energy passes between them, both ways.
 
 The bridge, of conductance G, moves with the sum of the forces of all strings on it. For one partial of strings nearly
 in unison that is one damper for the sum of their speeds v, in place of one for each:
@@ -30,17 +30,26 @@ from engine.kernels import voice_records as at
 from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import MOST_PAIRS, QUANTUM
 from engine.kernels.memory import fence, tension_program_at, truth_program_at, voice_at
-from engine.kernels.mixer_records import MOST_COURSE, CourseString, Mixer
+from engine.kernels.mixer_records import CAUSE_STARVED, MOST_COURSE, CourseString, Mixer
 from engine.kernels.modes import following, motion, row
-from engine.kernels.voice import begin, differentiate, end, is_first, is_heard, move_points, remember
-from engine.kernels.voice_records import Voice
+from engine.kernels.voice import (
+    begin,
+    differentiate,
+    end,
+    generate,
+    is_first,
+    is_heard,
+    move_points,
+    note_gap,
+    remember,
+)
 
 SHARED = 2 * MOST_PAIRS  # modes of a string that have a part in the bridge, at most
 PARTS = lanes.PARTS * SHARED  # slots of all their parts
 
 
 @kernel
-def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
+def _joins(course: int, late: int, voice: at.Voice, now: int) -> bool:
     """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
     if voice.course != course or voice.course_done == now + 1:
         return False
@@ -52,7 +61,7 @@ def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
 
 @kernel
 def add(mixer: Mixer, place: int, now_s: float) -> int:
-    """Add the next quantum of the course of an active voice, by its place, to the mix; return that voice's state.
+    """Add the next quantum of an active voice, by its place, and of its course to the mix; return the voice's state.
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
@@ -62,11 +71,10 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
     state = begin(first_voice, mixer)
     if state != at.SOUNDING:
         return state
-    course = first_voice.course
-    late = first_voice.late
-    strings = 1
+    course, late, strings = first_voice.course, first_voice.late, 1
+    was_dry, before = first_voice.dry, first_voice.generated
     mixer.course[0].address = mixer.voices[place]
-    for later_place in range(place + 1, mixer.active):
+    for later_place in range(place + 1, mixer.active if course != 0 else 0):
         other = voice_at(mixer.voices[later_place])
         if strings < MOST_COURSE and _joins(course, late, other, now) and begin(other, mixer) == at.SOUNDING:
             mixer.course[strings].address = mixer.voices[later_place]
@@ -80,15 +88,21 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
                 generated += 1
         if generated > 0:
             _generate(mixer, generated, turn == 0)
+    if first_voice.dry and not was_dry:
+        note_gap(mixer, now, 0.0, CAUSE_STARVED)
     for number in range(strings):
         voice, out = voice_at(mixer.course[number].address), mixer.out[number]
         if voice.velocity:
             differentiate(voice, out, mixer.taps[:])
-        state = end(voice, mixer, now_s, out, True)
-        voice.course_done = now + 1
-        fence()
-        voice.state = state
-    return first_voice.state
+        added = end(voice, mixer, now_s, out, number > 0 or voice.generated > before)
+        if course != 0:
+            voice.course_done = now + 1
+        if number == 0:
+            state = added
+        else:
+            fence()
+            voice.state = added
+    return state
 
 
 @inlined
@@ -105,6 +119,12 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
         first: whether those that sense velocity are behind the others.
     """
     scratch = mixer.scratch[:]
+    alone = voice_at(_string(mixer, 0).address)
+    if alone.course == 0:
+        generate(alone, is_heard(alone), mixer.rate_hz, mixer.out[0], scratch)
+        if alone.velocity:
+            remember(alone, is_heard(alone), first, mixer.out[0])
+        return
     sums = scratch[lanes.aligned(scratch) :][:SHARED]
     place, solved, shared = lanes.aligned(scratch) + SHARED, False, 0
     for number in range(strings):
@@ -152,7 +172,8 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
             string = _string(mixer, number)
             voice, out = voice_at(string.address), mixer.out[mixer.generated[number]]
             program, fading = truth_program_at(voice.program), voice.next_weights == 1
-            truth.advance(voice, program, string.sub_steps, frame, fading, is_heard(voice), out)
+            truth.hear(voice, program, frame, fading, is_heard(voice), out)
+            truth.ring(voice, program, string.sub_steps, max(string.sub_steps, 1))
         sums[:shared] = 0.0
         for number in range(strings):
             string = _string(mixer, number)
@@ -167,13 +188,13 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
 
 
 @inlined
-def _speeds(voice: Voice, shared: int) -> np.ndarray:
+def _speeds(voice: at.Voice, shared: int) -> np.ndarray:
     """Speeds of a solved string's first modes."""
     return row(voice, 1)[: min(voice.modes, shared)]
 
 
 @kernel
-def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
+def _set_up(string: CourseString, voice: at.Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
     """Prepare a string for a quantum, its parts and modes from a slot of the scratch on; return the slot behind."""
     string.parts, string.first = place, place + PARTS
     if solved:
@@ -231,7 +252,7 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
 
 
 @inlined
-def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
+def _advance(string: CourseString, voice: at.Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
     first, near, ears = string.first, string.near, string.ears
     at_points, largest = string.heard[:], voice.largest_stretch
@@ -256,7 +277,7 @@ def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int
 
 
 @kernel
-def _put_back(string: CourseString, voice: Voice, scratch: np.ndarray) -> None:
+def _put_back(string: CourseString, voice: at.Voice, scratch: np.ndarray) -> None:
     """A string as it is after a quantum."""
     x, y = motion(voice)
     tension.save(x, y, tension.order_of(voice)[: voice.heard], scratch, string.first)

@@ -14,11 +14,10 @@ from engine.kernels import constants as of
 from engine.kernels import drum_modes, loudness, velocities
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
-from engine.kernels.memory import address_of, drum_at, matrix, reals, wholes
+from engine.kernels.memory import address_of, drum_at, reals, shaped, wholes
 from engine.kernels.modes import TOO_HIGH, row, weights
 from engine.kernels.playing import keys, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
-from engine.kernels.voice_records import Voice
 from engine.levels import RUNAWAY_FACTOR
 
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
@@ -50,7 +49,7 @@ def drum_of(table: Table, key: int) -> Drum:
 @kernel
 def rows_of(drum: Drum) -> np.ndarray:
     """The rows (DRUM_ROWS, modes) of a drum."""
-    return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
+    return shaped(reals(address_of(drum)), HEADER, (DRUM_ROWS, drum.modes))
 
 
 @kernel
@@ -82,28 +81,23 @@ def gain_of(player: Player, table: Table, key: int) -> float:
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
         _blow(drum, rows[STRUCK], _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0)), speeds)
-        stereo = table.points == 2
-        loudest = 0.0
-        modes = 0
+        loudest, modes, place = 0.0, 0, 0
         for mode in range(n):
             speeds[mode] /= math.sqrt(rows[SQUARE, mode])
-            weight = abs(rows[WEIGHTS, mode])
-            if stereo:
-                weight = max(weight, abs(rows[WEIGHTS + 1, mode]))
-            loud[mode] = weight * abs(speeds[mode])
+            loud[mode] = 0.0
+            for point in range(table.points):
+                loud[mode] = max(loud[mode], abs(rows[WEIGHTS + point, mode] * speeds[mode]))
             loudest = max(loudest, loud[mode])
         loud[0] = loud[n - 1] = loudest  # so that the peak is looked for in the same frames
         for mode in range(n):
-            if loud[mode] > UNHEARD * loudest:
-                modes += 1
-        place = 0
+            modes += loud[mode] > UNHEARD * loudest
         for mode in range(n):
             if loud[mode] > UNHEARD * loudest:
                 sound[of.SOUND_OMEGA * modes + place] = math.sqrt(rows[SQUARE, mode])
                 sound[of.SOUND_SIGMA * modes + place] = rows[SIGMA, mode]
-                sound[of.SOUND_LEFT * modes + place] = rows[WEIGHTS, mode] * speeds[mode]
-                right = rows[WEIGHTS + 1, mode] * speeds[mode] if stereo else 0.0
-                sound[of.SOUND_RIGHT * modes + place] = right
+                sound[of.SOUND_RIGHT * modes + place] = 0.0
+                for point in range(table.points):
+                    sound[(of.SOUND_LEFT + point) * modes + place] = rows[WEIGHTS + point, mode] * speeds[mode]
                 place += 1
         body, mix = keys.body_of(player, table)
         gain = loudness.gain(sound, modes, table.points, body, mix)
@@ -154,7 +148,7 @@ def make_voice(player: Player, table: Table, address: int, event: Event, source:
 
 
 @kernel
-def weigh(player: Player, table: Table, voice: Voice, which: int, key: int) -> None:
+def weigh(player: Player, table: Table, voice: at.Voice, which: int, key: int) -> None:
     """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
     highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum_of(table, key))
     for point in range(table.points):

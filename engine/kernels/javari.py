@@ -41,17 +41,15 @@ from engine.kernels import constants as of
 from engine.kernels import lanes, strings, tension, truth
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import tension_program_at, truth_program_at
 from engine.kernels.modes import damped, following, motion, row
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import TensionProgram, TruthProgram, Voice
 
 PHASE, MOST_STEPS = 0.15, 6
 
 
 @kernel
-def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
+def fit(voice: at.Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
     """Give a voice that has not begun an edge of its bridge.
 
     Args:
@@ -96,8 +94,8 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
 
 
 @kernel
-def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
+def generate(voice: at.Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+    """The next quantum, (4, of.QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
     if voice.kind == at.TRUTH:
         _ring_solved(voice, truth_program_at(voice.program), fading, audible, out)
     else:
@@ -108,11 +106,11 @@ def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch
             first[mode] = 0.0
         if second[mode] * second[mode] < tension.NOTHING:
             second[mode] = 0.0
-    voice.generated += QUANTUM
+    voice.generated += of.QUANTUM
 
 
 @kernel
-def _prepare(voice: Voice, step_s: float) -> None:
+def _prepare(voice: at.Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
     shapes, give = row(voice, at.JAVARI), 0.0
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
@@ -128,7 +126,7 @@ def _prepare(voice: Voice, step_s: float) -> None:
 
 @kernel
 def _ring(
-    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """A quantum of latents that share a tension."""
     tension.bring_up_to_date(voice, program)
@@ -157,7 +155,7 @@ def _ring(
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         for ear in range(ears):
             out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
             out[apart * ear, frame] -= voice.javari.heard * pushed
@@ -189,7 +187,7 @@ def _ring(
 
 
 @kernel
-def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
+def _ring_solved(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
     sub_steps = truth.set_up(voice, program)
     steps = voice.javari.steps
@@ -203,7 +201,7 @@ def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: boo
     before, pushed = -gap, voice.javari.force
     for mode in range(moving):
         before -= shapes[mode] * q[mode]
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         truth.hear(voice, program, frame, fading, audible, out)
         for which in range((2 if fading else 1) if audible else 0):
             for point in range(voice.points):

@@ -63,19 +63,7 @@ def _at(number: Any):
     return memory
 
 
-_reals, _wholes = _at(types.float64), _at(types.int64)
-
-
-@kernel
-def reals(address: int) -> np.ndarray:
-    """The memory at an address (int64) as real numbers, of no stated length."""
-    return _reals(address)
-
-
-@kernel
-def wholes(address: int) -> np.ndarray:
-    """The same as whole numbers."""
-    return _wholes(address)
+reals, wholes = _at(types.float64), _at(types.int64)  # of no stated length
 
 
 def record_at(dtype: np.dtype[np.void]) -> Any:
@@ -152,19 +140,7 @@ def part(typing_context: Any, memory: Any, first: Any, count: Any):
 @kernel
 def behind(record: Any, slot: int, count: int) -> np.ndarray:
     """The real numbers, as many as `count`, from a slot of a record that they follow, counted from its beginning."""
-    return part(_reals(address_of(record)), slot, count)
-
-
-@intrinsic
-def matrix(typing_context: Any, memory: Any, first: Any, rows: Any, columns: Any):
-    """The same as an array (rows, columns)."""
-    kind = types.Array(memory.dtype, 2, "C", readonly=not memory.mutable)
-
-    def generate(context, builder, signature, arguments):
-        data = context.make_array(memory)(context, builder, arguments[0]).data
-        return _array(context, builder, kind, builder.gep(data, [arguments[1]]), arguments[2:])
-
-    return kind(memory, types.int64, types.int64, types.int64), generate
+    return part(reals(address_of(record)), slot, count)
 
 
 @intrinsic

@@ -23,7 +23,7 @@ from engine.kernels.memory import address_of, fence, mixer_at, voice_at
 from engine.kernels.mixer_records import CAUSE_DEVICE, LARGEST, MOST_VOICES, RING, Mixer
 from engine.kernels.playing.events import play
 from engine.kernels.sympathy import sympathise
-from engine.kernels.voice import add, note_gap, take_over
+from engine.kernels.voice import note_gap, take_over
 
 TONE_HZ = 440.0
 TONE_LEVEL = 0.1
@@ -90,7 +90,7 @@ def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
         address = mixer.voices[place]
         voice = voice_at(address)
         if voice.of_instrument == of_instrument:
-            state = courses.add(mixer, place, given_s) if voice.course != 0 else add(voice, mixer, given_s)
+            state = courses.add(mixer, place, given_s)
             fence()
             voice.state = state  # one that is over may be freed from here on
             if state != at.SOUNDING and state != at.WAITING:

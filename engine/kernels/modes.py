@@ -14,46 +14,45 @@ import numpy as np
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import inlined, kernel
 from engine.kernels.fields import slots
-from engine.kernels.memory import address_of, behind, fence, matrix, reals, wish_at
+from engine.kernels.memory import behind, fence, shaped, wish_at
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import VOICE, WEIGHT_ROWS, WISH, Voice
 
 TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
-BEHIND_VOICE, BEHIND_WISH = slots(VOICE), slots(WISH)
+BEHIND_VOICE, BEHIND_WISH = slots(at.VOICE), slots(at.WISH)
 
 
 @kernel
-def weights(voice: Voice, which: int, point: int, part: int) -> np.ndarray:
+def weights(voice: at.Voice, which: int, point: int, part: int) -> np.ndarray:
     """The weights (modes,) of a set, at a point, of the real (0) or imaginary (1) parts."""
     return behind(voice, BEHIND_VOICE + ((which * 2 + point) * 2 + part) * voice.modes, voice.modes)
 
 
 @kernel
-def rows(voice: Voice, first: int, count: int) -> np.ndarray:
+def rows(voice: at.Voice, first: int, count: int) -> np.ndarray:
     """Rows of a voice, (count * modes,), one after the other."""
-    return behind(voice, BEHIND_VOICE + (WEIGHT_ROWS + first) * voice.modes, count * voice.modes)
+    return behind(voice, BEHIND_VOICE + (at.WEIGHT_ROWS + first) * voice.modes, count * voice.modes)
 
 
 @kernel
-def row(voice: Voice, which: int) -> np.ndarray:
+def row(voice: at.Voice, which: int) -> np.ndarray:
     """The row (modes,) of that number of a voice."""
     return rows(voice, which, 1)
 
 
 @kernel
-def motion(voice: Voice) -> tuple[np.ndarray, np.ndarray]:
+def motion(voice: at.Voice) -> tuple[np.ndarray, np.ndarray]:
     """The two rows that move: amplitude and speed, or x and y."""
     return row(voice, 0), row(voice, 1)
 
 
 @kernel
-def table(voice: Voice, first: int, count: int) -> np.ndarray:
+def table(voice: at.Voice, first: int, count: int) -> np.ndarray:
     """The same as an array (count, modes)."""
-    return matrix(reals(address_of(voice)), BEHIND_VOICE + (WEIGHT_ROWS + first) * voice.modes, count, voice.modes)
+    return shaped(rows(voice, first, count), 0, (count, voice.modes))
 
 
 @kernel
-def following(voice: Voice) -> np.ndarray:
+def following(voice: at.Voice) -> np.ndarray:
     """The values that follow from modes of latents with one tension, (7, modes): see `kernels.tension.prepare`."""
     return table(voice, at.FOLLOWING, 7)
 
@@ -65,13 +64,13 @@ def wished_rows(address: int, modes: int) -> np.ndarray:
 
 
 @kernel
-def gliding(voice: Voice) -> bool:
+def gliding(voice: at.Voice) -> bool:
     """Return True if the voice's modes are still to change."""
     return voice.resonator != voice.current_modes or voice.glide > 0
 
 
 @kernel
-def glide(voice: Voice) -> None:
+def glide(voice: at.Voice) -> None:
     """A step towards the modes that it is to have."""
     wanted = voice.resonator
     if wanted != voice.current_modes:
@@ -92,7 +91,13 @@ def damped(omega_squared: float, sigma: float) -> float:
 
 
 @kernel
-def run_up(voice: Voice, seconds: float) -> None:
+def eased(share: float) -> float:
+    """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
+    return share * share * (3 - 2 * share)
+
+
+@kernel
+def run_up(voice: at.Voice, seconds: float) -> None:
     """Advance a voice that has not begun by so long; each mode moves alone, at rest's tension."""
     q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
@@ -148,7 +153,7 @@ def turn(
 
 
 @kernel
-def rest_above(voice: Voice, rate: float) -> int:
+def rest_above(voice: at.Voice, rate: float) -> int:
     """Lay modes to rest that lie too high for the rate; the highest of the others."""
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas = row(voice, at.SIGMA)

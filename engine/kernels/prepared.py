@@ -12,7 +12,6 @@ from engine.kernels import bodies, responses, rooms
 from engine.kernels import constants as of
 from engine.kernels.bodies import given_frames, rung_frames
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.convolver import BEHIND_IMPULSE, convolver_slots, partition, partitioned_slots
 from engine.kernels.fields import slots
 from engine.kernels.fourier import COSINES, ROWS, SINES, fill_circle, power_of_two
@@ -21,12 +20,12 @@ from engine.kernels.memory import (
     behind,
     body_at,
     impulse_at,
-    matrix,
     needs_at,
     part,
     pointer,
     reals,
     responses_at,
+    shaped,
 )
 from engine.kernels.mixer_records import WINDOW
 from engine.kernels.records import BODY, RESPONSES, Body
@@ -99,17 +98,17 @@ def prepare(
     prepared = responses_at(found_address)
     memory = reals(memory_address)
     wide = width(body, rate_hz, size, t60_s)
-    work = matrix(memory, 0, ROWS, wide)
+    work = shaped(memory, 0, (ROWS, wide))
     fill_circle(work[COSINES], work[SINES])
     body_part, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
     first, room_frames = ROWS * wide, rooms.room_frames(t60_s)
-    one = matrix(memory, first, body_part, 2)
-    other = matrix(memory, first + 2 * body_part, frames - max(body_part - 1, 0), 2)
-    both = matrix(memory, first + 2 * (frames + 1), frames, 2)
+    one = shaped(memory, first, (body_part, 2))
+    other = shaped(memory, first + 2 * body_part, (frames - max(body_part - 1, 0), 2))
+    both = shaped(memory, first + 2 * (frames + 1), (frames, 2))
     scratch = part(memory, first + 2 * (2 * frames + 1), 1 << 40)
     if body_part > 0:
         _respond(work, body, size, rate_hz, scratch, one)
-    noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), matrix(scratch, 0, room_frames, 2)
+    noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), shaped(scratch, 0, (room_frames, 2))
     for frame in range(room_frames):
         made[frame, 0], made[frame, 1] = NOISE_UNIT * noise[frame, 0], NOISE_UNIT * noise[frame, 1]
     rooms.respond(work, t60_s, made, rate_hz, other)
@@ -124,7 +123,7 @@ def prepare(
             partition(work, response, frames, impulse_at(place))
     curve_frames = body_frames(body, size, CURVES_HZ)
     if curve_frames > 0:
-        response = matrix(scratch, 2 * body.frames, curve_frames, 2)
+        response = shaped(scratch, 2 * body.frames, (curve_frames, 2))
         _respond(work, body, size, CURVES_HZ, scratch, response)
         responses.curves(work, response, prepared.curves)
 
@@ -135,11 +134,11 @@ def _respond(
 ) -> None:
     """Write the response of a body; `scratch` has room for the samples of one that is given."""
     if body.frames == 0:
-        modes = matrix(reals(address_of(body)), BODY_SLOTS, 4, body.modes)
+        modes = shaped(reals(address_of(body)), BODY_SLOTS, (4, body.modes))
         bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, response)
         return
     samples = carray(pointer(address_of(body) + 8 * BODY_SLOTS), (body.frames, body.channels), np.int32)
-    recorded = matrix(scratch, 0, body.frames, 2)
+    recorded = shaped(scratch, 0, (body.frames, 2))
     for frame in range(body.frames):
         recorded[frame, 0], recorded[frame, 1] = (
             body.unit * samples[frame, 0],
@@ -172,9 +171,9 @@ def mix(found_address: int, weights_address: int, into_address: int, first: int,
             for place in range(first, end):
                 into[place] += weight * response[place]
     for channel in range(2):  # a single sample at the beginning: the same at all frequencies
-        begin = BEHIND_IMPULSE + channel * 2 * (QUANTUM + 1)
-        for place in range(max(begin, first), min(begin + QUANTUM + 1, end)):
-            into[place] += weights[0] / (2 * QUANTUM)
+        begin = BEHIND_IMPULSE + channel * 2 * (of.QUANTUM + 1)
+        for place in range(max(begin, first), min(begin + of.QUANTUM + 1, end)):
+            into[place] += weights[0] / (2 * of.QUANTUM)
     if first == 0:
         counts, room = (
             into.view(np.int64),

@@ -13,7 +13,7 @@ import numpy as np
 from engine.kernels import constants as of
 from engine.kernels.compiled import kernel
 from engine.kernels.fourier import ONE, SPARE, TWO, power_of_two, row, silence, turn, turn_any
-from engine.kernels.memory import matrix
+from engine.kernels.memory import shaped
 
 FADE_SHARE = 0.1  # of a response that is cut: its end
 FINEST_RATIO = 1000  # denominators of ratios of rates: within a cent
@@ -286,7 +286,7 @@ def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
     Args:
         body: its response at CURVES_HZ.
     """
-    common = matrix(curve, 0, 4, 4)
+    common = shaped(curve, 0, (4, 4))
     powers(work, body, body[:0], float(of.CURVES_HZ), common)
     curve[of.BODY_CROSS] = common[_DRY, _BODY]
     left = right = highest = 0.0

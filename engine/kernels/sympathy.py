@@ -23,7 +23,6 @@ import numpy as np
 from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import mixer_at, player_at, table_at
 from engine.kernels.mixer_records import LARGEST
 from engine.kernels.playing.keys import pitch_of, string_of
@@ -104,8 +103,8 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if count == 0:
         return
     mixer, driven = mixer_at(mixer_address), False
-    mix, force, out = mixer.mix[:], mixer.scratch[:QUANTUM], mixer.scratch[QUANTUM : 2 * QUANTUM]
-    for frame in range(QUANTUM):
+    mix, force, out = mixer.mix[:], mixer.scratch[: of.QUANTUM], mixer.scratch[of.QUANTUM : 2 * of.QUANTUM]
+    for frame in range(of.QUANTUM):
         mono = 0.5 * (mix[frame, 0] + mix[frame, 1])
         force[frame] = mono if abs(mono) < LARGEST else 0.0  # also where it is not a number
         driven = driven or abs(mono) > NOTHING
@@ -134,6 +133,6 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if not rings and not driven:
         bank.x[:count] = 0.0
         bank.y[:count] = 0.0
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         mix[frame, 0] += out[frame]
         mix[frame, 1] += out[frame]

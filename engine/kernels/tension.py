@@ -18,14 +18,13 @@ from engine.kernels.fields import slots
 from engine.kernels.memory import behind
 from engine.kernels.modes import damped, following, glide, gliding, motion, rest_above, rest_silent, row, weights
 from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
-from engine.kernels.voice_records import TENSION_PROGRAM, TensionProgram, Voice
 
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 FEWER_QUANTA = 64  # from one look at whether a string's modes that still move need so many nodes to the next
-BEHIND_PROGRAM = slots(TENSION_PROGRAM)
+BEHIND_PROGRAM = slots(at.TENSION_PROGRAM)
 
 
 @kernel
@@ -48,13 +47,13 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
 
 
 @kernel
-def order_of(voice: Voice) -> np.ndarray:
+def order_of(voice: at.Voice) -> np.ndarray:
     """The numbers of a voice's modes, in the order in which they are taken."""
     return row(voice, at.ORDER).view(np.int64)
 
 
 @kernel
-def take(voice: Voice, order: np.ndarray, fading: bool, audible: bool, memory: np.ndarray, first: int) -> int:
+def take(voice: at.Voice, order: np.ndarray, fading: bool, audible: bool, memory: np.ndarray, first: int) -> int:
     """Copy modes of a voice, in this order, and their weights into blocks; return the ears that hear them."""
     x, y = motion(voice)
     load(x, y, following(voice), order, memory, first)
@@ -184,7 +183,7 @@ def advance(
 
 
 @kernel
-def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
+def _nodes(voice: at.Voice, program: at.TensionProgram, kick: float) -> int:
     """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
 
     Args:
@@ -200,7 +199,7 @@ def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
 
 
 @kernel
-def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
+def _needs_fewer_nodes(voice: at.Voice, program: at.TensionProgram) -> bool:
     """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
     if voice.steps == 1 or program.unheard > 0:
         return False
@@ -216,7 +215,7 @@ def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
 
 
 @kernel
-def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
+def prepare(voice: at.Voice, program: at.TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
     """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
     n, rate = voice.modes, program.rate_hz
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
@@ -267,7 +266,7 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
 
 
 @kernel
-def _turn(voice: Voice, mode: int, sign: float) -> None:
+def _turn(voice: at.Voice, mode: int, sign: float) -> None:
     """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
 
     Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
@@ -282,7 +281,7 @@ def _turn(voice: Voice, mode: int, sign: float) -> None:
 
 
 @kernel
-def _fall(voice: Voice) -> None:
+def _fall(voice: at.Voice) -> None:
     """Modes that rest because nobody hears or feels them decay to the present."""
     frames = voice.rested * QUANTUM
     if frames == 0:
@@ -306,7 +305,7 @@ def _fall(voice: Voice) -> None:
 
 
 @kernel
-def _wake(voice: Voice) -> None:
+def _wake(voice: at.Voice) -> None:
     """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
     order = order_of(voice)
@@ -318,7 +317,7 @@ def _wake(voice: Voice) -> None:
 
 
 @kernel
-def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray) -> None:
+def _look(voice: at.Voice, program: at.TensionProgram, sets: int, scratch: np.ndarray) -> None:
     """Order the modes of a drum: those that are heard, others that stretch it, and those that rest.
 
     The highest that are silent are laid to rest for good.
@@ -398,7 +397,7 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
 
 
 @kernel
-def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
+def physical(voice: at.Voice, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     n = voice.modes
     _wake(voice)
@@ -429,7 +428,7 @@ def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
 
 
 @kernel
-def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
+def set_out(voice: at.Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
     As `KoopmanTension._set_out`.
@@ -467,7 +466,7 @@ def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
 
 
 @kernel
-def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
+def bring_up_to_date(voice: at.Voice, program: at.TensionProgram) -> None:
     """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
     n = voice.modes
     fewer = voice.prepared and _needs_fewer_nodes(voice, program)
@@ -503,7 +502,7 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
 
 @kernel
 def generate(
-    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     bring_up_to_date(voice, program)

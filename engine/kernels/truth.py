@@ -14,11 +14,10 @@ from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.modes import damped, glide, gliding, motion, rest_above, rest_silent, row, table, turn, weights
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import TruthProgram, Voice
 
 
 @kernel
-def _sub_steps(voice: Voice, program: TruthProgram) -> int:
+def _sub_steps(voice: at.Voice, program: at.TruthProgram) -> int:
     """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
     n = voice.modes
     squares, couplings = row(voice, at.OMEGA_SQUARED), row(voice, at.COUPLING)
@@ -31,7 +30,7 @@ def _sub_steps(voice: Voice, program: TruthProgram) -> int:
 
 
 @kernel
-def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
+def _prepare(voice: at.Voice, program: at.TruthProgram, sub_steps: int) -> None:
     """The exact damped rotations between kicks, of half the palindrome."""
     n = voice.modes
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
@@ -48,7 +47,7 @@ def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
 
 
 @kernel
-def set_up(voice: Voice, program: TruthProgram) -> int:
+def set_up(voice: at.Voice, program: at.TruthProgram) -> int:
     """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     changed = gliding(voice)
     if changed:
@@ -61,16 +60,7 @@ def set_up(voice: Voice, program: TruthProgram) -> int:
 
 
 @kernel
-def advance(
-    voice: Voice, program: TruthProgram, sub_steps: int, frame: int, fading: bool, audible: bool, out: np.ndarray
-) -> None:
-    """Advance by one frame of a quantum, after it is heard."""
-    hear(voice, program, frame, fading, audible, out)
-    ring(voice, program, sub_steps, max(sub_steps, 1))
-
-
-@kernel
-def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
+def hear(voice: at.Voice, program: at.TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The output of a frame.
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
@@ -93,7 +83,7 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible:
 
 
 @kernel
-def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
+def ring(voice: at.Voice, program: at.TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
     moving = voice.moving
     q, v = motion(voice)
@@ -108,9 +98,10 @@ def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> Non
 
 
 @kernel
-def generate(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
+def generate(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     sub_steps = set_up(voice, program)
     for frame in range(QUANTUM):
-        advance(voice, program, sub_steps, frame, fading, audible, out)
+        hear(voice, program, frame, fading, audible, out)
+        ring(voice, program, sub_steps, max(sub_steps, 1))
     voice.generated += QUANTUM

@@ -19,9 +19,8 @@ from engine.kernels.memory import (
     voice_at,
     wish_at,
 )
-from engine.kernels.mixer_records import CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, REACH, Mixer
-from engine.kernels.modes import motion, row, weights
-from engine.kernels.voice_records import Voice
+from engine.kernels.mixer_records import CAUSE_RUNAWAY, GAPS, REACH, Mixer
+from engine.kernels.modes import eased, motion, row, weights
 
 MOVE_S = 0.020  # the fade to another listening point
 END_S = 0.020  # the fade of a voice that has become silent
@@ -30,7 +29,7 @@ WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 
 @kernel
-def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
+def generate(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     kind = voice.kind
     if kind == at.RENDERED:
@@ -51,7 +50,7 @@ def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scra
 
 
 @kernel
-def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
+def move_points(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
     """Fade what a quantum is at its points to what it is at others."""
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
     for point in range(voice.points):
@@ -70,25 +69,13 @@ def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) ->
 
 
 @kernel
-def _velocity(
-    voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
-) -> None:
-    """Generate the motion of `_generate`, differentiated; the voice is generated a quantum ahead for that."""
-    begins = is_first(voice)
-    for turn in range(2 if begins else 1):
-        _generate(voice, audible, rate_hz, out, scratch)
-        remember(voice, audible, begins and turn == 0, out)
-    differentiate(voice, out, taps)
-
-
-@kernel
-def is_first(voice: Voice) -> bool:
+def is_first(voice: at.Voice) -> bool:
     """Return True if a voice is not yet ahead of what was heard of it."""
     return voice.generated == voice.frame
 
 
 @kernel
-def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
+def remember(voice: at.Voice, audible: bool, first: bool, out: np.ndarray) -> None:
     """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
@@ -114,7 +101,7 @@ def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
 
 
 @kernel
-def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
+def differentiate(voice: at.Voice, out: np.ndarray, taps: np.ndarray) -> None:
     """The velocity of the quantum before the latest, (2, QUANTUM) of `out`."""
     for point in range(voice.points):
         past = voice.history[point]
@@ -126,7 +113,7 @@ def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
 
 
 @kernel
-def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
+def take_over(voice: at.Voice, now: int, scratch: np.ndarray) -> None:
     """Take over the string of the voice before: stop its motion as this one begins, or add this pluck to it.
 
     One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
@@ -147,14 +134,14 @@ def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
 
 
 @kernel
-def _never_begin(voice: Voice) -> None:
+def _never_begin(voice: at.Voice) -> None:
     """A voice that waits ends without a sound."""
     voice.gain = voice.gain_to = voice.wanted_gain = 0.0
     voice.release = 1
 
 
 @kernel
-def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
+def _join(voice: at.Voice, before: at.Voice, now: int, scratch: np.ndarray) -> None:
     """The pluck is added to the motion of the voice before, which fades as this one begins.
 
     One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
@@ -192,7 +179,7 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
 
 
 @kernel
-def _past(voice: Voice, before: Voice) -> None:
+def _past(voice: at.Voice, before: at.Voice) -> None:
     """Displacement before the pluck: the motion so far, and the string held where the pluck begins."""
     pulled = row(voice, 0)
     for point in range(voice.points):
@@ -205,13 +192,7 @@ def _past(voice: Voice, before: Voice) -> None:
 
 
 @kernel
-def _eased(share: float) -> float:
-    """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
-    return share * share * (3 - 2 * share)
-
-
-@kernel
-def _look_at_wishes(voice: Voice, now: int) -> None:
+def _look_at_wishes(voice: at.Voice, now: int) -> None:
     """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     latest = voice.resonator
     address = voice.pending_modes if latest == 0 else wish_at(latest).next
@@ -225,30 +206,12 @@ def _look_at_wishes(voice: Voice, now: int) -> None:
 
 
 @kernel
-def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
-    """Add the next quantum of a voice to the mix, (QUANTUM, 2). Return its state, which it leaves to the caller."""
-    state = begin(voice, mixer)
-    if state != at.SOUNDING:
-        return state
-    out, scratch, rate_hz = mixer.out[0], mixer.scratch[:], mixer.rate_hz
-    audible = is_heard(voice)
-    was_dry, generated = voice.dry, voice.generated
-    if voice.velocity:
-        _velocity(voice, audible, rate_hz, out, scratch, mixer.taps[:])
-    else:
-        _generate(voice, audible, rate_hz, out, scratch)
-    if voice.dry and not was_dry:
-        note_gap(mixer, mixer.frames, 0.0, CAUSE_STARVED)
-    return end(voice, mixer, now_s, out, voice.generated > generated)
-
-
-@kernel
-def is_heard(voice: Voice) -> bool:
+def is_heard(voice: at.Voice) -> bool:
     return voice.gain != 0 or voice.gain_to != 0
 
 
 @kernel
-def begin(voice: Voice, mixer: Mixer) -> int:
+def begin(voice: at.Voice, mixer: Mixer) -> int:
     """Begin a voice's next quantum before it is generated; return its state where none is: it waits, or is over."""
     mix, now = mixer.mix[:], mixer.frames
     if voice.state == at.WAITING:
@@ -276,7 +239,7 @@ def begin(voice: Voice, mixer: Mixer) -> int:
 
 
 @kernel
-def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
+def end(voice: at.Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
     """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
 
     Args:
@@ -299,10 +262,10 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
         for frame in range(QUANTUM):
             gain = goal
             if done + frame < length:
-                gain = source + (goal - source) * _eased((done + frame + 1) / length)
+                gain = source + (goal - source) * eased((done + frame + 1) / length)
             if first + frame < attack:
                 if voice.joins:
-                    gain *= _eased((first + frame + 1) / attack)
+                    gain *= eased((first + frame + 1) / attack)
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
             place = frame + late
@@ -315,7 +278,7 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
         voice.gain_done = min(done + QUANTUM, length)
         voice.gain = goal
         if done + QUANTUM < length:
-            voice.gain = source + (goal - source) * _eased((done + QUANTUM) / length)
+            voice.gain = source + (goal - source) * eased((done + QUANTUM) / length)
     if moved:
         if voice.began_frame < 0:
             voice.began_frame = mixer.frames + late
@@ -341,7 +304,7 @@ def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
 
 
 @kernel
-def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
+def forward(voice: at.Voice, mixer: Mixer, frames: int) -> None:
     """Let a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
     quanta = (frames + QUANTUM // 2) // QUANTUM
     if voice.kind == at.RENDERED:  # there need not be samples yet
@@ -349,5 +312,5 @@ def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
         quanta = 0
     _look_at_wishes(voice, 0)
     for _ in range(quanta):
-        _generate(voice, False, mixer.rate_hz, mixer.out[0], mixer.scratch[:])
+        generate(voice, False, mixer.rate_hz, mixer.out[0], mixer.scratch[:])
     voice.frame = voice.generated

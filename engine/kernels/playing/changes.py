@@ -31,7 +31,8 @@ def landing(table: Table, note: Note) -> float:
 @kernel
 def level_of(player: Player, table: Table, note: Note, which: int) -> float:
     """The level of the noise of a note's stroke or release, in dB."""
-    return keys.value_of(player, table, which) + channels.loudness_db(player, table.mode, note.channel)
+    loudness = max(channels.loudness(player, table.mode, note.channel), 1e-9)
+    return keys.value_of(player, table, which) + 20 * math.log10(loudness)
 
 
 @kernel

@@ -70,12 +70,6 @@ def loudness(player: Player, mode: int, channel: int) -> float:
 
 
 @kernel
-def loudness_db(player: Player, mode: int, channel: int) -> float:
-    """The same in dB."""
-    return 20 * math.log10(max(loudness(player, mode, channel), 1e-9))
-
-
-@kernel
 def is_master(mode: int, channel: int, other: int) -> bool:
     """Return True if the channel is the other's master in MPE, or the other itself.
 

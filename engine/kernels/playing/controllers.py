@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from engine.kernels import constants as of
-from engine.kernels import contact, midi
+from engine.kernels import midi
 from engine.kernels.compiled import kernel
 from engine.kernels.playing import changes, channels, chords, hands, slots, voices
 from engine.kernels.records import Player, Table
@@ -22,8 +22,10 @@ def stop(player: Player, seconds: float, frame: int) -> None:
         channels.release_keys(player, channel)
     chords.forget_turns(player, of.POLY, -1)
     player.next_up = 0
-    player.sympathy.stops = slots.quanta(player, max(seconds, hands.STOP_S)) + 2
-    contact.hush(player, slots.quanta(player, max(seconds, hands.STOP_S)))
+    quanta = slots.quanta(player, max(seconds, hands.STOP_S))
+    player.sympathy.stops = quanta + 2
+    for noise in player.noises:
+        noise.stops = quanta
 
 
 # By the numbers of `constants.PEDAL` and those after it

@@ -10,11 +10,10 @@ from __future__ import annotations
 from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
 from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, chords, controllers, gains, hands, notes, voices
-from engine.kernels.records import Event, Player
+from engine.kernels.records import Event, Player, Table
 
 
 @kernel
@@ -59,43 +58,39 @@ def _cancel(player: Player, id: int, now: int) -> None:
 @kernel
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
     """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
-    kind = event.kind
-    frame = event.frame
-    now = mixer.frames
-    channel, key = event.channel, event.key
-    value, address = event.value, player.table
+    kind, frame, now = event.kind, event.frame, mixer.frames
     if kind == of.TABLE:
         _take_table(player, event.table, frame, now)
-        return
-    if kind == of.CANCEL:
+    elif kind == of.CANCEL:
         _cancel(player, event.id, now)
-        return
-    if kind == of.STOP:
-        controllers.stop(player, value, frame)
-        return
-    if kind in (of.CHOKE, of.TUNE) and chords.waits(player, event, now):
-        return
-    if kind == of.CHOKE:
-        hands.choke(player, event, frame)
-        return
-    if kind == of.TUNE and address != 0:
-        hands.tune(player, table_at(address), event, frame, now)
-        return
-    if not (0 <= channel < of.CHANNELS and 0 <= key < of.KEYS and address != 0):
-        if kind == of.NOTE_ON:
-            notes.refuse(player, event)
-        return
-    table = table_at(address)
+    elif kind == of.STOP:
+        controllers.stop(player, event.value, frame)
+    elif kind in (of.CHOKE, of.TUNE):
+        if chords.waits(player, event, now):
+            return
+        if kind == of.CHOKE:
+            hands.choke(player, event, frame)
+        elif player.table != 0:
+            hands.tune(player, table_at(player.table), event, frame, now)
+    elif player.table != 0 and 0 <= event.channel < of.CHANNELS and 0 <= event.key < of.KEYS:
+        _handle_on_channel(player, table_at(player.table), mixer, event)
+    elif kind == of.NOTE_ON:
+        notes.refuse(player, event)
+
+
+@kernel
+def _handle_on_channel(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
+    """Play an event of one of the channels."""
+    kind, frame, now = event.kind, event.frame, mixer.frames
+    channel, key, value = event.channel, event.key, event.value
     if kind == of.NOTE_ON and value > 0.0:
         if chords.strum(player, table, event, now):
             return
-        if event.position > 0.0:  # by hand: no key is down
-            notes.strike(player, table, mixer, event)
-            return
-        player.channels[channel].held[key] = 1
-        player.channels[channel].strokes[key] += event.string == 0
-        if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
-            return
+        if event.position <= 0.0:  # else by hand: no key is down
+            player.channels[channel].held[key] = 1
+            player.channels[channel].strokes[key] += event.string == 0
+            if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
+                return
         notes.strike(player, table, mixer, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if chords.waits(player, event, now):
@@ -119,11 +114,8 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
 @kernel
 def _superseded(event: Event, following: Event) -> bool:
     """Return True if an event and the next move the same wheel: a burst costs one glide."""
-    kind, key = event.kind, event.key
-    same = kind == following.kind and key == following.key
-    if not same or event.channel != following.channel:
-        return False
-    return kind == of.BEND or (kind == of.CONTROLLER and key == midi.MOD_WHEEL)
+    same = event.kind == following.kind and event.key == following.key and event.channel == following.channel
+    return same and (event.kind == of.BEND or (event.kind == of.CONTROLLER and event.key == midi.MOD_WHEEL))
 
 
 @kernel
@@ -151,7 +143,7 @@ def play(player_address: int, mixer_address: int) -> None:
     done = 0
     while done < player.queued:
         event = player.queue[done]
-        if event.frame >= now + QUANTUM:
+        if event.frame >= now + of.QUANTUM:
             break
         done += 1
         together = done < player.queued and player.queue[done].frame == event.frame

@@ -16,7 +16,6 @@ import math
 from engine.kernels import constants as of
 from engine.kernels import contact, strings
 from engine.kernels.compiled import inlined, kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import clear, table_at
 from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, keys, notes, slots, voices
@@ -63,12 +62,16 @@ def _move(player: Player, table: Table, note: Note, key: int, frame: int, now: i
 
 
 @kernel
-def _move_others(player: Player, table: Table, first: Note, before: int, key: int, frame: int, now: int) -> None:
-    """Let the other strings of a course follow the first, a note that has moved."""
+def _move_course(player: Player, table: Table, first: Note, key: int, frame: int, now: int) -> bool:
+    """Move a note, and the other strings of its course with it; False where it cannot play that key."""
+    before = first.key
+    if not _move(player, table, first, key, frame, now):
+        return False
     for note in player.notes:
         same = note.key == before and note.channel == first.channel and note.id == first.id
         if same and note.member != 0 and slots.sounds(note):
             _move(player, table, note, key, frame, now)
+    return True
 
 
 @kernel
@@ -87,9 +90,8 @@ def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) 
         if held and note.age > age and slots.sounds(note):
             latest, age = note, note.age
     id, before = latest.id, latest.key
-    if age == 0 or event.key == before or not _move(player, table, latest, event.key, frame, now):
+    if age == 0 or event.key == before or not _move_course(player, table, latest, event.key, frame, now):
         return False
-    _move_others(player, table, latest, before, event.key, frame, now)
     notes.report(player, of.ENDED, id, event.channel, before, now, 0.0)
     notes.reported(player)
     for other in player.notes:
@@ -103,7 +105,6 @@ def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) 
 @kernel
 def _pull_off(player: Player, table: Table, note: Note, frame: int, now: int) -> bool:
     """Give the note of a released key to the highest key that is down and has none; return True if there is one."""
-    before = note.key
     if not channels.switched(player, table.mode, note.channel, of.LEGATO):
         return False
     for key in range(of.KEYS - 1, -1, -1):
@@ -111,8 +112,7 @@ def _pull_off(player: Player, table: Table, note: Note, frame: int, now: int) ->
         for other in player.notes:
             same = other.key == key and other.channel == note.channel and other.member == 0
             free = free and not (same and other.held != 0 and slots.sounds(other))
-        if free and _move(player, table, note, key, frame, now):
-            _move_others(player, table, note, before, key, frame, now)
+        if free and _move_course(player, table, note, key, frame, now):
             return True
     return False
 
@@ -175,10 +175,10 @@ def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
     depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
     if depth == 0.0 and note.vibrato == 0.0:
         return
-    ahead = now + VIBRATO_QUANTA * QUANTUM - note.began
+    ahead = now + VIBRATO_QUANTA * of.QUANTUM - note.began
     hz = keys.value_of(player, table, of.VIBRATO_HZ)
     note.vibrato = depth * math.sin(2 * math.pi * hz * max(ahead, 0) / player.rate_hz)
-    seconds = VIBRATO_QUANTA * QUANTUM / player.rate_hz
+    seconds = VIBRATO_QUANTA * of.QUANTUM / player.rate_hz
     changes.retune(player, table, note, seconds, 0, now)
 
 
@@ -187,13 +187,13 @@ def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
     """Lift fingers from strings that they touch, and pluck again what a tremolo plucks, in the next quantum."""
     if player.table == 0 or table_at(player.table).drums != 0:
         return
-    table, end = table_at(player.table), now + QUANTUM
+    table, end = table_at(player.table), now + of.QUANTUM
     for note in player.notes:
         if note.state != of.RINGS:
             continue
         if note.touched != 0 and note.lifted < end:
             changes.retune(player, table, note, LIFT_S, note.lifted, now)
-        if (now - note.began) // QUANTUM % VIBRATO_QUANTA == 0:
+        if (now - note.began) // of.QUANTUM % VIBRATO_QUANTA == 0:
             _vibrate(player, table, note, now)
         again = note.held != 0 and note.released == 0 and note.member == 0 and note.by_hand == 0
         if not again or not slots.sounds(note):

@@ -7,11 +7,9 @@ import math
 from engine.kernels import constants as of
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import clear, voice_at
 from engine.kernels.modes import rows
 from engine.kernels.records import PLAYER, Note, Player, Table
-from engine.kernels.voice_records import WEIGHT_ROWS, Voice
 
 VOICES_AT = PLAYER.itemsize
 voice_bytes = kernel(at.voice_bytes)
@@ -24,7 +22,7 @@ def frames(player: Player, seconds: float) -> int:
 
 @kernel
 def quanta(player: Player, seconds: float) -> int:
-    return max(1, round(seconds * player.rate_hz / QUANTUM))
+    return max(1, round(seconds * player.rate_hz / of.QUANTUM))
 
 
 @kernel
@@ -62,7 +60,7 @@ def set_gain(address: int, gain: float) -> None:
 
 
 @kernel
-def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> Voice:
+def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> at.Voice:
     """A voice of a source at rest, with as many rows as are used set to zero."""
     voice, rate_hz = voice_at(address), player.rate_hz
     clear(voice)
@@ -75,5 +73,5 @@ def blank_voice(player: Player, table: Table, address: int, source: int, modes: 
     voice.fade_frames = round(at.FADE_S * rate_hz)
     voice.ends_at, voice.ends_in = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice.silent = at.SILENT_DB * math.log(10.0) / 20
-    rows(voice, -WEIGHT_ROWS, WEIGHT_ROWS + used)[:] = 0.0
+    rows(voice, -at.WEIGHT_ROWS, at.WEIGHT_ROWS + used)[:] = 0.0
     return voice

@@ -10,16 +10,14 @@ from engine.kernels import constants as of
 from engine.kernels import drums, javari, recorded, strings, tension
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import kernel
-from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import fence, table_at, voice_at, wish_at
 from engine.kernels.mixer_records import Mixer
 from engine.kernels.modes import TOO_HIGH, motion, row, rows, run_up, weights
 from engine.kernels.playing import channels, keys, slots
 from engine.kernels.records import Note, Player, Table
-from engine.kernels.voice_records import WISH, Voice
 from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
 
-WISH_BYTES = WISH.itemsize
+WISH_BYTES = at.WISH.itemsize
 
 
 @kernel
@@ -33,7 +31,7 @@ def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: fl
 
 
 @kernel
-def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
+def _weigh(player: Player, voice: at.Voice, which: int, note: Note) -> None:
     """Set one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
     solo, pairs = note.solo, note.pairs
     string_row, highest = note.own, TOO_HIGH * player.rate_hz
@@ -211,7 +209,7 @@ def take_out(mixer: Mixer, address: int) -> None:
 def lag_of(player: Player, table: Table, member: int) -> int:
     """The frames from the stroke of a course's string to its beginning, in step with the first; 0: at once."""
     later = round(member * table.apart_s * player.rate_hz)
-    return -later % QUANTUM if table.bridge > 0.0 else 0
+    return -later % of.QUANTUM if table.bridge > 0.0 else 0
 
 
 @kernel
@@ -259,7 +257,7 @@ def _listen(player: Player, table: Table, note: Note) -> None:
 
 
 @kernel
-def _may_move(table: Table, note: Note, voice: Voice) -> bool:
+def _may_move(table: Table, note: Note, voice: at.Voice) -> bool:
     """Return True if a voice of a note can be heard at other points of the instrument."""
     if note.drum != 0 and not drums.has_modes(table, note.key, voice.modes):
         return False
