@@ -69,10 +69,7 @@ def amplify(mixer: Mixer) -> None:
 
 @kernel
 def _begin(amp: Amplifier) -> None:
-    """Reset the amplifier, as if there had never been any input.
-
-    All is at rest, which is where the bias has it.
-    """
+    """Reset the amplifier, as if there had never been any input: all is at rest, which is where the bias has it."""
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
     amp.low = 0.0
     amp.last = BIAS

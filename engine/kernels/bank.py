@@ -44,10 +44,7 @@ def _turn(angle: float) -> tuple[float, float]:
 
 @inlined
 def _exp(x: float) -> float:
-    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64.
-
-    It is computed the same way for all x; below -64 it is as good as nothing.
-    """
+    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64; below, it is as good as nothing."""
     y = max(x, -64.0) / 64
     e = 1 + y * (
         1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320))))))
@@ -294,8 +291,7 @@ def generate(
 ) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
-    Args:
-        heard: otherwise only time advances.
+    Where it is not audible only time advances.
     """
     n, ratio, first = program.modes, program.ratio, voice.generated
     if program.higher:
@@ -411,8 +407,11 @@ def _segment(
             if curved:
                 g, h = cr[m], ci[m]
                 sr[m], si[m] = e * g - f * h, e * h + f * g
-    rows(voice, at.LEVEL, 4)[:] = end[: 4 * n]
-    row(voice, at.CHANGE + 1)[:] = end[4 * n :]
+    latest, next_change = rows(voice, at.LEVEL, 4), row(voice, at.CHANGE + 1)
+    for m in range(alive):
+        for part in range(4):
+            latest[part * n + m] = end[part * n + m]
+        next_change[m] = end[4 * n + m]
 
 
 @kernel

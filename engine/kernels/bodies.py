@@ -31,11 +31,7 @@ def given_frames(frames: int, own_hz: float, size: float, rate_hz: float, longes
 
 @kernel
 def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound: np.ndarray) -> None:
-    """Write all modes after one blow, in whole runs, which are computed side by side.
-
-    Args:
-        modes: (4, modes).
-    """
+    """Write all modes, (4, modes), after one blow, in whole runs, which are computed side by side."""
     runs, step_s = len(sound) // RUN, 1 / rate_hz
     x, y = row(work, ONE, runs), row(work, ONE + 1, runs)
     left, right = row(work, SPARE, RUN * runs), row(work, SPARE + 1, RUN * runs)  # frames of all runs, then the next
@@ -86,11 +82,7 @@ def respond(
 def respond_as(
     work: np.ndarray, recorded: np.ndarray, own_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
-    """Write the response of a body that is given as one.
-
-    Args:
-        sound: (`given_frames`, 2).
-    """
+    """Write the response, (`given_frames`, 2), of a body that is given as one."""
     resample(work, recorded, own_hz / size, rate_hz, sound)
     if len(sound) < resampled_frames(len(recorded), own_hz / size, rate_hz):
         fade(sound)

@@ -170,10 +170,7 @@ def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
 
 @kernel
 def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> None:
-    """The spectra (2, 2, half + 1) of two real signals (2, 2 half) by one complex transform.
-
-    The signals' later halves become the earlier.
-    """
+    """The spectra (2, 2, half + 1) of two real signals (2, 2 half), whose later halves become the earlier."""
     n, half = signals.shape[1], signals.shape[1] // 2
     re, im, re2, im2 = _work(convolver, n)
     for frame in range(n):

@@ -113,11 +113,7 @@ def _string(mixer: Mixer, number: int) -> CourseString:
 
 @kernel
 def _generate(mixer: Mixer, strings: int, first: bool) -> None:
-    """The next quantum of the strings that are generated now.
-
-    Args:
-        first: whether those that sense velocity are behind the others.
-    """
+    """The next quantum of the strings that are generated now; `first`: those that sense velocity are behind."""
     scratch = mixer.scratch[:]
     alone = voice_at(_string(mixer, 0).address)
     if alone.course == 0:

@@ -73,10 +73,8 @@ def bessels(x: float, out: np.ndarray) -> float:
         return 2 * x * x / (3 * math.pi)
     orders = min(len(out), int(x + 12 * x ** (1 / 3)) + 20)
     most = max(float(orders), x)
-    above = 0.0
-    here = 1e-300
-    total = 0.0
-    struve = 0.0
+    above, here = 0.0, 1e-300
+    total = struve = 0.0
     for m in range(2 * int(most / 2 + 4 * most ** (1 / 3) + 6), 0, -1):
         if m < orders:
             out[m] = here
@@ -101,10 +99,8 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
         bessels(x, after)
         for m in range(len(after)):
             if before[m] * after[m] < 0:
-                low = x - APART
-                high = x
-                z = x - APART / 2
-                slope = 0.0
+                low, high = x - APART, x
+                z, slope = x - APART / 2, 0.0
                 for _ in range(60):
                     bessels(z, scratch[: m + 2])
                     slope = m / z * scratch[m] - scratch[m + 1]
@@ -260,10 +256,7 @@ def shapes(drum: np.ndarray, surface: np.ndarray, places: np.ndarray, tools: Too
 
 @kernel
 def spread(turn: float, tools: Tools) -> float:
-    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR.
-
-    It is so for any solution of -∇²φ = κ²φ.
-    """
+    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR for any solution of -∇²φ = κ²φ."""
     return 1.0 if turn < 1e-6 else 2 * bessel(1, turn, tools) / turn
 
 
@@ -297,9 +290,7 @@ def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, 
 def air_at(
     drum: np.ndarray, surface: np.ndarray, ka: float, points: int, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """Write what the air adds to modes at k times size: reactance, and resistance by ka.
-
-    The shape is (2, modes), at a size of 1.
+    """Write what the air adds to modes at k times size: reactance, and resistance by ka, (2, modes), at a size of 1.
 
     ∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du. And ∫ D(s)/√(k² - s²) ds over s < k, with
     s = k sin α.
@@ -321,8 +312,7 @@ def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
     """The value at ka of one function of `air_at`: a Chebyshev series in the square of ka."""
     share = min(ka / reach, 1.0)
     t = 2 * share * share - 1
-    one = 0.0
-    two = 0.0
+    one = two = 0.0
     for term in range(len(row) - 1, 0, -1):
         one, two = 2 * t * one - two + row[term], one
     return t * one - two + row[0]
@@ -441,10 +431,7 @@ def lowest(drum: np.ndarray) -> float:
 
 @kernel
 def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarray) -> float:
-    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), else the first.
-
-    Over a kettle (0,1) dies away at once.
-    """
+    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), as (0,1) dies away; else the first."""
     across = lowest(drum)
     stiff = drum[TENSION] + stretching(drum) * (drum[THICKNESS] * across) ** 2 / 6
     in_vacuo_hz = across * math.sqrt(stiff / (drum[DENSITY] * drum[THICKNESS])) / (2 * math.pi)

@@ -100,11 +100,7 @@ def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: floa
 
 @kernel
 def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: float, least: float) -> float:
-    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it.
-
-    Args:
-        body, mix: as of `gain`.
-    """
+    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it."""
     x, y = of.SOUND_X * modes, of.SOUND_Y * modes
     noise, onset = 1.0, 0.0
     if mix > 0.0:

@@ -39,7 +39,7 @@ def row(voice: at.Voice, which: int) -> np.ndarray:
     return rows(voice, which, 1)
 
 
-@kernel
+@inlined
 def motion(voice: at.Voice) -> tuple[np.ndarray, np.ndarray]:
     """The two rows that move: amplitude and speed, or x and y."""
     return row(voice, 0), row(voice, 1)

@@ -140,10 +140,8 @@ def _respond(
     samples = carray(pointer(address_of(body) + 8 * BODY_SLOTS), (body.frames, body.channels), np.int32)
     recorded = shaped(scratch, 0, (body.frames, 2))
     for frame in range(body.frames):
-        recorded[frame, 0], recorded[frame, 1] = (
-            body.unit * samples[frame, 0],
-            body.unit * samples[frame, body.channels - 1],
-        )
+        recorded[frame, 0] = body.unit * samples[frame, 0]
+        recorded[frame, 1] = body.unit * samples[frame, body.channels - 1]
     bodies.respond_as(work, recorded, body.hz, size, rate_hz, response)
 
 
@@ -157,16 +155,13 @@ def weigh(found_address: int, body_mix: float, room_mix: float, weights_address:
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
     """Write some slots of a mix of responses as the convolver reads it."""
     prepared = responses_at(found_address)
-    weights = reals(weights_address)
-    into = reals(into_address)
+    weights, into = reals(weights_address), reals(into_address)
     end = min(first + count, prepared.part)
     for place in range(first, end):
         into[place] = 0.0
     for number in range(3):
-        weight, response = (
-            weights[1 + number],
-            behind(prepared, RESPONSES_SLOTS + number * prepared.part, prepared.part),
-        )
+        weight, part_slot = weights[1 + number], RESPONSES_SLOTS + number * prepared.part
+        response = behind(prepared, part_slot, prepared.part)
         if weight != 0.0:
             for place in range(first, end):
                 into[place] += weight * response[place]
@@ -175,9 +170,5 @@ def mix(found_address: int, weights_address: int, into_address: int, first: int,
         for place in range(max(begin, first), min(begin + of.QUANTUM + 1, end)):
             into[place] += weights[0] / (2 * of.QUANTUM)
     if first == 0:
-        counts, room = (
-            into.view(np.int64),
-            behind(prepared, RESPONSES_SLOTS + prepared.part, prepared.part).view(np.int64),
-        )
-        for place in range(BEHIND_IMPULSE):
-            counts[place] = room[place]
+        room = behind(prepared, RESPONSES_SLOTS + prepared.part, BEHIND_IMPULSE)
+        into.view(np.int64)[:BEHIND_IMPULSE] = room.view(np.int64)

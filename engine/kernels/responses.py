@@ -101,10 +101,8 @@ def fraction(ratio: float) -> tuple[int, int]:
     """
     denominator = 1 << 54
     over, under = int(ratio * denominator), denominator
-    before = 0
-    before_under = 1
-    last = 1
-    last_under = 0
+    before, before_under = 0, 1
+    last, last_under = 1, 0
     while under > 0:
         whole = over // under
         next_under = before_under + whole * last_under
@@ -152,10 +150,9 @@ def _resampling_size(frames: int, resampled: int, from_hz: float, to_hz: float) 
 
 @kernel
 def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, resampled: np.ndarray) -> None:
-    """Write a response at another rate, by its Fourier series with as much silence: any ratio, in bounded time.
+    """Write a response at another rate, as far as there is room, by its Fourier series with as much silence.
 
-    Args:
-        found: its first frames, as many as there is room for.
+    It takes any ratio, in bounded time.
     """
     if from_hz == to_hz:
         for frame in range(len(resampled)):
@@ -209,9 +206,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
     analyse(work, ONE, body, size)
     analyse(work, TWO, room, size)
     total = 0.0
-    for i in range(4):
-        for j in range(4):
-            shares[i, j] = 0.0
+    shares[:] = 0.0
     for k in range(first, last + 1):
         one, two = _channels(work, ONE, k, size), _channels(work, TWO, k, size)
         total += 2 / k
@@ -221,9 +216,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
             for i in range(4):
                 for j in range(4):
                     shares[i, j] += (parts[i].real * parts[j].real + parts[i].imag * parts[j].imag) / k
-    for i in range(4):
-        for j in range(4):
-            shares[i, j] /= total
+    shares[:] /= total
 
 
 @kernel
@@ -253,11 +246,7 @@ def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: fl
 
 @kernel
 def weigh(cases: np.ndarray, body_mix: float, room_mix: float, weights: np.ndarray) -> None:
-    """Write the weights (4,) of the parts of a mix, with which pink noise keeps its level.
-
-    Args:
-        cases: as `all_powers` writes them.
-    """
+    """Write the weights (4,) of the parts of a mix, with which pink noise keeps its level, of `all_powers`."""
     weights[_DRY] = (1 - body_mix) * (1 - room_mix)
     weights[_BODY] = body_mix * (1 - room_mix)
     weights[_ROOM] = (1 - body_mix) * room_mix

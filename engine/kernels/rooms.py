@@ -57,10 +57,7 @@ def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, so
 def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> float:
     """Write the reflections of walls that reflect all, as signal ONE; the direct sound's way in m.
 
-    They start when the direct sound arrives as 1.
-
-    Args:
-        grown: the sides, times SIDES_M.
+    They start when the direct sound arrives as 1. `grown`: the sides, times SIDES_M.
     """
     square = 0.0
     for axis in range(3):

@@ -253,10 +253,9 @@ def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
 
 
 def stand(string: Row, modes: int, pairs: int, conductance: tuple[float, float], out: Out) -> None:
-    """Move what pairs lose to a bridge that others share from σ of `out`, as of `rows`, to the place behind η².
+    """Move what pairs lose to a bridge from σ of `out`, as of `rows`, to the place behind η²: what is shared of it.
 
-    Args:
-        conductance: of what is shared, in both directions; 0: nothing is.
+    `conductance`: of that, in both directions.
     """
     pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):

@@ -29,11 +29,7 @@ BEHIND_PROGRAM = slots(at.TENSION_PROGRAM)
 
 @kernel
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
-
-    Args:
-        rows: (7, modes), see `advance`.
-    """
+    """Copy modes, in this order, with their rows, see `advance`, into blocks of `kernels.lanes`; the rest is 0."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
         if number < len(order):
@@ -184,11 +180,7 @@ def advance(
 
 @kernel
 def _nodes(voice: at.Voice, program: at.TensionProgram, kick: float) -> int:
-    """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
-
-    Args:
-        kick: Σ η² k (q² + v²/ω²).
-    """
+    """The nodes in a frame for the modes that move, as `KoopmanTension.step`; `kick`: Σ η² k (q² + v²/ω²)."""
     last = voice.moving - 1
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     first_rate = damped(squares[0], sigmas[0]) / program.node_phase
@@ -318,13 +310,9 @@ def _wake(voice: at.Voice) -> None:
 
 @kernel
 def _look(voice: at.Voice, program: at.TensionProgram, sets: int, scratch: np.ndarray) -> None:
-    """Order the modes of a drum: those that are heard, others that stretch it, and those that rest.
+    """Order the modes of a drum: those that so many sets of weights hear, others that stretch it, those that rest.
 
-    The highest that are silent are laid to rest for good.
-
-    Args:
-        sets: of weights that hear it.
-        scratch: room for three rows (modes,).
+    The highest that are silent are laid to rest for good. The scratch has room for three rows (modes,).
     """
     _fall(voice)
     moving = voice.moving
@@ -431,10 +419,7 @@ def physical(voice: at.Voice, q: np.ndarray, v: np.ndarray) -> None:
 def set_out(voice: at.Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
-    As `KoopmanTension._set_out`.
-
-    Args:
-        bounded: the largest energy is there, and may only fall; otherwise it follows from the input.
+    As `KoopmanTension._set_out`. `bounded`: the largest energy is there, and may only fall; else it is set.
     """
     n = voice.modes
     x, y = motion(voice)

@@ -240,11 +240,7 @@ def begin(voice: at.Voice, mixer: Mixer) -> int:
 
 @kernel
 def end(voice: at.Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
-    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
-
-    Args:
-        moved: whether it was generated, else it stands still.
-    """
+    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state. One that is not `moved` stands still."""
     mix = mixer.mix[:]
     left_over = voice.left_over[:]
     points, late, release = voice.points, voice.late, voice.release

@@ -172,10 +172,7 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
 
 @kernel
 def place_of(player: Player, table: Table, event: Event) -> int:
-    """The string of the instrument that an event's note has.
-
-    256 (n + 1): string n of a set, which was given.
-    """
+    """The string of the instrument that an event's note has; 256 (n + 1): string n of a set, which was given."""
     channel, string = event.channel, event.string
     if _is_string(player, table, channel):
         return 256 * (channel + 1)

@@ -62,8 +62,7 @@ def _swap(player: Player, first: Event, second: Event) -> None:
 def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) -> None:
     """Let the first string of a chord come first, of notes that come at the same frame.
 
-    Args:
-        ring: events (count,), of which `place` is played next, and `end` is the last one's successor.
+    Of the ring's events, `place` is played next, and `end` is the last one's successor.
     """
     event = ring[place % len(ring)]
     if player.table == 0 or event.chord != 0:

@@ -19,9 +19,7 @@ LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by
 
 # By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
 # differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
-VARIES_PLACE = 0.08
-VARIES_DB = 1.0
-VARIES_WIDTH = 0.12  # shares, dB
+VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
 
 
 @kernel
@@ -68,10 +66,7 @@ def pull(player: Player, table: Table, shape: int, modes: int, position: float, 
 
 @kernel
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
-    """The amplitudes of the modes of a rounded triangle, up to its height `pulses.corner`.
-
-    It peaks where the force pulls: elsewhere it is straight.
-    """
+    """The amplitudes of the modes of a rounded triangle, which peaks where the force pulls; else it is straight."""
     turn = len(sines)
     grid = turn // 2 + 1
     low = max(int((position - width / 2) * (grid - 1)) - 1, 1)
