@@ -216,7 +216,9 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
             for i in range(4):
                 for j in range(4):
                     shares[i, j] += (parts[i].real * parts[j].real + parts[i].imag * parts[j].imag) / k
-    shares[:] /= total
+    for i in range(4):
+        for j in range(4):
+            shares[i, j] /= total
 
 
 @kernel
