@@ -12,19 +12,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
-from engine.kernels.mixer_records import (
-    LAGS,
-    LARGEST,
-    OVERSAMPLING,
-    SHAPED_FRAMES,
-    SMALLEST,
-    Amplifier,
-    Mixer,
-)
+from engine.kernels.mixer_records import LAGS, LARGEST, OVERSAMPLING, SHAPED_FRAMES, SMALLEST, Amplifier, Mixer
 
 NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 BIAS = 0.25  # in the shape's own unit: 1 is where it bends most
@@ -38,7 +28,7 @@ REST_QUANTA = 400  # without input, after which all has died away
 TAPS = LAGS * OVERSAMPLING
 
 
-@njit(**COMPILED)
+@kernel
 def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer, see `engine.values.effects.Amp`; a tone of the peak NOMINAL keeps its level.
 
@@ -51,7 +41,7 @@ def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> Non
     amp.wanted_drive = factor / level if on else 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def amplify(mixer: Mixer) -> None:
     """Replace the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
     amp = mixer.amplifier
@@ -77,12 +67,9 @@ def amplify(mixer: Mixer) -> None:
     _give(mixer, amp, goal if first else share, reached)
 
 
-@njit(**COMPILED)
+@kernel
 def _begin(amp: Amplifier) -> None:
-    """Reset the amplifier, as if there had never been any input.
-
-    All is at rest, which is where the bias has it.
-    """
+    """Reset the amplifier, as if there had never been any input: all is at rest, which is where the bias has it."""
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
     amp.low = 0.0
     amp.last = BIAS
@@ -104,7 +91,7 @@ def _begin(amp: Amplifier) -> None:
     amp.quiet = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _bessel(x: float) -> float:
     """I₀."""
     total = term = 1.0
@@ -114,13 +101,11 @@ def _bessel(x: float) -> float:
     return total
 
 
-@njit(**COMPILED)
+@kernel
 def _take(mixer: Mixer, amp: Amplifier) -> bool:
     """The next input behind the last one, through the high-pass. Returns whether there is any."""
-    sounds = False
-    low = amp.low
-    raw = amp.input
-    mix = mixer.mix
+    sounds, low = False, amp.low
+    raw, mix = amp.input, mixer.mix
     follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer.rate_hz)
     for frame in range(LAGS):
         raw[frame] = raw[QUANTUM + frame]
@@ -135,34 +120,29 @@ def _take(mixer: Mixer, amp: Amplifier) -> bool:
     return sounds
 
 
-@njit(**COMPILED)
+@kernel
 def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
-    last = LAGS
-    rows = OVERSAMPLING
-    filter = amp.filter
-    raw = amp.input
-    all_shaped = amp.shaped
-    drive, goal = amp.drive, amp.wanted_drive
-    if goal == 0.0:  # it is switched off: as it was
-        goal = drive
-    for row in range(rows):
+    filter, raw, all_shaped = amp.filter, amp.input, amp.shaped
+    drive = amp.drive
+    goal = amp.wanted_drive if amp.wanted_drive != 0.0 else drive  # it is switched off: as it was
+    for row in range(OVERSAMPLING):
         out = all_shaped[row]
-        for frame in range(last):
+        for frame in range(LAGS):
             out[frame] = out[QUANTUM + frame]
-        new = out[last:]
+        new = out[LAGS:]
         new[:] = 0.0
-        for lag in range(last):
-            tap = rows * filter[rows * lag + row]
-            delayed = raw[last - lag : last - lag + QUANTUM]
+        for lag in range(LAGS):
+            tap = OVERSAMPLING * filter[OVERSAMPLING * lag + row]
+            delayed = raw[LAGS - lag : LAGS - lag + QUANTUM]
             for frame in range(QUANTUM):
                 new[frame] += tap * delayed[frame]
         for frame in range(QUANTUM):
-            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / rows) / QUANTUM)
+            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / OVERSAMPLING) / QUANTUM)
     before = amp.last
     root = math.sqrt(1 + before * before)
-    for frame in range(last, SHAPED_FRAMES):
-        for row in range(rows):
+    for frame in range(LAGS, SHAPED_FRAMES):
+        for row in range(OVERSAMPLING):
             value = all_shaped[row, frame]
             following = math.sqrt(1 + value * value)
             all_shaped[row, frame] = (before + value) / (root + following)
@@ -170,31 +150,21 @@ def _shape(amp: Amplifier) -> None:
     amp.last = before
 
 
-@njit(**COMPILED)
+@kernel
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
-    last = LAGS
-    rows = OVERSAMPLING
-    filter = amp.filter
-    out = amp.out
-    mix = mixer.mix
+    filter, out, mix = amp.filter, amp.out, mixer.mix
     out[:] = 0.0
-    for row in range(rows):
-        for lag in range(last):
-            tap = filter[rows * lag + rows - 1 - row]
-            shaped = amp.shaped[row, last - lag : last - lag + QUANTUM]
+    for row in range(OVERSAMPLING):
+        for lag in range(LAGS):
+            tap = filter[OVERSAMPLING * lag + OVERSAMPLING - 1 - row]
+            shaped = amp.shaped[row, LAGS - lag : LAGS - lag + QUANTUM]
             for frame in range(QUANTUM):
                 out[frame] += tap * shaped[frame]
-    drive = amp.drive
-    gain = amp.gain
-    tone = amp.tone
-    drive_to = amp.wanted_drive
-    gain_to = amp.wanted_gain
-    tone_to = amp.wanted_tone
-    if drive_to == 0.0:
-        drive_to = drive
-        gain_to = gain
-        tone_to = tone
+    gain, tone = amp.gain, amp.tone
+    if amp.wanted_drive != 0.0:  # else it is switched off: as it was
+        amp.drive, amp.gain, amp.tone = amp.wanted_drive, amp.wanted_gain, amp.wanted_tone
+    gain_to, tone_to = amp.gain, amp.tone
     blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer.rate_hz)
     follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer.rate_hz)
     mean, low = amp.mean, amp.low_out
@@ -210,6 +180,3 @@ def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
             dry = mix[frame, side]
             mix[frame, side] = value if wet == 1.0 else dry + wet * (value - dry)
     amp.mean, amp.low_out = mean, low if abs(low) >= SMALLEST else 0.0
-    amp.drive = drive_to
-    amp.gain = gain_to
-    amp.tone = tone_to

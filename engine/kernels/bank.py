@@ -14,15 +14,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import behind
 from engine.kernels.mixer_records import MOST_LATENTS, SCRATCH_ROWS
 from engine.kernels.modes import row, rows, weights
-from engine.kernels.voice_records import BankProgram, Voice
 
 SHORT, LONG = 32, 64  # frames of a segment, at first and later
 INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
@@ -33,7 +31,7 @@ STRAIGHT = 5e-6  # radians and nepers of a segment that may come from a cubic te
 _TWO_PI = 2 * math.pi
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _turn(angle: float) -> tuple[float, float]:
     """Cosine and sine of any angle to 1e-8, as arithmetic that becomes vector instructions."""
     x = (angle - _TWO_PI * np.floor(angle / _TWO_PI + 0.5)) * 0.25
@@ -44,12 +42,9 @@ def _turn(angle: float) -> tuple[float, float]:
     return 1 - 2 * s * s, 2 * s * c
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _exp(x: float) -> float:
-    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64.
-
-    It is computed the same way for all x; below -64 it is as good as nothing.
-    """
+    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64; below, it is as good as nothing."""
     y = max(x, -64.0) / 64
     e = 1 + y * (
         1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320))))))
@@ -62,7 +57,7 @@ def _exp(x: float) -> float:
     return e * e
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _tanh(x: float) -> float:
     y = 0.5 * (-18.0 if x < -18 else 18.0 if x > 18 else x)
     s = y * y
@@ -70,8 +65,14 @@ def _tanh(x: float) -> float:
     return 2 * t / (1 + t * t)
 
 
-@njit(**COMPILED)
-def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -> None:
+@kernel
+def _room(scratch: np.ndarray, row: int, count: int) -> np.ndarray:
+    """The first numbers of a row of the scratch."""
+    return scratch[row * MOST_LATENTS : row * MOST_LATENTS + count]
+
+
+@kernel
+def energies(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray) -> None:
     """E_m (modes,) at a time in trained samples."""
     n = program.modes
     sigma = behind(program, program.sigma, n)
@@ -80,8 +81,8 @@ def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -
         out[m] = start[m] * _exp(-2 * sigma[m] * time)
 
 
-@njit(**COMPILED)
-def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+@kernel
+def higher_orders(program: at.BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """f(E) - K E, (2 modes,)."""
     n = program.modes
     omega = behind(program, program.omega, n)
@@ -95,10 +96,7 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
     layers = program.layers
     if layers > 0:
         network = behind(program, program.network, program.modulation - program.network).view(np.float32)
-        values, results = (
-            scratch[:MOST_LATENTS].view(np.float32),
-            scratch[MOST_LATENTS : 2 * MOST_LATENTS].view(np.float32),
-        )
+        values, results = scratch.view(np.float32), scratch[MOST_LATENTS:].view(np.float32)
         for m in range(n):
             values[m] = units[m] * energy[m]
         slot = 0
@@ -128,9 +126,7 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
     if program.adiabatic:
         shares = behind(program, program.shares, n * n)
         largest = behind(program, program.largest, n)
-        linear = scratch[:n]
-        share = scratch[MOST_LATENTS : MOST_LATENTS + n]
-        change = scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + n]
+        linear, share, change = _room(scratch, 0, n), _room(scratch, 1, n), _room(scratch, 2, n)
         for step in range(3):
             change[:] = 0.0
             for m in range(n):
@@ -147,8 +143,8 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
             out[n + j] += omega[j] * (math.sqrt(1 + 2 * max(share[j], -0.4)) - 1 - linear[j])
 
 
-@njit(**COMPILED)
-def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
+@kernel
+def strike(voice: at.Voice, program: at.BankProgram, scratch: np.ndarray) -> None:
     """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
     n = program.modes
     sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
@@ -173,54 +169,46 @@ def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
         _integrate_from(voice, program, 0, scratch)
 
 
-@njit(**COMPILED)
+@kernel
 def _width(node: int) -> int:
     """Nodes from this one to the next that is used: what is left to change does so ever more slowly."""
     return 1 if node < 16 else 2 if node < 64 else 4 if node < 256 else 8
 
 
-@njit(**COMPILED)
-def _integrate_from(voice: Voice, program: BankProgram, node: int, scratch: np.ndarray) -> None:
-    """The higher orders at a node, half-way and at the next."""
+@kernel
+def _integrate_from(voice: at.Voice, program: at.BankProgram, first: int, scratch: np.ndarray) -> None:
+    """The higher orders at the voice's node, half-way and at the next, from the first of these on that is new."""
     n = program.modes
-    spacing = program.spacing
-    energy, more = scratch[4 * MOST_LATENTS : 4 * MOST_LATENTS + n], scratch[5 * MOST_LATENTS :]
-    for half in range(3):
-        energies(voice, program, (node + 0.5 * half * _width(node)) * spacing, energy)
+    energy, more = _room(scratch, 4, n), scratch[5 * MOST_LATENTS :]
+    for half in range(first, 3):
+        time = (voice.node + 0.5 * half * _width(voice.node)) * program.spacing
+        energies(voice, program, time, energy)
         higher_orders(program, energy, rows(voice, at.AT_LEFT + 2 * half, 2), more)
 
 
-@njit(**COMPILED)
-def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
+@kernel
+def _integrate_to(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
     """Move on to the node before a time."""
-    n = program.modes
-    spacing = program.spacing
-    energy, more = scratch[4 * MOST_LATENTS : 4 * MOST_LATENTS + n], scratch[5 * MOST_LATENTS :]
-    wanted = int(time / spacing)
+    wanted = int(time / program.spacing)
     while voice.node + _width(voice.node) <= wanted:
         width = _width(voice.node)
         total = rows(voice, at.INTEGRAL, 2)
         left = rows(voice, at.AT_LEFT, 2)
         middle = rows(voice, at.AT_MIDDLE, 2)
         right = rows(voice, at.AT_RIGHT, 2)
-        for j in range(2 * n):
-            total[j] += width * spacing * (left[j] + 4 * middle[j] + right[j]) / 6
+        for j in range(2 * program.modes):
+            total[j] += width * program.spacing * (left[j] + 4 * middle[j] + right[j]) / 6
             left[j] = right[j]
         voice.node += width
-        node = voice.node
-        width = _width(node)
-        energies(voice, program, (node + 0.5 * width) * spacing, energy)
-        higher_orders(program, energy, middle, more)
-        energies(voice, program, (node + width) * spacing, energy)
-        higher_orders(program, energy, right, more)
+        _integrate_from(voice, program, 1, scratch)
 
 
-@njit(**COMPILED)
-def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
+@kernel
+def _change(program: at.BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
     """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
     n = program.modes
     weight = behind(program, program.change, n * n)  # transposed
-    squares, energy = scratch[:alive], scratch[MOST_LATENTS : MOST_LATENTS + alive]
+    squares, energy = _room(scratch, 0, alive), _room(scratch, 1, alive)
     change = out[:alive]
     most = 0.0
     for m in range(alive):
@@ -247,8 +235,8 @@ def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray
         change[j] = -grown if change[j] < 0 else grown
 
 
-@njit(**COMPILED)
-def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
+@kernel
+def _move(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
     n = program.modes
     sigma, omega = behind(program, program.sigma, n), behind(program, program.omega, n)
@@ -256,10 +244,9 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
     start = row(voice, at.ENERGY_0)
     constant = rows(voice, at.CONSTANT, 2)
     alive = voice.audible_count
-    f, integral = scratch[: 2 * n], scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + 2 * n]
+    f, integral = _room(scratch, 0, 2 * n), _room(scratch, 2, 2 * n)
     if program.higher:
-        spacing = program.spacing
-        spacing *= _width(voice.node)
+        spacing = program.spacing * _width(voice.node)
         u = (time - voice.node * program.spacing) / spacing
         total, left = rows(voice, at.INTEGRAL, 2), rows(voice, at.AT_LEFT, 2)
         middle, right = rows(voice, at.AT_MIDDLE, 2), rows(voice, at.AT_RIGHT, 2)
@@ -270,8 +257,7 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
             integral[j] = constant[j] + total[j] + spacing * u * (left[j] + u * (0.5 * slope + u * bend / 3))
     else:
         f[:] = 0.0
-        for j in range(2 * n):
-            integral[j] = constant[j]
+        integral[:] = constant
     for m in range(alive):
         energy = start[m] * _exp(-2 * sigma[m] * time)
         if not energy * largest[m] > 2e-8 * sigma[m]:
@@ -299,21 +285,17 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
         _change(program, level, alive, out[4 * n :], scratch)
 
 
-@njit(**COMPILED)
+@kernel
 def generate(
-    voice: Voice, program: BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
-    Args:
-        heard: otherwise only time advances.
+    Where it is not audible only time advances.
     """
-    n = program.modes
-    ratio = program.ratio
-    first = voice.generated
+    n, ratio, first = program.modes, program.ratio, voice.generated
     if program.higher:
         _integrate_to(voice, program, first * ratio, scratch)
-    points = voice.points
     if fading and voice.weights_faded == 0:  # what could not be heard there may be heard here
         if voice.modulated != program.modulates:
             voice.modulated, voice.segment_valid = program.modulates, 0
@@ -331,26 +313,22 @@ def generate(
                 _look(voice, program, z, scratch)
                 voice.refresh = LOOK_EVERY
             voice.refresh -= 1
-        modulated = voice.modulated and voice.rows > 0
         for which in range(2 if fading else 1):
-            for point in range(points):
+            for point in range(voice.points):
                 _sum(voice, which, point, z, out[2 * which + point], scratch)
-        if modulated:
-            _modulate(voice, program, z, fading, points, out, scratch)
+        if voice.modulated and voice.rows > 0:
+            _modulate(voice, program, z, fading, out, scratch)
     else:
         voice.segment_valid = 0
     voice.generated = first + QUANTUM
     # Beyond those that were audible there is no level: what is dead stays so
-    loudest = -1e9
-    alive = 1
-    was_alive = voice.audible_count
+    loudest, alive = -1e9, 1
     sigma = behind(program, program.sigma, n)
-    levels = row(voice, at.LEVEL_0)
-    latest = row(voice, at.LEVEL)
+    levels, latest = row(voice, at.LEVEL_0), row(voice, at.LEVEL)
     time = (first + QUANTUM) * ratio
     for m in range(n):
         level = levels[m] - sigma[m] * time
-        if audible and program.higher and m < was_alive:
+        if audible and program.higher and m < voice.audible_count:
             level = max(level, latest[m])
         loudest = max(loudest, level)
         if level + program.loudness > DEAD:
@@ -359,11 +337,11 @@ def generate(
     voice.audible_count = alive
 
 
-@njit(**COMPILED)
-def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
+@kernel
+def _keep_end(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
     """Keep the state at which the next segment begins."""
     n = program.modes
-    end = scratch[8 * MOST_LATENTS : 8 * MOST_LATENTS + 5 * n]
+    end = _room(scratch, 8, 5 * n)
     end[4 * n :] = 0.0
     _move(voice, program, time, end, scratch)
     rows(voice, at.LEVEL, 4)[:] = end[: 4 * n]
@@ -371,27 +349,19 @@ def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarr
     voice.segment_valid = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _segment(
-    voice: Voice,
-    program: BankProgram,
-    first: int,
-    length: int,
-    alive: int,
-    z: np.ndarray,
-    scratch: np.ndarray,
+    voice: at.Voice, program: at.BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
-    n = program.modes
-    ratio, limit = program.ratio, program.limit
-    end = scratch[8 * MOST_LATENTS : 8 * MOST_LATENTS + 5 * n]
+    n, ratio, limit = program.modes, program.ratio, program.limit
+    end = _room(scratch, 8, 5 * n)
     end[4 * n :] = 0.0
     _move(voice, program, (first + length) * ratio, end, scratch)
     sigma = behind(program, program.sigma, n)
     width, count = length * ratio, float(length)
     level, phase = row(voice, at.LEVEL), row(voice, at.PHASE)
     level_rate, phase_rate = row(voice, at.LEVEL_RATE), row(voice, at.PHASE_RATE)
-    next_change = row(voice, at.CHANGE + 1)
     turns = scratch[16 * MOST_LATENTS :].view(np.float32)
     zr = turns[:n]
     zi = turns[n : 2 * n]
@@ -425,41 +395,27 @@ def _segment(
         c, s = _turn(6 * screw)
         cr[m], ci[m] = grown * c, grown * s
     curved = bent * count * count * count > STRAIGHT
-    if not curved:
-        for frame in range(length):
-            real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
-            for m in range(alive):
-                a = zr[m]
-                b = zi[m]
-                c = rr[m]
-                d = ri[m]
-                real[m], imaginary[m] = a, b
-                zr[m], zi[m] = a * c - b * d, a * d + b * c
-                e, f = sr[m], si[m]
-                rr[m], ri[m] = c * e - d * f, c * f + d * e
-    for frame in range(length if curved else 0):
+    for frame in range(length):
         real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
         for m in range(alive):
-            a = zr[m]
-            b = zi[m]
-            c = rr[m]
-            d = ri[m]
+            a, b = zr[m], zi[m]
+            c, d = rr[m], ri[m]
+            e, f = sr[m], si[m]
             real[m], imaginary[m] = a, b
             zr[m], zi[m] = a * c - b * d, a * d + b * c
-            e, f = sr[m], si[m]
             rr[m], ri[m] = c * e - d * f, c * f + d * e
-            g, h = cr[m], ci[m]
-            sr[m], si[m] = e * g - f * h, e * h + f * g
+            if curved:
+                g, h = cr[m], ci[m]
+                sr[m], si[m] = e * g - f * h, e * h + f * g
+    latest, next_change = rows(voice, at.LEVEL, 4), row(voice, at.CHANGE + 1)
     for m in range(alive):
-        level[m] = end[m]
-        level_rate[m] = end[2 * n + m]
-        phase_rate[m] = end[3 * n + m]
-        phase[m] = end[n + m]
+        for part in range(4):
+            latest[part * n + m] = end[part * n + m]
         next_change[m] = end[4 * n + m]
 
 
-@njit(**COMPILED)
-def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+@kernel
+def _sum(voice: at.Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """Add Re Σ w z at each frame of the quantum."""
     n, alive = voice.modes, voice.audible_count
     reals, imaginaries = weights(voice, which, point, 0), weights(voice, which, point, 1)
@@ -475,19 +431,13 @@ def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, s
         out[frame] += total + constant
 
 
-@njit(**COMPILED)
-def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
-    """Find the latents whose modulation can be heard, and those whose squares are heard in it.
-
-    Energies decay: later there are no more.
-    """
+@kernel
+def _look(voice: at.Voice, program: at.BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
+    """Find the latents that are heard as modulated, and those whose squares are heard in that; there come no more."""
     n = program.modes
     alive = voice.audible_count
     matrix, largest = behind(program, program.modulation, 4 * n * n), behind(program, program.largest_modulation, n)
-    squares, loud = (
-        scratch[20 * MOST_LATENTS : 20 * MOST_LATENTS + n],
-        scratch[21 * MOST_LATENTS : 21 * MOST_LATENTS + n],
-    )
+    squares, loud = _room(scratch, 20, n), _room(scratch, 21, n)
     loudest = 0.0
     for m in range(alive):  # beyond, z is another voice's
         squares[m] = z[m] * z[m] + z[n + m] * z[n + m]
@@ -522,34 +472,25 @@ def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray
         voice.modulated = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _modulate(
-    voice: Voice,
-    program: BankProgram,
-    z: np.ndarray,
-    fading: bool,
-    points: int,
-    out: np.ndarray,
-    scratch: np.ndarray,
+    voice: at.Voice, program: at.BankProgram, z: np.ndarray, fading: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """Add what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
     n = program.modes
-    quantum = QUANTUM
     matrix, limit = behind(program, program.modulation, 4 * n * n), program.limit
     row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
     change, next_change = row(voice, at.CHANGE), row(voice, at.CHANGE + 1)
-    squares = scratch[(SCRATCH_ROWS + 2 * quantum) * MOST_LATENTS :].view(np.float32)
-    alive = voice.audible_count
-    columns = voice.columns
-    rows_kept = voice.rows
+    squares = scratch[(SCRATCH_ROWS + 2 * QUANTUM) * MOST_LATENTS :].view(np.float32)
+    alive, columns, rows_kept = voice.audible_count, voice.columns, voice.rows
     while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
         columns -= 1
     while rows_kept > 0 and row_list[rows_kept - 1] >= alive:
         rows_kept -= 1
     for place in range(columns):
         m = column_list[place]
-        real, imaginary = squares[2 * place * quantum :], squares[(2 * place + 1) * quantum :]
-        for frame in range(quantum):
+        real, imaginary = squares[2 * place * QUANTUM :], squares[(2 * place + 1) * QUANTUM :]
+        for frame in range(QUANTUM):
             a, b = z[frame * 2 * n + m], z[frame * 2 * n + n + m]
             real[frame] = a * a - b * b
             imaginary[frame] = np.float32(2) * a * b
@@ -557,8 +498,8 @@ def _modulate(
     for place in range(rows_kept):
         j = row_list[place]
         start = change[j]
-        step = (next_change[j] - start) / quantum
-        for frame in range(quantum):
+        step = (next_change[j] - start) / QUANTUM
+        for frame in range(QUANTUM):
             growth[frame] = start + step * frame
             turn[frame] = 0.0
         for column in range(columns):
@@ -566,22 +507,21 @@ def _modulate(
             entry = matrix[(j * n + m) * 4 : (j * n + m) * 4 + 4]
             a, b = np.float32(entry[0]), np.float32(entry[1])
             c, d = np.float32(entry[2]), np.float32(entry[3])
-            real, imaginary = squares[2 * column * quantum :], squares[(2 * column + 1) * quantum :]
-            for frame in range(quantum):
+            real, imaginary = squares[2 * column * QUANTUM :], squares[(2 * column + 1) * QUANTUM :]
+            for frame in range(QUANTUM):
                 growth[frame] += a * real[frame] + b * imaginary[frame]
                 turn[frame] += c * real[frame] + d * imaginary[frame]
-        for frame in range(quantum):
+        for frame in range(QUANTUM):
             gain = _exp(limit * _tanh(growth[frame] / limit))
             cosine, sine = _turn(float(turn[frame]))
             a, b = z[frame * 2 * n + j], z[frame * 2 * n + n + j]
             growth[frame] = a * (gain * cosine - 1) - b * gain * sine
             turn[frame] = a * gain * sine + b * (gain * cosine - 1)
         for which in range(2 if fading else 1):
-            for point in range(points):
+            for point in range(voice.points):
                 w, v = weights(voice, which, point, 0)[j], weights(voice, which, point, 1)[j]
                 signal = out[2 * which + point]
-                for frame in range(quantum):
+                for frame in range(QUANTUM):
                     signal[frame] += w * growth[frame] + v * turn[frame]
     if program.adiabatic:
-        for m in range(n):
-            change[m] = next_change[m]
+        change[:] = next_change

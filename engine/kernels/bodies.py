@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.fourier import ONE, SPARE, row, silence
 from engine.kernels.memory import part
 from engine.kernels.responses import fade, high_pass, level, resample, resampled_frames
@@ -18,25 +17,21 @@ HIGHEST_SHARE = 0.45  # of the rate: no mode lies above
 HZ, DECAY, LEFT, RIGHT = range(4)  # rows of modes, at a size of 1
 
 
-@njit(**COMPILED)
+@kernel
 def rung_frames(seconds: float, size: float, rate_hz: float) -> int:
     """The length of the response of a body whose modes ring so long at a size of 1."""
     return RUN * math.ceil(seconds * size * rate_hz / RUN)
 
 
-@njit(**COMPILED)
+@kernel
 def given_frames(frames: int, own_hz: float, size: float, rate_hz: float, longest_s: float) -> int:
     """The length of a response that is given, whose rate at a size of 1 is `own_hz`; what is longer is cut."""
     return min(resampled_frames(frames, own_hz / size, rate_hz), int(longest_s * rate_hz))
 
 
-@njit(**COMPILED)
+@kernel
 def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound: np.ndarray) -> None:
-    """Write all modes after one blow, in whole runs, which are computed side by side.
-
-    Args:
-        modes: (4, modes).
-    """
+    """Write all modes, (4, modes), after one blow, in whole runs, which are computed side by side."""
     runs, step_s = len(sound) // RUN, 1 / rate_hz
     x, y = row(work, ONE, runs), row(work, ONE + 1, runs)
     left, right = row(work, SPARE, RUN * runs), row(work, SPARE + 1, RUN * runs)  # frames of all runs, then the next
@@ -67,7 +62,7 @@ def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound
             sound[run * RUN + frame, 1] = right[frame * runs + run]
 
 
-@njit(**COMPILED)
+@kernel
 def respond(
     work: np.ndarray, modes: np.ndarray, subsonic_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
@@ -83,15 +78,11 @@ def respond(
     level(work, sound, rate_hz)
 
 
-@njit(**COMPILED)
+@kernel
 def respond_as(
     work: np.ndarray, recorded: np.ndarray, own_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
-    """Write the response of a body that is given as one.
-
-    Args:
-        sound: (`given_frames`, 2).
-    """
+    """Write the response, (`given_frames`, 2), of a body that is given as one."""
     resample(work, recorded, own_hz / size, rate_hz, sound)
     if len(sound) < resampled_frames(len(recorded), own_hz / size, rate_hz):
         fade(sound)

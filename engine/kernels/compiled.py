@@ -24,6 +24,17 @@ COMPILED: dict[str, Any] = {
     "error_model": "numpy",
 }
 
+
+def kernel(function: Any) -> Any:
+    """Compile a function where it is first called."""
+    return njit(**COMPILED)(function)
+
+
+def inlined(function: Any) -> Any:
+    """Compile a function into those that call it."""
+    return njit(inline="always", **COMPILED)(function)
+
+
 LAWS = pulses, recorded, rotation, strings, velocities  # modules of plain functions that compiled ones call
 
 
@@ -41,7 +52,7 @@ _P0, _P1, _P2 = (np.float32(x) for x in (135135, 17325, 378))
 _Q0, _Q1, _Q2, _Q3 = (np.float32(x) for x in (135135, 62370, 3150, 28))
 
 
-@njit(**COMPILED)
+@kernel
 def tanh(x: np.float32) -> np.float32:
     """tanh x to 1.3e-7: Lambert's continued fraction of tanh(x/2) to depth 7, then tanh 2y = 2 tanh y/(1 + tanh² y).
 

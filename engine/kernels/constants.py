@@ -74,21 +74,14 @@ ANY = -1  # channel or key of the notes that are tuned or choked
 MOST_SOURCES = 4  # of a note
 
 # An instrument's table
-POLY = 0
-GUITAR = 1
-MPE = 2
-GAUSSIAN = 0
-TRIANGULAR = 1
-RAISED_COSINE = 2
-ROUNDED = 3  # as in `engine.pluck.SHAPES`
+POLY, GUITAR, MPE = range(3)
+GAUSSIAN, TRIANGULAR, RAISED_COSINE, ROUNDED = range(4)  # as in `engine.pluck.SHAPES`
 BRIDGE = -1.0  # a listening point that is none: the force on the end at 0
 BY_TENSION, BY_LENGTH = 0, 1
 KEYS = 128
 GUITAR_STRINGS = 8  # at most, of a guitar that sends MIDI
 GAINS = 1 + GUITAR_STRINGS  # of a key: on the string that it chooses, and on each of the first strings
-NO_SYMPATHY = 0
-EVERY_KEY = 1
-OPEN_STRINGS = 2
+NO_SYMPATHY, EVERY_KEY, OPEN_STRINGS = range(3)
 STROKE, RELEASE = 0, 1
 MOST_STRINGS = 128
 
@@ -122,17 +115,15 @@ CHANNELS = 17  # of MIDI, then the keys of the computer and the screen
 FIRST, ON_SCREEN = 0, 16
 TUNING_STEPS = 8192  # of fine tuning, of a semitone
 USUAL_VOLUME = 100  # General MIDI's: at this volume an instrument is as loud as it is without one
-LEGATO, SLIDES, HARMONICS, TREMOLO, STRUMS = range(5)  # footswitches
-SWITCHES = 5
+PEDAL, LEGATO, SLIDES, HARMONICS, TREMOLO, STRUMS = range(6)  # the pedal that sustains, and footswitches
+SWITCHES = 6
 
 # Notes
 FREE, RINGS = 0, 1
 MOST_NOTES = 128
 
 # Reports
-BEGAN = 0
-ENDED = 1
-REFUSED = 2
+BEGAN, ENDED, REFUSED = range(3)
 
 # A player
 EVENTS = 1024

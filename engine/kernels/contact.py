@@ -21,11 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import address_of, attack_at, behind, mixed, mixer_at, player_at, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
 
@@ -42,7 +40,7 @@ WINDINGS_M, LOWEST_SLIDE_HZ = 2_500.0, 200.0
 LEFT_DB = -80.0  # of the burst as it ends
 
 
-@njit(**COMPILED)
+@kernel
 def attack_of(table: Table) -> Attack:
     """The recorded attack of a table that has one."""
     return attack_at(address_of(table) + 8 * table.attack)
@@ -72,20 +70,17 @@ class Touch(NamedTuple):
     slides_s: float
 
 
-@njit(**COMPILED)
+@kernel
 def touch(player: Player, table: Table, by: Touch) -> None:
     """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
     if not by.level_db > OFF_DB:
         return
-    kind = table.contacts[by.which]
-    rate_hz = player.rate_hz
-    which = by.which
+    kind, rate_hz = table.contacts[by.which], player.rate_hz
     strength, hardness = by.strength, by.hardness
     energy = table.noise_level * rate_hz * 10.0 ** (by.level_db / 10)
     energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = player.noises[0], -1
-    for number in range(of.MOST_NOISES):
-        candidate = player.noises[number]
+    for candidate in player.noises:
         if candidate.left == 0:
             noise = candidate
             break
@@ -107,7 +102,7 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
     noise.frame = by.frame
     noise.done, noise.stops = 0, 0
-    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + which + 1)
+    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + by.which + 1)
     noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
     noise.pulse_frames = pulse_frames
     noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
@@ -117,9 +112,8 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     noise.b0 = passed
     noise.a1 = -2 * math.cos(turn) / (1 + alpha)
     noise.a2 = (1 - alpha) / (1 + alpha)
-    for place in range(4):
-        noise.past[place] = 0.0
-    noise.recorded = table.attack != 0 and which == of.STROKE
+    noise.past[:] = 0.0
+    noise.recorded = table.attack != 0 and by.which == of.STROKE
     if noise.recorded != 0:
         noise.pulse = math.sqrt(energy / rate_hz)
         attack = attack_of(table)
@@ -129,40 +123,29 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     noise.left = int(max(pulse_frames, falls)) + 1
 
 
-@njit(**COMPILED)
-def hush(player: Player, quanta: int) -> None:
-    """Let all noises fade out."""
-    for number in range(of.MOST_NOISES):
-        player.noises[number].stops = quanta
-
-
-@njit(**COMPILED)
+@kernel
 def sound(player_address: int, mixer_address: int) -> None:
     """Add all noises to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
     if player.table == 0:
         return
-    table = table_at(player.table)
-    gain = 0.0
-    sounding = 0
+    table, gain, sounding = table_at(player.table), 0.0, 0
     for source in range(table.sources):
         if player.source_gains[source] != 0.0:
             gain = player.source_gains[source]
             sounding += 1
     if sounding != 1 or table.solo != 0:
         gain = 0.0
-    before = player.noise_gain
-    player.noise_gain = gain
+    before, player.noise_gain = player.noise_gain, gain
     mixer = mixer_at(mixer_address)
     mix, now = mixer.mix[:], mixer.frames
-    for number in range(of.MOST_NOISES):
-        noise = player.noises[number]
-        if noise.left == 0 or noise.frame >= now + QUANTUM:
+    for noise in player.noises:
+        if noise.left == 0 or noise.frame >= now + of.QUANTUM:
             continue
         begin, gain_from = 0, before
         if noise.done == 0:
             begin, gain_from = max(0, noise.frame - now), gain
-        end = min(QUANTUM, begin + noise.left)
+        end = min(of.QUANTUM, begin + noise.left)
         if noise.recorded == 0:
             _run(noise, begin, end, gain_from, gain, mix)
         elif table.attack != 0:
@@ -177,13 +160,10 @@ def sound(player_address: int, mixer_address: int) -> None:
             noise.left = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
-    """Add a force to a frame of the mix, at a gain between two quanta.
-
-    It fades out where the noise stops.
-    """
-    share = (frame + 1) / QUANTUM
+    """Add a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
+    share = (frame + 1) / of.QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
         level *= 1 - share / stops
@@ -191,30 +171,15 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
     mix[frame, 1] += level * force
 
 
-@njit(**COMPILED)
-def _run(
-    noise: Noise,
-    begin: int,
-    end: int,
-    before: float,
-    gain: float,
-    mix: np.ndarray,
-) -> None:
+@kernel
+def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np.ndarray) -> None:
     """Add a noise to frames of the mix, while its gain goes from `before` to `gain`."""
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
-    b0 = noise.b0
-    a1 = noise.a1
-    a2 = noise.a2
-    past = noise.past
-    x1 = past[0]
-    x2 = past[1]
-    y1 = past[2]
-    y2 = past[3]
-    seed = noise.seed
-    done = noise.done
-    stops = noise.stops
+    b0, a1, a2 = noise.b0, noise.a1, noise.a2
+    x1, x2, y1, y2 = noise.past[0], noise.past[1], noise.past[2], noise.past[3]
+    seed, done, stops = noise.seed, noise.done, noise.stops
     for frame in range(begin, end):
         x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
@@ -226,37 +191,24 @@ def _run(
             force += pulse * (0.5 - 0.5 * math.cos(2 * math.pi * (done + 0.5) / pulse_frames))
         _add(mix, frame, force, before, gain, stops)
         done += 1
-    past[0] = x1
-    past[1] = x2
-    past[2] = y1
-    past[3] = y2
+    noise.past[0], noise.past[1], noise.past[2], noise.past[3] = x1, x2, y1, y2
     noise.envelope = envelope
     noise.done = done
 
 
-@njit(**COMPILED)
-def _play(
-    player: Player,
-    attack: Attack,
-    noise: Noise,
-    begin: int,
-    end: int,
-    before: float,
-    mix: np.ndarray,
-) -> None:
+@kernel
+def _play(player: Player, attack: Attack, noise: Noise, begin: int, end: int, before: float, mix: np.ndarray) -> None:
     """Add a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
     gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)
-    amplitude = noise.pulse
-    done = noise.done
-    stops = noise.stops
+    done, stops = noise.done, noise.stops
     for frame in range(begin, end):
         place = done * step
         number = int(place)
         if number < frames:
             after = samples[number + 1] if number + 1 < frames else 0.0
-            force = amplitude * (samples[number] + (place - number) * (after - samples[number]))
+            force = noise.pulse * (samples[number] + (place - number) * (after - samples[number]))
             _add(mix, frame, force, before, gain, stops)
         done += 1
     noise.done = done

@@ -17,9 +17,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import slots
 from engine.kernels.fourier import ONE, fill_circle, row, silence, transform, turn
@@ -36,6 +35,7 @@ from engine.kernels.mixer_records import (
     Impulse,
     Mixer,
 )
+from engine.kernels.modes import eased
 
 _SUMMING = WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
 _SHARE = -(-(WINDOW + 1) // _SUMMING)  # frequencies in each
@@ -43,7 +43,7 @@ FADE_S = 0.020  # at least: the way from one response to another, in whole windo
 BEHIND_CONVOLVER, BEHIND_IMPULSE = slots(CONVOLVER), slots(IMPULSE)
 
 
-@njit(**COMPILED)
+@kernel
 def convolve(mixer: Mixer) -> None:
     """Replace the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
     if mixer.effects == 0 and mixer.effects_now == 0 and mixer.effects_next == 0:
@@ -73,7 +73,7 @@ def convolve(mixer: Mixer) -> None:
         convolver.active = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
     """Leave only what may ring on. Return True if there is anything."""
     sounds = False
@@ -91,7 +91,7 @@ def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
     return sounds
 
 
-@njit(**COMPILED)
+@kernel
 def _exchange(mixer: Mixer, convolver: Convolver) -> None:
     """Continue with a change of the response, or begin one; it is made at once where it is inaudible."""
     if convolver.step >= 0:
@@ -114,7 +114,7 @@ def _exchange(mixer: Mixer, convolver: Convolver) -> None:
         _take(mixer, convolver)
 
 
-@njit(**COMPILED)
+@kernel
 def _take(mixer: Mixer, convolver: Convolver) -> None:
     """The next response is the one that is heard."""
     convolver.step = -1
@@ -124,7 +124,7 @@ def _take(mixer: Mixer, convolver: Convolver) -> None:
     mixer.effects_next = 0
 
 
-@njit(**COMPILED)
+@kernel
 def _wake(convolver: Convolver) -> None:
     """Reset the convolver, as if there had never been any input."""
     convolver.early_input[:] = 0.0
@@ -135,13 +135,13 @@ def _wake(convolver: Convolver) -> None:
     convolver.active = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _late(convolver: Convolver) -> np.ndarray:
     """The late spectra, (capacity, 2, 2, WINDOW + 1)."""
     return shaped(reals(address_of(convolver)), BEHIND_CONVOLVER, (convolver.capacity, 2, 2, WINDOW + 1))
 
 
-@njit(**COMPILED)
+@kernel
 def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
     """The spectra of the input's last two quanta and, where a window is over, of its last two windows.
 
@@ -160,7 +160,7 @@ def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
     for side in range(2):
         early, late = early_input[side], late_input[side, WINDOW + phase * QUANTUM :]
         for frame in range(QUANTUM):
-            share = _way((phase * QUANTUM + frame + 1) / WINDOW) if softly else 1.0
+            share = eased((phase * QUANTUM + frame + 1) / WINDOW) if softly else 1.0
             early[QUANTUM + frame] = late[frame] = share * mix[frame, side]
     place = (convolver.early_place + 1) % EARLY
     _analyse(convolver, early_input, convolver.early[place])
@@ -168,12 +168,9 @@ def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
     convolver.early_filled = min(convolver.early_filled + 1, EARLY)
 
 
-@njit(**COMPILED)
+@kernel
 def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> None:
-    """The spectra (2, 2, half + 1) of two real signals (2, 2 half) by one complex transform.
-
-    The signals' later halves become the earlier.
-    """
+    """The spectra (2, 2, half + 1) of two real signals (2, 2 half), whose later halves become the earlier."""
     n, half = signals.shape[1], signals.shape[1] // 2
     re, im, re2, im2 = _work(convolver, n)
     for frame in range(n):
@@ -183,22 +180,18 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
         for frame in range(half):
             signal[frame] = signal[half + frame]
     transform(re, im, re2, im2, convolver.cosines[:], convolver.sines[:])
-    left_re = spectra[0, 0]
-    left_im = spectra[0, 1]
-    right_re = spectra[1, 0]
-    right_im = spectra[1, 1]
+    left_re, left_im = spectra[0, 0], spectra[0, 1]
+    right_re, right_im = spectra[1, 0], spectra[1, 1]
     for k in range(half + 1):
         mirror = n - k if k > 0 else 0
         left_re[k], left_im[k] = 0.5 * (re[k] + re[mirror]), 0.5 * (im[k] - im[mirror])
         right_re[k], right_im[k] = 0.5 * (im[k] + im[mirror]), 0.5 * (re[mirror] - re[k])
 
 
-@njit(**COMPILED)
+@kernel
 def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
     """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
-    channels = impulse.channels
-    early = impulse.early
-    late = impulse.late
+    channels, early, late = impulse.channels, impulse.early, impulse.late
     spectra = reals(address_of(impulse))
     response, sums = shaped(spectra, BEHIND_IMPULSE, (early, channels, 2, QUANTUM + 1)), convolver.early_sums[:]
     count = min(early, convolver.early_filled)
@@ -216,7 +209,7 @@ def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int
     return early + (late + 4) * WINDOW_QUANTA
 
 
-@njit(**COMPILED)
+@kernel
 def _compute(convolver: Convolver, response: np.ndarray, lane: int) -> None:
     """Compute this quantum's part of what the late partitions give in the next window."""
     phase, sums = convolver.phase, convolver.late_sums[lane]
@@ -232,7 +225,7 @@ def _compute(convolver: Convolver, response: np.ndarray, lane: int) -> None:
             goal[:] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def _multiply(spectra: np.ndarray, place: int, response: np.ndarray, begin: int, end: int, sums: np.ndarray) -> None:
     """The sum over partitions of input times response, at some of the frequencies.
 
@@ -255,16 +248,14 @@ def _multiply(spectra: np.ndarray, place: int, response: np.ndarray, begin: int,
                 sum_im[k] += x_re[k] * h_im[k] + x_im[k] * h_re[k]
 
 
-@njit(**COMPILED)
+@kernel
 def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> None:
     """The later halves (2, half) of two real signals from their spectra, by one complex transform."""
     half = goal.shape[1]
     n, bins = 2 * half, half + 1
     re, im, re2, im2 = _work(convolver, n)
-    left_re = spectra[0, 0]
-    left_im = spectra[0, 1]
-    right_re = spectra[1, 0]
-    right_im = spectra[1, 1]
+    left_re, left_im = spectra[0, 0], spectra[0, 1]
+    right_re, right_im = spectra[1, 0], spectra[1, 1]
     for k in range(bins):
         re[k], im[k] = left_re[k] - right_im[k], left_im[k] + right_re[k]
     for k in range(1, half):
@@ -275,18 +266,15 @@ def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> 
         left[frame], right[frame] = re[half + frame], im[half + frame]
 
 
-@njit(**COMPILED)
+@kernel
 def _work(convolver: Convolver, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     work = convolver.work[:]
     return work[0, :n], work[1, :n], work[2, :n], work[3, :n]
 
 
-@njit(**COMPILED)
+@kernel
 def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """The output: a lane, or the fade from one to the other.
-
-    A lane without a response is the mix itself.
-    """
+    """The output: a lane, or the fade from one to the other. A lane without a response is the mix itself."""
     step, lane = convolver.step, convolver.lane
     now, following = convolver.wet[lane], convolver.wet[1 - lane]
     done = (step - 1) * WINDOW + convolver.phase * QUANTUM
@@ -297,17 +285,11 @@ def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -
             value = now[side, frame] if wet_now else dry
             if step > 0:
                 other = following[side, frame] if wet_next else dry
-                value += _way((done + frame + 1) / frames) * (other - value)
+                value += eased((done + frame + 1) / frames) * (other - value)
             mix[frame, side] = value
 
 
-@njit(**COMPILED)
-def _way(share: float) -> float:
-    """The smooth way from 0 to 1, without a corner."""
-    return share * share * (3 - 2 * share)
-
-
-@njit(**COMPILED)
+@kernel
 def begin(convolver: Convolver, rate_hz: float, frames: int) -> None:
     """Set up a convolver, which is all 0, for responses of so many frames."""
     convolver.capacity = late_partitions(frames) + 1
@@ -316,32 +298,32 @@ def begin(convolver: Convolver, rate_hz: float, frames: int) -> None:
     fill_circle(convolver.cosines[:], convolver.sines[:])
 
 
-@njit(**COMPILED)
+@kernel
 def convolver_slots(frames: int) -> int:
     """The memory of a convolver for responses of so many frames."""
     return BEHIND_CONVOLVER + (late_partitions(frames) + 1) * 4 * (WINDOW + 1)
 
 
-@njit(**COMPILED)
+@kernel
 def late_partitions(frames: int) -> int:
     """The partitions of a window's length of a response."""
     return max(0, (frames - EARLY * QUANTUM + WINDOW - 1) // WINDOW)
 
 
-@njit(**COMPILED)
+@kernel
 def early_partitions(frames: int) -> int:
     """The partitions of a quantum's length before them."""
     return min(EARLY, (frames + QUANTUM - 1) // QUANTUM)
 
 
-@njit(**COMPILED)
+@kernel
 def partitioned_slots(frames: int, channels: int) -> int:
     """The memory of a response in partitions."""
     early, late = early_partitions(frames), late_partitions(frames)
     return BEHIND_IMPULSE + 2 * channels * (early * (QUANTUM + 1) + late * (WINDOW + 1))
 
 
-@njit(**COMPILED)
+@kernel
 def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impulse) -> None:
     """Write a response (frames, 1 or 2) as the convolver reads it; the inverse transform's factor is in it.
 
@@ -350,18 +332,13 @@ def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impu
         frames: of it with silence at the end.
         impulse: of `partitioned_slots`.
     """
-    channels = response.shape[1]
-    early = early_partitions(frames)
-    late = late_partitions(frames)
-    impulse.channels = channels
-    impulse.early = early
-    impulse.late = late
+    impulse.channels = response.shape[1]
+    impulse.early, impulse.late = early_partitions(frames), late_partitions(frames)
     memory = reals(address_of(impulse))
-    place = BEHIND_IMPULSE
-    first = 0
-    for number in range(early + late):
-        length = QUANTUM if number < early else WINDOW
-        for channel in range(channels):
+    place, first = BEHIND_IMPULSE, 0
+    for number in range(impulse.early + impulse.late):
+        length = QUANTUM if number < impulse.early else WINDOW
+        for channel in range(impulse.channels):
             re, im = row(work, ONE, 2 * length), row(work, ONE + 1, 2 * length)
             silence(work, ONE, 0, 2 * length)
             for frame in range(min(length, len(response) - first)):

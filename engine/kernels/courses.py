@@ -1,4 +1,4 @@
-"""Strings of a course that stand on one bridge, and ring in step: energy passes between them, both ways.
+"""Voices in the mix, alone or as strings of a course on one bridge, in step: energy passes between them, both ways.
 
 The bridge, of conductance G, moves with the sum of the forces of all strings on it. For one partial of strings nearly
 in unison that is one damper for the sum of their speeds v, in place of one for each:
@@ -24,24 +24,32 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import lanes, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import MOST_PAIRS, QUANTUM
 from engine.kernels.memory import fence, tension_program_at, truth_program_at, voice_at
-from engine.kernels.mixer_records import MOST_COURSE, CourseString, Mixer
-from engine.kernels.modes import following, row, weights
-from engine.kernels.voice import begin, differentiate, end, is_first, is_heard, move_points, remember
-from engine.kernels.voice_records import Voice
+from engine.kernels.mixer_records import CAUSE_STARVED, MOST_COURSE, CourseString, Mixer
+from engine.kernels.modes import following, motion, row
+from engine.kernels.voice import (
+    begin,
+    differentiate,
+    end,
+    generate,
+    is_first,
+    is_heard,
+    move_points,
+    note_gap,
+    remember,
+)
 
 SHARED = 2 * MOST_PAIRS  # modes of a string that have a part in the bridge, at most
 PARTS = lanes.PARTS * SHARED  # slots of all their parts
 
 
-@njit(**COMPILED)
-def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
+@kernel
+def _joins(course: int, late: int, voice: at.Voice, now: int) -> bool:
     """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
     if voice.course != course or voice.course_done == now + 1:
         return False
@@ -51,11 +59,9 @@ def _joins(course: int, late: int, voice: Voice, now: int) -> bool:
     return voice.state == at.SOUNDING and voice.late == late
 
 
-@njit(**COMPILED)
+@kernel
 def add(mixer: Mixer, place: int, now_s: float) -> int:
-    """Add the next quantum of the course of an active voice, by its place, to the mix.
-
-    Returns the state of that voice.
+    """Add the next quantum of an active voice, by its place, and of its course to the mix; return the voice's state.
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
@@ -65,11 +71,10 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
     state = begin(first_voice, mixer)
     if state != at.SOUNDING:
         return state
-    course = first_voice.course
-    late = first_voice.late
-    strings = 1
+    course, late, strings = first_voice.course, first_voice.late, 1
+    was_dry, before = first_voice.dry, first_voice.generated
     mixer.course[0].address = mixer.voices[place]
-    for later_place in range(place + 1, mixer.active):
+    for later_place in range(place + 1, mixer.active if course != 0 else 0):
         other = voice_at(mixer.voices[later_place])
         if strings < MOST_COURSE and _joins(course, late, other, now) and begin(other, mixer) == at.SOUNDING:
             mixer.course[strings].address = mixer.voices[later_place]
@@ -83,36 +88,41 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
                 generated += 1
         if generated > 0:
             _generate(mixer, generated, turn == 0)
+    if first_voice.dry and not was_dry:
+        note_gap(mixer, now, 0.0, CAUSE_STARVED)
     for number in range(strings):
         voice, out = voice_at(mixer.course[number].address), mixer.out[number]
         if voice.velocity:
             differentiate(voice, out, mixer.taps[:])
-        state = end(voice, mixer, now_s, out, True)
-        voice.course_done = now + 1
-        fence()
-        voice.state = state
-    return first_voice.state
+        added = end(voice, mixer, now_s, out, number > 0 or voice.generated > before)
+        if course != 0:
+            voice.course_done = now + 1
+        if number == 0:
+            state = added
+        else:
+            fence()
+            voice.state = added
+    return state
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _string(mixer: Mixer, number: int) -> CourseString:
     """A string that is generated now, by its number."""
     return mixer.course[mixer.generated[number]]
 
 
-@njit(**COMPILED)
+@kernel
 def _generate(mixer: Mixer, strings: int, first: bool) -> None:
-    """The next quantum of the strings that are generated now.
-
-    Args:
-        first: whether those that sense velocity are behind the others.
-    """
+    """The next quantum of the strings that are generated now; `first`: those that sense velocity are behind."""
     scratch = mixer.scratch[:]
-    place = lanes.aligned(scratch)
-    solved = False
-    shared = 0
-    sums = scratch[place : place + SHARED]
-    place += SHARED
+    alone = voice_at(_string(mixer, 0).address)
+    if alone.course == 0:
+        generate(alone, is_heard(alone), mixer.rate_hz, mixer.out[0], scratch)
+        if alone.velocity:
+            remember(alone, is_heard(alone), first, mixer.out[0])
+        return
+    sums = scratch[lanes.aligned(scratch) :][:SHARED]
+    place, solved, shared = lanes.aligned(scratch) + SHARED, False, 0
     for number in range(strings):
         voice = voice_at(_string(mixer, number).address)
         solved = voice.kind == at.TRUTH
@@ -136,27 +146,20 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
             remember(voice, audible, first, out)
 
 
-@njit(**COMPILED)
+@kernel
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
     """A quantum of latents that share a tension."""
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
-    one = _string(mixer, 0)
-    other = _string(mixer, min(1, strings - 1))
-    third = _string(mixer, strings - 1)
+    one, other, third = _string(mixer, 0), _string(mixer, min(1, strings - 1)), _string(mixer, strings - 1)
     parts, modes = (one.parts, other.parts, third.parts), (one.first, other.first, third.first)
     for frame in range(QUANTUM):
         for number in range(strings):
             string = _string(mixer, number)
             _advance(string, voice_at(string.address), scratch, frame, mixer.out[mixer.generated[number]])
-        if strings == 1:
-            lanes.meet_1(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
-        elif strings == 2:
-            lanes.meet_2(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
-        else:
-            lanes.meet_3(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
+        lanes.meet(scratch, blocks, strings, modes, parts)
 
 
-@njit(**COMPILED)
+@kernel
 def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> None:
     """A quantum of strings that are solved."""
     scratch = mixer.scratch[:]
@@ -164,10 +167,9 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
         for number in range(strings):
             string = _string(mixer, number)
             voice, out = voice_at(string.address), mixer.out[mixer.generated[number]]
-            program = truth_program_at(voice.program)
-            fading = voice.next_weights == 1
-            audible = is_heard(voice)
-            truth.advance(voice, program, string.sub_steps, frame, fading, audible, out)
+            program, fading = truth_program_at(voice.program), voice.next_weights == 1
+            truth.hear(voice, program, frame, fading, is_heard(voice), out)
+            truth.ring(voice, program, string.sub_steps, max(string.sub_steps, 1))
         sums[:shared] = 0.0
         for number in range(strings):
             string = _string(mixer, number)
@@ -181,50 +183,40 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
                 speeds[mode] -= parts[mode] * sums[mode]
 
 
-@njit(inline="always", **COMPILED)
-def _speeds(voice: Voice, shared: int) -> np.ndarray:
+@inlined
+def _speeds(voice: at.Voice, shared: int) -> np.ndarray:
     """Speeds of a solved string's first modes."""
     return row(voice, 1)[: min(voice.modes, shared)]
 
 
-@njit(**COMPILED)
-def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
-    """Prepare a string for a quantum, with its parts and modes from a slot of the scratch on.
-
-    Returns the first slot behind them.
-    """
+@kernel
+def _set_up(string: CourseString, voice: at.Voice, scratch: np.ndarray, place: int, solved: bool) -> int:
+    """Prepare a string for a quantum, its parts and modes from a slot of the scratch on; return the slot behind."""
     string.parts, string.first = place, place + PARTS
     if solved:
         string.sub_steps = truth.set_up(voice, truth_program_at(voice.program))
         return string.first
     program = tension_program_at(voice.program)
     tension.bring_up_to_date(voice, program)
-    moving = voice.moving
-    voice.heard = voice.felt = moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)[:moving]
+    moving = voice.heard = voice.felt = voice.moving
     first, near = string.first, lanes.blocks_of(moving)
-    tension.load(x, y, rows, order, scratch, first)
+    ears = tension.take(
+        voice, tension.order_of(voice)[:moving], voice.next_weights == 1, is_heard(voice), scratch, first
+    )
     for number in range(lanes.LANES * near, SHARED):  # these rest
         slot = first + lanes.place(number)
         scratch[slot] = scratch[slot + lanes.LANES] = 0.0
-    points = voice.points
-    ears = (2 if voice.next_weights == 1 else 1) * points if is_heard(voice) else 0
-    for ear in range(ears):
-        tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
     string.near = near
     string.moving = moving
     string.nodes = voice.steps
     string.ears = ears
-    string.apart = 2 if points == 1 else 1
+    string.apart = 2 if voice.points == 1 else 1
     string.stretch, string.second = lanes.add_up(scratch, first, near, 0, ears, string.heard[:])
     string.total, string.silence = 0.0, program.silence
     return first + lanes.slots(max(voice.modes, SHARED))
 
 
-@njit(**COMPILED)
+@kernel
 def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> None:
     """Compute the parts of strings' modes in the bridge's motion, and what that takes from them in a frame.
 
@@ -243,9 +235,7 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
         modes = min(shared, voice.bridged, voice.moving)
         parts = scratch[first : first + PARTS].reshape(lanes.PARTS, SHARED)
         parts[:] = 0.0
-        lost = row(voice, at.BRIDGE)
-        sigmas = row(voice, at.SIGMA)
-        squares = following(voice)[6]
+        lost, sigmas, squares = row(voice, at.BRIDGE), row(voice, at.SIGMA), following(voice)[6]
         if voice.kind == at.TRUTH:
             for mode in range(modes):
                 part = math.sqrt(lost[mode])
@@ -257,12 +247,10 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
                 parts[2, mode] = part / omega * (2 * step_s / (1 + step_s * sums[mode]))
 
 
-@njit(inline="always", **COMPILED)
-def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
+@inlined
+def _advance(string: CourseString, voice: at.Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
-    first = string.first
-    near = string.near
-    ears = string.ears
+    first, near, ears = string.first, string.near, string.ears
     at_points, largest = string.heard[:], voice.largest_stretch
     sums, nothing = (string.stretch, string.second), (0.0, 0.0)
     for ear in range(ears):
@@ -284,10 +272,10 @@ def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int
     string.stretch, string.second = sums
 
 
-@njit(**COMPILED)
-def _put_back(string: CourseString, voice: Voice, scratch: np.ndarray) -> None:
+@kernel
+def _put_back(string: CourseString, voice: at.Voice, scratch: np.ndarray) -> None:
     """A string as it is after a quantum."""
-    order = row(voice, at.ORDER).view(np.int64)[: voice.heard]
-    tension.save(row(voice, 0), row(voice, 1), order, scratch, string.first)
+    x, y = motion(voice)
+    tension.save(x, y, tension.order_of(voice)[: voice.heard], scratch, string.first)
     voice.moving, loudness = string.moving, tension_program_at(voice.program).loudness
     voice.loudness = (0.5 * math.log(string.total) if string.total > 0 else -1e9) + loudness

@@ -15,11 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine import bounds
 from engine.kernels import pulses
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import behind, drum_at
 from engine.kernels.records import DRUM as DRUM_BLOCK
 from engine.kernels.records import DRUM_ROWS
@@ -55,12 +54,12 @@ HERTZ = -0.2  # power of the speed in the time of contact
 J01 = 2.404825557695773  # the first zero of J₀
 
 
-@njit(**COMPILED)
+@kernel
 def _hypot(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)
 
 
-@njit(**COMPILED)
+@kernel
 def bessels(x: float, out: np.ndarray) -> float:
     """Write J_m(x) of m from 0 on, x ≥ 0, and return Struve's H₁(x).
 
@@ -74,10 +73,8 @@ def bessels(x: float, out: np.ndarray) -> float:
         return 2 * x * x / (3 * math.pi)
     orders = min(len(out), int(x + 12 * x ** (1 / 3)) + 20)
     most = max(float(orders), x)
-    above = 0.0
-    here = 1e-300
-    total = 0.0
-    struve = 0.0
+    above, here = 0.0, 1e-300
+    total = struve = 0.0
     for m in range(2 * int(most / 2 + 4 * most ** (1 / 3) + 6), 0, -1):
         if m < orders:
             out[m] = here
@@ -92,7 +89,7 @@ def bessels(x: float, out: np.ndarray) -> float:
     return 2 / math.pi * (1 - out[0]) + 4 / math.pi * struve / total
 
 
-@njit(**COMPILED)
+@kernel
 def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray, scratch: np.ndarray) -> int:
     """Write rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`; return their number."""
     count, x = 0, 0.0
@@ -102,10 +99,8 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
         bessels(x, after)
         for m in range(len(after)):
             if before[m] * after[m] < 0:
-                low = x - APART
-                high = x
-                z = x - APART / 2
-                slope = 0.0
+                low, high = x - APART, x
+                z, slope = x - APART / 2, 0.0
                 for _ in range(60):
                     bessels(z, scratch[: m + 2])
                     slope = m / z * scratch[m] - scratch[m + 1]
@@ -131,7 +126,7 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
     return count
 
 
-@njit(**COMPILED)
+@kernel
 def tabulate(table: np.ndarray) -> None:
     """Write J_m of multiples of STEP, (steps, TERMS + orders + TERMS): m from -TERMS on."""
     for step in range(table.shape[0]):
@@ -141,7 +136,7 @@ def tabulate(table: np.ndarray) -> None:
             row[TERMS - m] = -row[TERMS + m] if m & 1 else row[TERMS + m]
 
 
-@njit(**COMPILED)
+@kernel
 def bessel(m: int, x: float, tools: Tools) -> float:
     """J_m(x), where the table has it by Taylor's series, whose derivatives are of other orders: to 3e-11."""
     table, work = tools
@@ -163,7 +158,7 @@ def bessel(m: int, x: float, tools: Tools) -> float:
     return value
 
 
-@njit(**COMPILED)
+@kernel
 def size(drum: np.ndarray) -> float:
     """The radius of a circle of the same area."""
     if drum[SHAPE] == CIRCLE:
@@ -171,20 +166,20 @@ def size(drum: np.ndarray) -> float:
     return math.sqrt(drum[LENGTH] * drum[WIDTH] / math.pi)
 
 
-@njit(**COMPILED)
+@kernel
 def mass_kg(drum: np.ndarray) -> float:
     """μA: of each mass-normalised mode."""
     return drum[DENSITY] * drum[THICKNESS] * math.pi * size(drum) ** 2
 
 
-@njit(**COMPILED)
+@kernel
 def stretching(drum: np.ndarray) -> float:
     """C = Eh/2(1 - ν²) in N/m; of a bar, which is free to widen, without ν. D is C h²/6."""
     held_across = 1.0 if drum[SHAPE] == BAR else 1 - drum[POISSON] ** 2
     return drum[MODULUS] * drum[THICKNESS] / (2 * held_across)
 
 
-@njit(**COMPILED)
+@kernel
 def _of_sine(m: int, turn: float, sine: float, cosine: float) -> float:
     """|∫₀¹ sin(mπx) e^{i turn x} dx|, with the sign that the middle gives; sine and cosine of |turn|/2."""
     side, away = m * math.pi, abs(turn)
@@ -197,7 +192,7 @@ def _of_sine(m: int, turn: float, sine: float, cosine: float) -> float:
     return sign * side / (side + away) * part
 
 
-@njit(**COMPILED)
+@kernel
 def _across(n: int, turn: float, sine: float, cosine: float) -> float:
     """The same across the width, over which a bar, n = 0, moves alike."""
     if n > 0:
@@ -205,7 +200,7 @@ def _across(n: int, turn: float, sine: float, cosine: float) -> float:
     return math.sqrt(0.5) * (1.0 if turn == 0 else 2 * sine / abs(turn))
 
 
-@njit(**COMPILED)
+@kernel
 def _hankel(z: float, s: float, slope: float, bessel_m: float) -> float:
     """∫ J_m(zr) J_m(sr) r dr to r = 1, where J_m(z) = 0; `bessel_m`: J_m(s)."""
     if abs(z - s) < 1e-6 * z:
@@ -213,13 +208,13 @@ def _hankel(z: float, s: float, slope: float, bessel_m: float) -> float:
     return -z * slope * bessel_m / (z * z - s * s)
 
 
-@njit(**COMPILED)
+@kernel
 def _height(m: int, slope: float) -> float:
     """1/√(∫ J² cos² dA / A)."""
     return (1.0 if m == 0 else math.sqrt(2.0)) / abs(slope)
 
 
-@njit(**COMPILED)
+@kernel
 def transform(drum: np.ndarray, surface: np.ndarray, mode: int, along: float, across: float, tools: Tools) -> float:
     """|∫φ e^{is·x} dA|/A with its sign, s = (along, across) in 1/m."""
     m, n = int(surface[M, mode]), int(surface[N, mode])
@@ -237,7 +232,7 @@ def transform(drum: np.ndarray, surface: np.ndarray, mode: int, along: float, ac
     return 2 * _height(m, slope) * _hankel(surface[Z, mode], s, slope, bessel(m, s, tools)) * turned
 
 
-@njit(**COMPILED)
+@kernel
 def shape(drum: np.ndarray, surface: np.ndarray, mode: int, x: float, y: float, tools: Tools) -> float:
     """φ at a place on the surface, in half-lengths from the centre."""
     m, n = int(surface[M, mode]), int(surface[N, mode])
@@ -249,7 +244,7 @@ def shape(drum: np.ndarray, surface: np.ndarray, mode: int, x: float, y: float, 
     return radial * _height(m, surface[SLOPE, mode]) * (math.sin(angle) if n else math.cos(angle))
 
 
-@njit(**COMPILED)
+@kernel
 def shapes(drum: np.ndarray, surface: np.ndarray, places: np.ndarray, tools: Tools, out: np.ndarray) -> None:
     """`shape` at places (places, 2): (modes, places); 0 beyond the edge."""
     for place in range(len(places)):
@@ -259,16 +254,13 @@ def shapes(drum: np.ndarray, surface: np.ndarray, places: np.ndarray, tools: Too
             out[mode, place] = shape(drum, surface, mode, x, y, tools) if away <= 1 else 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def spread(turn: float, tools: Tools) -> float:
-    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR.
-
-    It is so for any solution of -∇²φ = κ²φ.
-    """
+    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR for any solution of -∇²φ = κ²φ."""
     return 1.0 if turn < 1e-6 else 2 * bessel(1, turn, tools) / turn
 
 
-@njit(**COMPILED)
+@kernel
 def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The share of each mode's square at a wavenumber s over all directions, at a size of 1: ∫ density ds = 1."""
     if drum[SHAPE] == CIRCLE:
@@ -294,13 +286,11 @@ def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, 
     out[:] *= 2 * s / angles
 
 
-@njit(**COMPILED)
+@kernel
 def air_at(
     drum: np.ndarray, surface: np.ndarray, ka: float, points: int, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """Write what the air adds to modes at k times size: reactance, and resistance by ka.
-
-    The shape is (2, modes), at a size of 1.
+    """Write what the air adds to modes at k times size: reactance, and resistance by ka, (2, modes), at a size of 1.
 
     ∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du. And ∫ D(s)/√(k² - s²) ds over s < k, with
     s = k sin α.
@@ -317,19 +307,18 @@ def air_at(
         out[1] += shares * (math.pi / (2 * ANGLES * ka))
 
 
-@njit(**COMPILED)
+@kernel
 def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
     """The value at ka of one function of `air_at`: a Chebyshev series in the square of ka."""
     share = min(ka / reach, 1.0)
     t = 2 * share * share - 1
-    one = 0.0
-    two = 0.0
+    one = two = 0.0
     for term in range(len(row) - 1, 0, -1):
         one, two = 2 * t * one - two + row[term], one
     return t * one - two + row[0]
 
 
-@njit(**COMPILED)
+@kernel
 def _column(k: float, size_m: float, shell_m: float, scratch: np.ndarray) -> tuple[float, float]:
     """Impedance of a shell's column of air less that of a piston in a baffle, of ρc: its two parts."""
     ka = k * size_m
@@ -340,7 +329,7 @@ def _column(k: float, size_m: float, shell_m: float, scratch: np.ndarray) -> tup
     return (1 - x * x - y * y) / whole - (1 - scratch[1] / ka), -2 * y / whole - struve / ka
 
 
-@njit(**COMPILED)
+@kernel
 def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
     """κ times size up to which modes are looked at for the lowest below a frequency, so many at most."""
     load = drum[DENSITY] * drum[THICKNESS] * (2 * math.pi * highest_hz) ** 2
@@ -352,7 +341,7 @@ def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
     return highest
 
 
-@njit(**COMPILED)
+@kernel
 def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: np.ndarray, out: np.ndarray) -> int:
     """Write the lowest modes below a frequency, so many at most, and return how many they are.
 
@@ -432,7 +421,7 @@ def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: 
     return count
 
 
-@njit(**COMPILED)
+@kernel
 def lowest(drum: np.ndarray) -> float:
     """κ of the lowest mode."""
     if drum[SHAPE] == CIRCLE:
@@ -440,12 +429,9 @@ def lowest(drum: np.ndarray) -> float:
     return _hypot(math.pi / drum[LENGTH], math.pi / drum[WIDTH])
 
 
-@njit(**COMPILED)
+@kernel
 def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarray) -> float:
-    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), else the first.
-
-    Over a kettle (0,1) dies away at once.
-    """
+    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), as (0,1) dies away; else the first."""
     across = lowest(drum)
     stiff = drum[TENSION] + stretching(drum) * (drum[THICKNESS] * across) ** 2 / 6
     in_vacuo_hz = across * math.sqrt(stiff / (drum[DENSITY] * drum[THICKNESS])) / (2 * math.pi)
@@ -456,7 +442,7 @@ def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarr
     return out[OMEGA, 0] if count else math.nan
 
 
-@njit(**COMPILED)
+@kernel
 def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: np.ndarray) -> None:
     """Raise a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
     if ratio == 1.0:
@@ -477,7 +463,7 @@ def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: 
     drum[TENSION] = at_rest * factor
 
 
-@njit(**COMPILED)
+@kernel
 def losses(drum: np.ndarray, modal: np.ndarray, out: np.ndarray) -> None:
     """σ: (d₁ + d₃κ²)/2μ, and what is radiated."""
     for mode in range(len(out)):
@@ -485,7 +471,7 @@ def losses(drum: np.ndarray, modal: np.ndarray, out: np.ndarray) -> None:
         out[mode] = lost / (2 * modal[MASS, mode]) + modal[RADIATED, mode]
 
 
-@njit(**COMPILED)
+@kernel
 def struck(
     drum: np.ndarray, modal: np.ndarray, x: float, y: float, radius_m: float, tools: Tools, out: np.ndarray
 ) -> None:
@@ -497,7 +483,7 @@ def struck(
         )
 
 
-@njit(**COMPILED)
+@kernel
 def blow(
     squares: np.ndarray,
     struck: np.ndarray,
@@ -525,7 +511,7 @@ def blow(
         out[mode] *= impulse
 
 
-@njit(**COMPILED)
+@kernel
 def radiated(drum: np.ndarray, modal: np.ndarray, x: float, y: float, tools: Tools, out: np.ndarray) -> None:
     """Sound pressure in Pa of modes at amplitude 1 m, 1 m off, as from a baffle: see `DrumModes.radiated`."""
     for mode in range(len(out)):
@@ -536,7 +522,7 @@ def radiated(drum: np.ndarray, modal: np.ndarray, x: float, y: float, tools: Too
         out[mode] = AIR_KG_M3 * omega**2 / 2 * moved
 
 
-@njit(**COMPILED)
+@kernel
 def write(drum: np.ndarray, modal: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
     """Write the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
     mu, block = drum[DENSITY] * drum[THICKNESS], drum_at(address)

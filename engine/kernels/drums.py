@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes, loudness, velocities
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, voice_at, wholes
+from engine.kernels.compiled import kernel
+from engine.kernels.memory import address_of, drum_at, reals, shaped, wholes
 from engine.kernels.modes import TOO_HIGH, row, weights
-from engine.kernels.playing import channels, slots
+from engine.kernels.playing import keys, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
-from engine.kernels.voice_records import Voice
 from engine.levels import RUNAWAY_FACTOR
 
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
@@ -29,58 +27,53 @@ SQUARE, SIGMA, _COUPLING, _STRETCH, STRUCK, WEIGHTS = range(6)  # rows of a drum
 UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
-@njit(**COMPILED)
+@kernel
+def has_modes(table: Table, key: int, modes: int) -> bool:
+    """Return True if a key has a drum of so many modes."""
+    return has_drum(table, key) and drum_of(table, key).modes == modes
+
+
+@kernel
 def has_drum(table: Table, key: int) -> bool:
     """Return True if a table of drums has one for a key."""
     return wholes(address_of(table))[table.drums + key] != 0
 
 
-@njit(**COMPILED)
+@kernel
 def drum_of(table: Table, key: int) -> Drum:
     """The drum of a key that has one."""
     address = address_of(table)
     return drum_at(address + 8 * wholes(address)[table.drums + key])
 
 
-@njit(**COMPILED)
+@kernel
 def rows_of(drum: Drum) -> np.ndarray:
     """The rows (DRUM_ROWS, modes) of a drum."""
-    return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
+    return shaped(reals(address_of(drum)), HEADER, (DRUM_ROWS, drum.modes))
 
 
-@njit(**COMPILED)
+@kernel
 def _speed(drum: Drum, share: float) -> float:
     """The speed of a mallet at a share of the velocities, in m/s."""
     return velocities.between(drum.softest_m_s, drum.hardest_m_s, share)
 
 
-@njit(**COMPILED)
+@kernel
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
     return _speed(drum, velocities.share(velocity, player.values[of.CURVE]))
 
 
-@njit(**COMPILED)
-def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple[float, float]:
-    """Strength and hardness of a blow on a key's drum, for the noise of the contact; see `engine.kernels.contact`."""
-    drum = drum_of(table, key)
-    reference = _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0))
-    return _speed_of(player, drum, velocity) / reference, min(FIRM_S / drum.contact_s, MOST_HARDER)
-
-
-@njit(**COMPILED)
+@kernel
 def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
     """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives."""
     masses_kg = drum.mass_kg, drum.mallet_kg
     drum_modes.blow(rows_of(drum)[SQUARE], struck, drum.contact_s, masses_kg, speed, out[: drum.modes])
 
 
-@njit(**COMPILED)
+@kernel
 def gain_of(player: Player, table: Table, key: int) -> float:
-    """The factor that makes a key as loud as others.
-
-    It lets the key peak no higher than the highest of them may.
-    """
+    """The factor that makes a key as loud as others, and lets it peak no higher than the highest of them may."""
     if player.gains[key, 0] == 0.0:
         drum = drum_of(table, key)
         n, rows = drum.modes, rows_of(drum)
@@ -88,126 +81,79 @@ def gain_of(player: Player, table: Table, key: int) -> float:
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
         _blow(drum, rows[STRUCK], _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0)), speeds)
-        stereo = table.points == 2
-        loudest = 0.0
-        modes = 0
+        loudest, modes, place = 0.0, 0, 0
         for mode in range(n):
             speeds[mode] /= math.sqrt(rows[SQUARE, mode])
-            weight = abs(rows[WEIGHTS, mode])
-            if stereo:
-                weight = max(weight, abs(rows[WEIGHTS + 1, mode]))
-            loud[mode] = weight * abs(speeds[mode])
+            loud[mode] = 0.0
+            for point in range(table.points):
+                loud[mode] = max(loud[mode], abs(rows[WEIGHTS + point, mode] * speeds[mode]))
             loudest = max(loudest, loud[mode])
         loud[0] = loud[n - 1] = loudest  # so that the peak is looked for in the same frames
         for mode in range(n):
-            if loud[mode] > UNHEARD * loudest:
-                modes += 1
-        place = 0
+            modes += loud[mode] > UNHEARD * loudest
         for mode in range(n):
             if loud[mode] > UNHEARD * loudest:
                 sound[of.SOUND_OMEGA * modes + place] = math.sqrt(rows[SQUARE, mode])
                 sound[of.SOUND_SIGMA * modes + place] = rows[SIGMA, mode]
-                sound[of.SOUND_LEFT * modes + place] = rows[WEIGHTS, mode] * speeds[mode]
-                right = rows[WEIGHTS + 1, mode] * speeds[mode] if stereo else 0.0
-                sound[of.SOUND_RIGHT * modes + place] = right
+                sound[of.SOUND_RIGHT * modes + place] = 0.0
+                for point in range(table.points):
+                    sound[(of.SOUND_LEFT + point) * modes + place] = rows[WEIGHTS + point, mode] * speeds[mode]
                 place += 1
-        body, mix = behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
+        body, mix = keys.body_of(player, table)
         gain = loudness.gain(sound, modes, table.points, body, mix)
         gain *= loudness.limit(gain * loudness.peak(sound, modes, True, body, mix, 0.0))
         player.gains[key, 0] = gain * table.level
     return player.gains[key, 0]
 
 
-@njit(**COMPILED)
-def strike(player: Player, table: Table, event: Event, number: int) -> float:
-    """Make the voices of one of the player's notes; their gain, 0: no drum."""
-    if not has_drum(table, event.key):
-        return 0.0
+@kernel
+def take(player: Player, table: Table, note: Note) -> bool:
+    """The gain of a note of a key's drum, and the contact of its blow; False: there is no such drum."""
+    note.drum = 1
+    if not has_drum(table, note.key) or drum_of(table, note.key).modes > player.modes:
+        return False
+    note.gain = gain_of(player, table, note.key)
+    drum = drum_of(table, note.key)
+    reference = _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0))
+    note.strength = _speed_of(player, drum, note.velocity) / reference
+    note.hardness = min(FIRM_S / drum.contact_s, MOST_HARDER)
+    return True
+
+
+@kernel
+def make_voice(player: Player, table: Table, address: int, event: Event, source: int) -> None:
+    """A voice that sets out from the speeds that a blow gives the modes of a key's drum."""
     drum = drum_of(table, event.key)
-    if drum.modes > player.modes:
-        return 0.0
-    gain, struck = gain_of(player, table, event.key), rows_of(drum)[STRUCK]
+    source_rows = rows_of(drum)
+    struck = source_rows[STRUCK]
     if event.struck != 0 and event.struck_modes == drum.modes:
         struck = reals(event.struck)[: drum.modes]
-    speed = _speed_of(player, drum, event.value)
-    for source in range(table.sources):
-        address = slots.address_of_voice(player, number, source)
-        begun = gain * player.source_gains[source]
-        begun *= channels.loudness(player, table.mode, event.channel)
-        _make(player, table, address, drum, struck, speed, source)
-        slots.set_gain(address, begun)
-    return gain
-
-
-@njit(**COMPILED)
-def _make(
-    player: Player, table: Table, address: int, drum: Drum, struck: np.ndarray, speed: float, source: int
-) -> None:
-    """A voice that sets out from the speeds that a blow gives its modes.
-
-    `struck`: those that 1 N s gives.
-    """
     # What follows from the modes is prepared
     used = at.FOLLOWING if table.kinds[source] == at.TENSION else at.TRUTH_ROWS
     voice = slots.blank_voice(player, table, address, source, drum.modes, used)
-    source_rows, speeds = rows_of(drum), row(voice, 1)
     for which in range(STRUCK):
-        target_row = row(voice, at.OMEGA_SQUARED + which)
-        for mode in range(drum.modes):
-            target_row[mode] = source_rows[which, mode]
-    weigh(player, table, voice, 0, drum)
-    _blow(drum, struck, speed, speeds)
+        row(voice, at.OMEGA_SQUARED + which)[:] = source_rows[which]
+    weigh(player, table, voice, 0, event.key)
+    speeds = row(voice, 1)
+    _blow(drum, struck, _speed_of(player, drum, event.value), speeds)
     widest, loudest = 0.0, 0.0
     for mode in range(drum.modes):
-        moved, omega = speeds[mode], math.sqrt(source_rows[SQUARE, mode])
-        widest += abs(moved) / omega
+        moved = abs(speeds[mode]) / math.sqrt(source_rows[SQUARE, mode])
+        widest += moved
         weight = 0.0
         for point in range(voice.points):
             weight = max(weight, abs(weights(voice, 0, point, 0)[mode]))
-        loudest += weight * abs(moved) / omega
+        loudest += weight * moved
     voice.peak, voice.limit = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
 
 
-@njit(**COMPILED)
-def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
+@kernel
+def weigh(player: Player, table: Table, voice: at.Voice, which: int, key: int) -> None:
     """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
-    highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum)
+    highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum_of(table, key))
     for point in range(table.points):
         real, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
-        for mode in range(drum.modes):
+        for mode in range(voice.modes):
             audible = source_rows[SQUARE, mode] <= highest * highest
             real[mode] = source_rows[WEIGHTS + point, mode] if audible else 0.0
             imaginary[mode] = 0.0
-
-
-@njit(**COMPILED)
-def hear(player: Player, table: Table, note: Note) -> None:
-    """Let a note follow the gains of sources and the places where the drum is heard."""
-    if table.drums == 0 or not has_drum(table, note.key):
-        return
-    drum, gain = drum_of(table, note.key), note.gain * channels.loudness(player, table.mode, note.channel)
-    moved = False
-    for point in range(2):
-        moved = moved or note.point[point] != player.values[of.POINT + point]
-    moved = moved and note.points == table.points
-    for source in range(table.sources):
-        address = note.voices[source]
-        if address == 0:
-            continue
-        voice = voice_at(address)
-        if voice.modes != drum.modes:
-            moved = False
-            continue
-        voice.wanted_gain = gain * player.source_gains[source]
-        moved = moved and voice.next_weights == 0
-    if not moved:
-        return
-    for point in range(2):
-        note.point[point] = player.values[of.POINT + point]
-    for source in range(table.sources):
-        address = note.voices[source]
-        if address != 0:
-            voice = voice_at(address)
-            weigh(player, table, voice, 1, drum)
-            voice.weights_faded = 0
-            voice.next_weights = 1

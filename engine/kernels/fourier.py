@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import part
 
 # Rows of a work space, (ROWS, N), N a power of two: a circle, room for transforms, two signals of complex numbers
@@ -26,7 +25,7 @@ ROWS = 8
 RUN = 16  # numbers of a chirp that are computed one from the other
 
 
-@njit(**COMPILED)
+@kernel
 def transform(
     re: np.ndarray, im: np.ndarray, re2: np.ndarray, im2: np.ndarray, cosines: np.ndarray, sines: np.ndarray
 ) -> None:
@@ -59,7 +58,7 @@ def transform(
             re2[k], im2[k] = re[k], im[k]
 
 
-@njit(**COMPILED)
+@kernel
 def _fours(
     re: np.ndarray,
     im: np.ndarray,
@@ -100,7 +99,7 @@ def _fours(
             out_r[q + 3 * stride], out_i[q + 3 * stride] = r * c3 - i * s3, r * s3 + i * c3
 
 
-@njit(**COMPILED)
+@kernel
 def power_of_two(least: int) -> int:
     """The smallest power of two that is not below a number."""
     power = 1
@@ -109,7 +108,7 @@ def power_of_two(least: int) -> int:
     return power
 
 
-@njit(**COMPILED)
+@kernel
 def fill_circle(cosines: np.ndarray, sines: np.ndarray) -> None:
     """Write cosines and sines of 2πk/N, k = 0 … N − 1; N is a multiple of 4."""
     quarter = len(cosines) // 4
@@ -121,13 +120,13 @@ def fill_circle(cosines: np.ndarray, sines: np.ndarray) -> None:
         cosines[3 * quarter + k], sines[3 * quarter + k] = sine, -cosine
 
 
-@njit(**COMPILED)
+@kernel
 def row(work: np.ndarray, number: int, size: int) -> np.ndarray:
     """The first numbers of a row of a work space."""
     return part(work[number], 0, size)
 
 
-@njit(**COMPILED)
+@kernel
 def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
     """Clear a signal of a work space from one place to another."""
     re, im = row(work, signal, end), row(work, signal + 1, end)
@@ -135,7 +134,7 @@ def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
         re[k] = im[k] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def turn(work: np.ndarray, real: int, imaginary: int, size: int) -> None:
     """Transform a signal of a work space, given its rows, in place; its size is a power of two.
 
@@ -147,7 +146,7 @@ def turn(work: np.ndarray, real: int, imaginary: int, size: int) -> None:
     transform(re, im, spare, row(work, SPARE + 1, size), work[COSINES], work[SINES])
 
 
-@njit(**COMPILED)
+@kernel
 def turn_any(work: np.ndarray, period: int, count: int, wanted: int, behind: int, size: int) -> None:
     """Transform signal ONE in place at multiples of 1/period, as its convolution with a chirp; TWO is used.
 
@@ -174,7 +173,7 @@ def turn_any(work: np.ndarray, period: int, count: int, wanted: int, behind: int
     _turn_back(work, size)
 
 
-@njit(**COMPILED)
+@kernel
 def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None:
     """Write exp(πi k²/period) as signal TWO, from k = 0 on as many as `positive`, then negative k."""
     re, im = row(work, TWO, size), row(work, TWO + 1, size)
@@ -194,7 +193,7 @@ def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None
         step_re, step_im = step_re * further_re - step_im * further_im, step_re * further_im + step_im * further_re
 
 
-@njit(**COMPILED)
+@kernel
 def _turn_back(work: np.ndarray, size: int) -> None:
     """Multiply signal ONE by the conjugate of TWO."""
     re, im = row(work, ONE, size), row(work, ONE + 1, size)

@@ -36,23 +36,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import lanes, strings, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import tension_program_at, truth_program_at
-from engine.kernels.modes import damped, following, row, weights
+from engine.kernels.modes import damped, following, motion, row
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import TensionProgram, TruthProgram, Voice
 
 PHASE, MOST_STEPS = 0.15, 6
 
 
-@njit(**COMPILED)
-def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
+@kernel
+def fit(voice: at.Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
     """Give a voice that has not begun an edge of its bridge.
 
     Args:
@@ -73,7 +70,7 @@ def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz:
     voice.javari.loss, voice.javari.mass_kg = edge[2], mass
 
 
-@njit(**COMPILED)
+@kernel
 def force(before: float, free: float, give: float, stiffness: float, loss: float) -> float:
     """The force of the edge within a step, in N.
 
@@ -96,31 +93,28 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
     return (moved - (b + math.sqrt(max(b * b - 4 * a * half * before * before, 0.0))) / (2 * a)) / give
 
 
-@njit(**COMPILED)
-def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
+@kernel
+def generate(voice: at.Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+    """The next quantum, (4, of.QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
     if voice.kind == at.TRUTH:
         _ring_solved(voice, truth_program_at(voice.program), fading, audible, out)
     else:
         _ring(voice, tension_program_at(voice.program), fading, audible, out, scratch)
-    first, second = row(voice, 0), row(voice, 1)
+    first, second = motion(voice)
     for mode in range(voice.modes):  # or they would become denormal
         if first[mode] * first[mode] < tension.NOTHING:
             first[mode] = 0.0
         if second[mode] * second[mode] < tension.NOTHING:
             second[mode] = 0.0
-    voice.generated += QUANTUM
+    voice.generated += of.QUANTUM
 
 
-@njit(**COMPILED)
-def _prepare(voice: Voice, step_s: float) -> None:
+@kernel
+def _prepare(voice: at.Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
-    shapes = row(voice, at.JAVARI)
-    compliance = row(voice, at.GIVEN)
-    speeds = row(voice, at.GIVEN_SPEED)
-    squares = row(voice, at.OMEGA_SQUARED)
-    sigmas = row(voice, at.SIGMA)
-    give = 0.0
+    shapes, give = row(voice, at.JAVARI), 0.0
+    compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     for mode in range(voice.modes):
         sigma = sigmas[mode]
         omega, part = damped(squares[mode], sigma), shapes[mode] / voice.javari.mass_kg
@@ -130,27 +124,21 @@ def _prepare(voice: Voice, step_s: float) -> None:
     voice.javari.give = give
 
 
-@njit(**COMPILED)
+@kernel
 def _ring(
-    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """A quantum of latents that share a tension."""
     tension.bring_up_to_date(voice, program)
-    n = voice.modes
-    points = voice.points
-    moving = voice.moving
-    steps = voice.javari.steps
+    moving, steps = voice.moving, voice.javari.steps
     step_s, nodes = 1 / (program.rate_hz * steps), voice.steps // steps
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
     voice.heard = voice.felt = moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)[:moving]
+    rows, order = following(voice), tension.order_of(voice)[:moving]
     first, near = lanes.aligned(scratch), lanes.blocks_of(moving)
-    tension.load(x, y, rows, order, scratch, first)
-    parts = first + lanes.slots(n)
+    ears = tension.take(voice, order, fading, audible, scratch, first)
+    parts = first + lanes.slots(voice.modes)
     ear_sums = scratch[parts + lanes.PRESSED * lanes.LANES * near :][: 2 * lanes.MOST_EARS]
     for number in range(lanes.LANES * near):
         slot = parts + number // lanes.LANES * lanes.PRESSED * lanes.LANES + number % lanes.LANES
@@ -161,20 +149,13 @@ def _ring(
             scratch[slot], scratch[slot + lanes.LANES] = row(voice, at.JAVARI)[number], compliance
             speed += row(voice, at.SIGMA)[number] * compliance
             scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
-    ears = (2 if fading else 1) * points if audible else 0
-    for ear in range(ears):
-        tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
-    largest = voice.largest_stretch
-    apart = 2 if points == 1 else 1
-    nothing = (0.0, 0.0)
-    total = 0.0
-    gap = voice.javari.gap_m
-    give = voice.javari.give
-    pushed = voice.javari.force
+    largest, apart = voice.largest_stretch, 2 if voice.points == 1 else 1
+    nothing, total = (0.0, 0.0), 0.0
+    gap, give, pushed = voice.javari.gap_m, voice.javari.give, voice.javari.force
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         for ear in range(ears):
             out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
             out[apart * ear, frame] -= voice.javari.heard * pushed
@@ -199,34 +180,31 @@ def _ring(
             total, held = tension.hold(scratch, first, near, voice.largest_energy)
             if held:
                 sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
+    x, y = motion(voice)
     tension.save(x, y, order, scratch, first)
     voice.javari.force = pushed
     voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
-@njit(**COMPILED)
-def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
+@kernel
+def _ring_solved(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
     sub_steps = truth.set_up(voice, program)
-    points = voice.points
     steps = voice.javari.steps
     step_s = 1 / (program.rate_hz * steps)
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    gap = voice.javari.gap_m
-    give = voice.javari.give
-    moving = voice.moving
-    q = row(voice, 0)
-    v = row(voice, 1)
+    gap, give, moving = voice.javari.gap_m, voice.javari.give, voice.moving
+    q, v = motion(voice)
     shapes = row(voice, at.JAVARI)
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
     before, pushed = -gap, voice.javari.force
     for mode in range(moving):
         before -= shapes[mode] * q[mode]
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         truth.hear(voice, program, frame, fading, audible, out)
         for which in range((2 if fading else 1) if audible else 0):
-            for point in range(points):
+            for point in range(voice.points):
                 out[2 * which + point, frame] -= voice.javari.heard * pushed
         pushed = 0.0
         for _ in range(steps):

@@ -1,21 +1,69 @@
-"""The drums of a plug-in, whose knobs are turned.
+"""The drums of a plug-in, whose knobs are turned, and their records.
 
 The blocks of keys are written again when these are struck or heard.
 """
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as drums
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import KEYS
 from engine.kernels.drum_modes import D1, D3, DRUM, HARDEST, MODULUS, ORDERS, ROWS, SOFTEST, SURFACE
-from engine.kernels.kit_records import FOLLOWED, KIT, KIT_DRUM
-from engine.kernels.memory import matrix, part, player_at, reals, record_at, table_at, voice_at, wholes
+from engine.kernels.fields import R, W
+from engine.kernels.memory import part, player_at, reals, record_at, shaped, table_at, voice_at, wholes
 from engine.kernels.records import DRUM_ROWS, Event
+
+# Records, as annotations of kernels
+Kit: TypeAlias = Any
+KitKey: TypeAlias = Any
+
+FOLLOWED = (of.MODULUS_FACTOR, of.DECAY, of.BRIGHTNESS_DECAY, of.POINT, of.POINT + 1)  # values that move drums
+
+KIT_DRUM = np.dtype(
+    [
+        ("drum", R, DRUM),  # with its blow
+        ("around", W),  # slot of what is around a mode, (SURFACE, listed)
+        ("listed", W),
+        ("air", W),  # slot of the terms of the air, (2, low, terms)
+        ("low", W),
+        ("terms", W),
+        ("reach", R),  # of the air
+    ]
+)
+
+KIT_KEY = np.dtype(
+    [
+        ("drum", W),  # slot of its `KIT_DRUM`; 0: it has none
+        ("ratio", R),
+        ("softest_m_s", R),
+        ("hardest_m_s", R),
+        ("stale", W),  # sum of what of it has changed
+        ("modes", W),
+        ("tuned", R, DRUM),  # its drum as it is tuned
+    ]
+)
+
+KIT = np.dtype(
+    [
+        ("highest_hz", R),
+        ("capacity", W),  # modes of a key
+        ("most", W),  # modes of a surface
+        ("bessels", W),  # slot of a table of Bessel functions, …
+        ("steps", W),  # … its rows …
+        ("columns", W),  # … and columns
+        ("work", W),  # slot of room to work in
+        ("found", W),  # slot of the modes of all keys, (KEYS, ROWS, capacity)
+        ("stale", W),  # whether any key is
+        ("values", R, len(FOLLOWED)),
+        ("keys", KIT_KEY, of.KEYS),
+    ]
+)
+"""Slots count from its beginning; what they point to follows the record."""
 
 MODES_MOVED = 1
 LOSSES_MOVED = 2
@@ -25,7 +73,7 @@ MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)  #
 kit_at, kit_drum_at = record_at(KIT), record_at(KIT_DRUM)
 
 
-@njit(**COMPILED)
+@kernel
 def begin(kit_address: int, table_address: int) -> None:
     """Write all keys' blocks into an instrument's table."""
     values = table_at(table_address).values
@@ -37,7 +85,7 @@ def begin(kit_address: int, table_address: int) -> None:
     kit_at(kit_address).stale = 0
 
 
-@njit(**COMPILED)
+@kernel
 def follow(kit_address: int, which: int, value: float) -> None:
     """Follow the change of one of the instrument's values."""
     kit = kit_at(kit_address)
@@ -45,11 +93,11 @@ def follow(kit_address: int, which: int, value: float) -> None:
         if which == FOLLOWED[number]:
             kit.values[number] = value
             kit.stale = 1
-            for key in range(KEYS):
-                kit.keys[key].stale |= MOVES[number]
+            for key in kit.keys:
+                key.stale |= MOVES[number]
 
 
-@njit(**COMPILED)
+@kernel
 def prepare(kit_address: int, table_address: int, player_address: int) -> None:
     """Prepare the drums that are struck or heard in the next quantum: they follow changed values."""
     kit, player = kit_at(kit_address), player_at(player_address)
@@ -59,8 +107,7 @@ def prepare(kit_address: int, table_address: int, player_address: int) -> None:
         _strike(kit_address, table_address, player.events[taken % of.EVENTS])
     for place in range(player.queued):
         _strike(kit_address, table_address, player.queue[place])
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         key, voice = note.key, note.voices[0]
         if note.state == of.RINGS and voice != 0:
             moved = kit.keys[key].stale & PLACES_MOVED
@@ -68,19 +115,19 @@ def prepare(kit_address: int, table_address: int, player_address: int) -> None:
                 _update(kit_address, table_address, key)
 
 
-@njit(**COMPILED)
+@kernel
 def _bessels(kit_address: int) -> np.ndarray:
     kit = kit_at(kit_address)
-    return matrix(reals(kit_address), kit.bessels, kit.steps, kit.columns)
+    return shaped(reals(kit_address), kit.bessels, (kit.steps, kit.columns))
 
 
-@njit(**COMPILED)
+@kernel
 def _strike(kit_address: int, table_address: int, event: Event) -> None:
     if event.kind == of.NOTE_ON:
         _update(kit_address, table_address, event.key)
 
 
-@njit(**COMPILED)
+@kernel
 def _possible(drum: np.ndarray) -> bool:
     """Return True if `DrumParameters` would take the drum, as far as knobs and tuning change it."""
     for value in range(1, drums.X):
@@ -90,7 +137,7 @@ def _possible(drum: np.ndarray) -> bool:
     return drum[drums.THICKNESS] <= (length if drum[drums.SHAPE] == drums.BAR else min(length, width)) / 10
 
 
-@njit(**COMPILED)
+@kernel
 def _update(kit_address: int, table_address: int, key: int) -> None:
     """Write the block of a key that is stale."""
     kit = kit_at(kit_address)
@@ -101,7 +148,7 @@ def _update(kit_address: int, table_address: int, key: int) -> None:
     if stale == 0 or kit_key.drum == 0:
         return
     struck, tuned = kit_drum_at(kit_address + 8 * kit_key.drum), kit_key.tuned
-    modal = matrix(memory, kit.found + key * ROWS * capacity, ROWS, capacity)
+    modal = shaped(memory, kit.found + key * ROWS * capacity, (ROWS, capacity))
     work = part(memory, kit.work, 4 * kit.most + ORDERS)
     if stale & MODES_MOVED:
         for value in range(DRUM):
@@ -111,7 +158,7 @@ def _update(kit_address: int, table_address: int, key: int) -> None:
         kit_key.modes = 0
         if _possible(tuned):
             air = part(memory, struck.air, 2 * struck.low * struck.terms).reshape(2, struck.low, struck.terms)
-            around = matrix(memory, struck.around, SURFACE, struck.listed), air, struck.reach
+            around = shaped(memory, struck.around, (SURFACE, struck.listed)), air, struck.reach
             drums.tune(tuned, kit_key.ratio, around, work, modal)
             if _possible(tuned):
                 kit_key.modes = drums.modes(tuned, around, kit.highest_hz, of.MOST_DRUM_MODES, work, modal)

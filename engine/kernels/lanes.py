@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.mixer_records import MOST_EARS
 
 # mypy: disable-error-code="no-untyped-def"
@@ -28,22 +28,24 @@ EARS = 9  # the weights of each
 ROWS = EARS + MOST_EARS
 BLOCK = ROWS * LANES
 
+EAR_COUNTS = (0, 1, 2, 4)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+ONES = ir.Constant(_VECTOR, [1.0] * LANES)
 _WHOLE, _LANE = ir.IntType(64), ir.IntType(32)
 
 
-@njit(**COMPILED)
+@kernel
 def place(number: int) -> int:
     """Slot of the first row of the mode with this number, from the first block on; rows are LANES apart."""
     return number // LANES * BLOCK + number % LANES
 
 
-@njit(**COMPILED)
+@kernel
 def blocks_of(modes: int) -> int:
     return (modes + LANES - 1) // LANES
 
 
-@njit(**COMPILED)
+@kernel
 def slots(modes: int) -> int:
     """Room for the blocks of so many modes in two groups, wherever the memory begins."""
     return (blocks_of(modes) + 2) * BLOCK
@@ -88,6 +90,32 @@ class _Blocks:
         slot = self.builder.add(self._place, _WHOLE(which * LANES))
         return self.builder.bitcast(self.builder.gep(self._data, [slot]), _VECTOR.as_pointer())
 
+    def sweep(self, first, blocks, ears: int, linear=None, squared=None) -> None:
+        """Turn blocks, unless they are only to be summed, and add what they give: see `_sweep`."""
+        builder = self.builder
+        with cgutils.for_range(builder, blocks) as loop:
+            self.begin(first, loop.index)
+            x, ratio = self.row(X), self.row(RATIO)
+            if linear is not None:
+                share = builder.fsub(linear, builder.fmul(ratio, squared))
+                y = builder.fadd(self.row(Y), builder.fmul(builder.fmul(self.row(KICK), share), x))
+                cosine, sine = self.row(COSINE), self.row(SINE)
+                self.set_row(Y, builder.fadd(builder.fmul(sine, x), builder.fmul(cosine, y)))
+                x = builder.fsub(builder.fmul(cosine, x), builder.fmul(sine, y))
+                self.set_row(X, x)
+            self.stretch(x, ratio)
+            lifted = builder.fmul(self.row(SEEN), x) if ears else x
+            for ear in range(ears):
+                weight = self.row(EARS + ear)
+                self.add(2 + 2 * ear, weight, x)
+                self.add(3 + 2 * ear, weight, lifted)
+
+    def stretch(self, x, ratio) -> None:
+        """Add what modes stretch the string by to the first two sums."""
+        stretch = self.builder.fmul(self.row(STRETCH), self.builder.fmul(x, x))
+        self.add(0, stretch, ONES)
+        self.add(1, stretch, ratio)
+
     def add(self, which: int, one, other) -> None:
         """Add a product to a sum."""
         product = self.builder.fmul(one, other)
@@ -109,96 +137,47 @@ class _Blocks:
         return scalars
 
 
-def _sweep(turns: bool, ears: int):
+def _sweep(turns: bool):
     """The kick of the common tension and the turn to the next node, or only the sums at the present one.
 
-    Returns a function of `near` blocks, which ears hear, and the `far` ones behind them. It gives Σ η² A x² and
-    Σ η² κ r x² at the node where they are then. It writes two sums for each ear to `heard`: that of the weights, and
-    that of the weights times κ p.
+    Returns a function of `near` blocks, which 0, 1, 2 or 4 ears hear, and the `far` ones behind them; of S (1 - 2R)
+    and S². It gives Σ η² A x² and Σ η² κ r x² at the node where they are then. It writes two sums for each ear to
+    `heard`: that of the weights, and that of the weights times κ p. Each number is taken by itself, so that all stay
+    in registers.
     """
 
     @intrinsic
-    def sweep(typing_context, memory, first, near, far, linear, squared, at_points):
+    def sweep(typing_context, memory, first, near, far, ears, linear, squared, at_points):
         def generate(context, builder, signature, arguments):
-            code = _Blocks(context, builder, signature.args[0], arguments[0], 2 + 2 * ears)
-            first, near, far = arguments[1:4]
-            linear, squared = (code.spread(ear) for ear in arguments[4:6])
-            ones = ir.Constant(_VECTOR, [1.0] * LANES)
+            first, near, far, ears = arguments[1:5]
             behind = builder.add(first, builder.mul(near, _WHOLE(BLOCK)))
-            for begin, blocks, hearing in ((first, near, ears), (behind, far, 0)):
-                with cgutils.for_range(builder, blocks) as loop:
-                    code.begin(begin, loop.index)
-                    x, ratio = code.row(X), code.row(RATIO)
-                    if turns:
-                        share = builder.fsub(linear, builder.fmul(ratio, squared))
-                        y = builder.fadd(code.row(Y), builder.fmul(builder.fmul(code.row(KICK), share), x))
-                        cosine, sine = code.row(COSINE), code.row(SINE)
-                        code.set_row(Y, builder.fadd(builder.fmul(sine, x), builder.fmul(cosine, y)))
-                        x = builder.fsub(builder.fmul(cosine, x), builder.fmul(sine, y))
-                        code.set_row(X, x)
-                    stretch = builder.fmul(code.row(STRETCH), builder.fmul(x, x))
-                    code.add(0, stretch, ones)
-                    code.add(1, stretch, ratio)
-                    lifted = builder.fmul(code.row(SEEN), x) if hearing else x
-                    for ear in range(hearing):
-                        weight = code.row(EARS + ear)
-                        code.add(2 + 2 * ear, weight, x)
-                        code.add(3 + 2 * ear, weight, lifted)
-            stretch, second, *ear_sums = code.totals()
-            data = context.make_array(signature.args[6])(context, builder, arguments[6]).data
-            for slot, total in enumerate(ear_sums):
-                builder.store(total, builder.gep(data, [_WHOLE(slot)]))
-            return context.make_tuple(builder, signature.return_type, (stretch, second))
+            felt = [cgutils.alloca_once(builder, ir.DoubleType()) for _ in range(2)]
+            heard = context.make_array(signature.args[7])(context, builder, arguments[7]).data
+            for count in EAR_COUNTS:
+                with builder.if_then(builder.icmp_signed("==", ears, _WHOLE(count))):
+                    code = _Blocks(context, builder, signature.args[0], arguments[0], 2 + 2 * count)
+                    shares = [code.spread(share) for share in arguments[5:7]] if turns else []
+                    code.sweep(first, near, count, *shares)
+                    code.sweep(behind, far, 0, *shares)
+                    for slot, total in enumerate(code.totals()):
+                        place = felt[slot] if slot < 2 else builder.gep(heard, [_WHOLE(slot - 2)])
+                        builder.store(total, place)
+            return context.make_tuple(builder, signature.return_type, [builder.load(total) for total in felt])
 
-        return types.UniTuple(types.float64, 2)(memory, first, near, far, linear, squared, at_points), generate
+        return types.UniTuple(types.float64, 2)(memory, first, near, far, ears, linear, squared, at_points), generate
 
     return sweep
 
 
-_sum, _sum_1, _sum_2, _sum_4 = (_sweep(False, ears) for ears in (0, 1, 2, 4))
-_turn, _turn_1, _turn_2, _turn_4 = (_sweep(True, ears) for ears in (0, 1, 2, 4))
+turn, _sum = (_sweep(turns) for turns in (True, False))
 
 
-@njit(inline="always", **COMPILED)
-def turn(
-    memory: np.ndarray,
-    first: int,
-    near: int,
-    far: int,
-    ears: int,
-    linear: float,
-    squared: float,
-    at_points: np.ndarray,
-) -> tuple[float, float]:
-    """Kick and turn blocks; return their sums at the next node, as `_sweep` says.
-
-    It takes each number by itself, so that all stay in registers.
-
-    Args:
-        ears: 0, 1, 2 or 4, that hear the near blocks.
-        linear, squared: S (1 - 2R) and S².
-    """
-    if ears == 0:
-        return _turn(memory, first, near, far, linear, squared, at_points)
-    if ears == 1:
-        return _turn_1(memory, first, near, far, linear, squared, at_points)
-    if ears == 2:
-        return _turn_2(memory, first, near, far, linear, squared, at_points)
-    return _turn_4(memory, first, near, far, linear, squared, at_points)
-
-
-@njit(inline="always", **COMPILED)
+@inlined
 def add_up(
     memory: np.ndarray, first: int, near: int, far: int, ears: int, at_points: np.ndarray
 ) -> tuple[float, float]:
     """The sums of blocks as they are, as `turn`."""
-    if ears == 0:
-        return _sum(memory, first, near, far, 0.0, 0.0, at_points)
-    if ears == 1:
-        return _sum_1(memory, first, near, far, 0.0, 0.0, at_points)
-    if ears == 2:
-        return _sum_2(memory, first, near, far, 0.0, 0.0, at_points)
-    return _sum_4(memory, first, near, far, 0.0, 0.0, at_points)
+    return _sum(memory, first, near, far, ears, 0.0, 0.0, at_points)
 
 
 @intrinsic
@@ -207,12 +186,11 @@ def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
 
     def generate(context, builder, signature, arguments):
         code = _Blocks(context, builder, signature.args[0], arguments[0], 2)
-        ones = ir.Constant(_VECTOR, [1.0] * LANES)
         with cgutils.for_range(builder, arguments[2]) as loop:
             code.begin(arguments[1], loop.index)
             x, y = code.row(X), code.row(Y)
             size = builder.fadd(builder.fmul(x, x), builder.fmul(y, y))
-            code.add(0, size, ones)
+            code.add(0, size, ONES)
             code.add(1, size, code.row(SQUARE))
         return context.make_tuple(builder, signature.return_type, code.totals())
 
@@ -229,7 +207,7 @@ def felt(typing_context, memory, blocks, modes, parts):
             code.begin(arguments[2], loop.index)
             part.begin(arguments[3], loop.index, PRESSED * LANES)
             moved = builder.fmul(part.row(0), code.row(X))
-            code.add(0, moved, ir.Constant(_VECTOR, [1.0] * LANES))
+            code.add(0, moved, ONES)
             code.add(1, moved, code.row(SEEN))
         return context.make_tuple(builder, signature.return_type, code.totals())
 
@@ -255,9 +233,7 @@ def press(typing_context, memory, blocks, modes, parts, force):
             x, y = (builder.fadd(code.row(axis), builder.fmul(part.row(1 + axis), force)) for axis in (X, Y))
             code.set_row(X, x)
             code.set_row(Y, y)
-            stretch = builder.fmul(code.row(STRETCH), builder.fmul(x, x))
-            code.add(0, stretch, ir.Constant(_VECTOR, [1.0] * LANES))
-            code.add(1, stretch, code.row(RATIO))
+            code.stretch(x, code.row(RATIO))
         return context.make_tuple(builder, signature.return_type, code.totals())
 
     return types.UniTuple(types.float64, 2)(memory, blocks, modes, parts, force), generate
@@ -266,32 +242,28 @@ def press(typing_context, memory, blocks, modes, parts, force):
 PARTS, PART_BLOCKS = 3, 12  # rows of parts in a bridge: of y and x in its motion, and of that in y; of so many blocks
 
 
-def _meet(strings: int):
-    """The bridge that strings share takes from each what its modes have in it, block by block.
+@intrinsic
+def meet(typing_context, memory, blocks, strings, modes, parts):
+    """Let the bridge that 1, 2 or 3 strings share take from each what its modes have in it, block by block.
 
-    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES), each by
-    itself. So all stay in registers.
+    `modes` and `parts` are three first slots each, of their modes and of their parts (PARTS, PART_BLOCKS, LANES).
     """
 
-    @intrinsic
-    def meet(typing_context, memory, blocks, one, other, third, of_one, of_other, of_third):
-        def generate(context, builder, signature, arguments):
-            codes = [_Blocks(context, builder, signature.args[0], arguments[0], 0) for _ in range(2 * strings)]
-            pairs = list(zip(codes[:strings], arguments[2:], codes[strings:], arguments[5:], strict=False))
-            with cgutils.for_range(builder, arguments[1]) as loop:
-                moved = ir.Constant(_VECTOR, [0.0] * LANES)
-                for code, modes, part, parts in pairs:
-                    code.begin(modes, loop.index)
-                    part.begin(parts, loop.index, LANES)
-                    moved = builder.fadd(moved, builder.fmul(part.row(0), code.row(Y)))
-                    moved = builder.fadd(moved, builder.fmul(part.row(PART_BLOCKS), code.row(X)))
-                for code, _, part, _ in pairs:
-                    code.set_row(Y, builder.fsub(code.row(Y), builder.fmul(part.row(2 * PART_BLOCKS), moved)))
-            return context.get_dummy_value()
+    def generate(context, builder, signature, arguments):
+        first_modes, first_parts = (cgutils.unpack_tuple(builder, each, 3) for each in arguments[3:])
+        for count in (1, 2, 3):
+            with builder.if_then(builder.icmp_signed("==", arguments[2], _WHOLE(count))):
+                codes = [_Blocks(context, builder, signature.args[0], arguments[0], 0) for _ in range(2 * count)]
+                pairs = list(zip(codes[:count], first_modes, codes[count:], first_parts, strict=False))
+                with cgutils.for_range(builder, arguments[1]) as loop:
+                    moved = ir.Constant(_VECTOR, [0.0] * LANES)
+                    for code, modes, part, parts in pairs:
+                        code.begin(modes, loop.index)
+                        part.begin(parts, loop.index, LANES)
+                        moved = builder.fadd(moved, builder.fmul(part.row(0), code.row(Y)))
+                        moved = builder.fadd(moved, builder.fmul(part.row(PART_BLOCKS), code.row(X)))
+                    for code, _, part, _ in pairs:
+                        code.set_row(Y, builder.fsub(code.row(Y), builder.fmul(part.row(2 * PART_BLOCKS), moved)))
+        return context.get_dummy_value()
 
-        return types.void(memory, blocks, one, other, third, of_one, of_other, of_third), generate
-
-    return meet
-
-
-meet_1, meet_2, meet_3 = (_meet(strings) for strings in (1, 2, 3))
+    return types.void(memory, blocks, strings, modes, parts), generate

@@ -10,9 +10,7 @@ as in G. Luff, "Designing a straightforward limiter", Signalsmith Audio, 2022.
 
 from __future__ import annotations
 
-from numba import njit
-
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.mixer_records import Mixer
 
@@ -22,16 +20,14 @@ _SIDE = AHEAD // 2 + 1  # frames of either average
 STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
 
 
-@njit(**COMPILED)
+@kernel
 def limit(mixer: Mixer) -> None:
     """Take the mix, (QUANTUM, 2), and leave there what is `AHEAD` frames older, within ±`CEILING`.
 
     Where nothing within reach exceeds the ceiling, samples stay as they are.
     """
-    mix = mixer.mix[:]
-    waiting = mixer.waiting[:]
-    peaks = mixer.peaks[:]
-    gains = mixer.gains[:]
+    mix, waiting = mixer.mix[:], mixer.waiting[:]
+    peaks, gains = mixer.peaks[:], mixer.gains[:]
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
@@ -46,17 +42,13 @@ def limit(mixer: Mixer) -> None:
         peaks[frame], gains[frame] = peaks[QUANTUM + frame], gains[QUANTUM + frame]
 
 
-@njit(**COMPILED)
+@kernel
 def _reduce(mixer: Mixer) -> None:
-    mix = mixer.mix[:]
-    waiting = mixer.waiting[:]
-    peaks = mixer.peaks[:]
-    gains = mixer.gains[:]
-    level = mixer.limiter
-    release = mixer.release
-    reduction = mixer.reduction
+    mix, waiting = mixer.mix[:], mixer.waiting[:]
+    peaks, gains = mixer.peaks[:], mixer.gains[:]
+    level, reduction = mixer.limiter, mixer.reduction
     for frame in range(AHEAD, AHEAD + QUANTUM):
-        level *= release
+        level *= mixer.release
         for before in range(AHEAD + 1):
             level = max(level, peaks[frame - before])
         gains[frame] = min(1.0, CEILING / level)

@@ -15,10 +15,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 
 # BS.1770: the shelf and the high-pass as analogue filters of second order
 _SHELF_HZ = 1681.97
@@ -31,13 +30,13 @@ _TINY = 1e-30
 LOOKED_AT = 5  # keys of an instrument, whose peaks are known
 
 
-@njit(**COMPILED)
+@kernel
 def looked_at(low: int, high: int, number: int) -> int:
     """The key of a number among those whose peaks are known: evenly over the range."""
     return low + (2 * number * (high - low) + LOOKED_AT - 1) // (2 * (LOOKED_AT - 1))
 
 
-@njit(**COMPILED)
+@kernel
 def k_weight(hz: Any) -> Any:
     """The square of the gain of K-weighting at a frequency, or at each of an array."""
     gain = 10 ** (_SHELF_DB / 20)
@@ -49,7 +48,7 @@ def k_weight(hz: Any) -> Any:
     return above / below * squared**2 / ((high_pass - squared) ** 2 + high_pass * squared / _PASS_Q**2)
 
 
-@njit(**COMPILED)
+@kernel
 def _at(body: np.ndarray, which: int, place: float) -> float:
     """A row of a body's curves at a place of its grid."""
     left = int(place)
@@ -57,27 +56,27 @@ def _at(body: np.ndarray, which: int, place: float) -> float:
     return body[first] + (place - left) * (body[first + 1] - body[first])
 
 
-@njit(**COMPILED)
+@kernel
 def _place(omega: float) -> float:
     """The place of a frequency on the grid of a body's curves."""
     place = of.BODY_STEPS * math.log2(max(omega / (2 * math.pi * of.BODY_LOWEST_HZ), 1.0))
     return min(place, of.BODY_POINTS - 1.001)
 
 
-@njit(**COMPILED)
+@kernel
 def _noise(body: np.ndarray, mix: float) -> float:
     """The power of noise through strings and body together; the sound is divided by its root."""
     return (1 - mix) ** 2 + 2 * mix * (1 - mix) * body[of.BODY_CROSS] + mix * mix
 
 
-@njit(**COMPILED)
+@kernel
 def _power(body: np.ndarray, mix: float, place: float) -> float:
     """The square of the body's gain, before that division."""
     alike = 2 * mix * (1 - mix) * _at(body, of.BODY_REAL, place)
     return max((1 - mix) ** 2 + alike + mix * mix * _at(body, of.BODY_POWER, place), 0.0)
 
 
-@njit(**COMPILED)
+@kernel
 def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: float) -> float:
     """The factor that brings a sound at the reference velocity to the wanted level; 1 where it is silent.
 
@@ -99,13 +98,9 @@ def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: floa
     return 10 ** (min(max(of.WANTED_DB - 10 * math.log10(total), of.GAIN_RANGE_DB[0]), of.GAIN_RANGE_DB[1]) / 20)
 
 
-@njit(**COMPILED)
+@kernel
 def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: float, least: float) -> float:
-    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it.
-
-    Args:
-        body, mix: as of `gain`.
-    """
+    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it."""
     x, y = of.SOUND_X * modes, of.SOUND_Y * modes
     noise, onset = 1.0, 0.0
     if mix > 0.0:
@@ -146,7 +141,7 @@ def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: flo
     return max(struck, _highest(sound, modes, frames))
 
 
-@njit(**COMPILED)
+@kernel
 def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
     """The highest of both channels' samples, of modes that turn from step to step."""
     left, right = sound[of.SOUND_LEFT * modes :][:modes], sound[of.SOUND_RIGHT * modes :][:modes]
@@ -165,7 +160,7 @@ def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
     return highest
 
 
-@njit(**COMPILED)
+@kernel
 def limit(highest: float) -> float:
     """The factor that lowers a peak to the highest one; 1 where it is not above."""
     most = 10 ** (of.HIGHEST_PEAK_DB / 20)

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import from_dtype, njit, types
+from numba import from_dtype, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from engine.kernels import mixer_records, records, voice_records
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -63,19 +63,7 @@ def _at(number: Any):
     return memory
 
 
-_reals, _wholes = _at(types.float64), _at(types.int64)
-
-
-@njit(**COMPILED)
-def reals(address: int) -> np.ndarray:
-    """The memory at an address (int64) as real numbers, of no stated length."""
-    return _reals(address)
-
-
-@njit(**COMPILED)
-def wholes(address: int) -> np.ndarray:
-    """The same as whole numbers."""
-    return _wholes(address)
+reals, wholes = _at(types.float64), _at(types.int64)  # of no stated length
 
 
 def record_at(dtype: np.dtype[np.void]) -> Any:
@@ -149,22 +137,10 @@ def part(typing_context: Any, memory: Any, first: Any, count: Any):
     return memory(memory, types.int64, types.int64), generate
 
 
-@njit(**COMPILED)
+@kernel
 def behind(record: Any, slot: int, count: int) -> np.ndarray:
     """The real numbers, as many as `count`, from a slot of a record that they follow, counted from its beginning."""
-    return part(_reals(address_of(record)), slot, count)
-
-
-@intrinsic
-def matrix(typing_context: Any, memory: Any, first: Any, rows: Any, columns: Any):
-    """The same as an array (rows, columns)."""
-    kind = types.Array(memory.dtype, 2, "C", readonly=not memory.mutable)
-
-    def generate(context, builder, signature, arguments):
-        data = context.make_array(memory)(context, builder, arguments[0]).data
-        return _array(context, builder, kind, builder.gep(data, [arguments[1]]), arguments[2:])
-
-    return kind(memory, types.int64, types.int64, types.int64), generate
+    return part(reals(address_of(record)), slot, count)
 
 
 @intrinsic
@@ -180,7 +156,7 @@ def shaped(typing_context: Any, memory: Any, first: Any, shape: Any):
     return kind(memory, types.int64, types.UniTuple(types.intp, len(shape))), generate
 
 
-@njit(**COMPILED)
+@kernel
 def publish(slots: np.ndarray, slot: int, whole: int) -> None:
     """Write a whole number into one of the slots, int64 (n,), after all that was written before.
 
@@ -191,7 +167,7 @@ def publish(slots: np.ndarray, slot: int, whole: int) -> None:
     fence()
 
 
-@njit(**COMPILED)
+@kernel
 def mixed(number: int) -> int:
     """A number with all bits mixed (splitmix64): noise, the same for the same numbers."""
     bits = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)

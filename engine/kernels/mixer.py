@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, types
 
 from engine.kernels import courses
 from engine.kernels import voice_records as at
 from engine.kernels.amplifier import amplify
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import COMPILED, inlined, kernel
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.contact import sound
 from engine.kernels.convolver import convolve
@@ -23,7 +23,7 @@ from engine.kernels.memory import address_of, fence, mixer_at, voice_at
 from engine.kernels.mixer_records import CAUSE_DEVICE, LARGEST, MOST_VOICES, RING, Mixer
 from engine.kernels.playing.events import play
 from engine.kernels.sympathy import sympathise
-from engine.kernels.voice import add, note_gap, take_over
+from engine.kernels.voice import note_gap, take_over
 
 TONE_HZ = 440.0
 TONE_LEVEL = 0.1
@@ -31,12 +31,10 @@ TONE_FADE_S = 0.020
 UNDERFLOW = 4  # PortAudio's flag
 
 
-@njit(**COMPILED)
+@kernel
 def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
     """The next frames, float32 (frames * channels,)."""
-    channels = mixer.channels
-    mix = mixer.mix[:]
-    done = 0
+    channels, mix, done = mixer.channels, mixer.mix[:], 0
     while done < frames:
         if mixer.left == 0:
             _quantum(mixer, now_s)
@@ -45,23 +43,18 @@ def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
         count = min(frames - done, mixer.left)
         for frame in range(count):
             left, right = mix[begin + frame, 0], mix[begin + frame, 1]
-            if channels == 1:
-                out[done + frame] = 0.5 * (left + right)
-            else:
-                out[(done + frame) * channels] = left
-                out[(done + frame) * channels + 1] = right
-                for channel in range(2, channels):
-                    out[(done + frame) * channels + channel] = 0.0
+            place = (done + frame) * channels
+            out[place] = left if channels > 1 else 0.5 * (left + right)
+            for channel in range(1, channels):
+                out[place + channel] = right if channel == 1 else 0.0
         mixer.left -= count
         mixer.frames += count
         done += count
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def _quantum(mixer: Mixer, now_s: float) -> None:
-    here = address_of(mixer)
-    player = mixer.player
-    before = mixer.player_before
+    here, player, before = address_of(mixer), mixer.player, mixer.player_before
     mixer.mix[:] = 0.0
     _take_up(mixer)
     fence()
@@ -89,7 +82,7 @@ def _quantum(mixer: Mixer, now_s: float) -> None:
     _finish(mixer)
 
 
-@njit(**COMPILED)
+@kernel
 def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
     """Add the next quantum of an instrument's voices (1), or of all others (0), to the mix."""
     kept = 0
@@ -97,7 +90,7 @@ def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
         address = mixer.voices[place]
         voice = voice_at(address)
         if voice.of_instrument == of_instrument:
-            state = courses.add(mixer, place, given_s) if voice.course != 0 else add(voice, mixer, given_s)
+            state = courses.add(mixer, place, given_s)
             fence()
             voice.state = state  # one that is over may be freed from here on
             if state != at.SOUNDING and state != at.WAITING:
@@ -108,7 +101,7 @@ def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
     mixer.active = kept
 
 
-@njit(**COMPILED)
+@kernel
 def _take_up(mixer: Mixer) -> None:
     """Voices that were handed over; beyond the last place they are refused, and over."""
     pushed = mixer.pushed
@@ -124,16 +117,13 @@ def _take_up(mixer: Mixer) -> None:
         mixer.taken += 1
 
 
-@njit(**COMPILED)
+@kernel
 def _finish(mixer: Mixer) -> None:
     """Volume, test tone, limiter and meter."""
-    mix = mixer.mix[:]
-    volume = mixer.volume
-    wanted = mixer.wanted_volume
-    smoothing = mixer.smoothing
+    mix, volume, wanted = mixer.mix[:], mixer.volume, mixer.wanted_volume
     for frame in range(QUANTUM):
         if volume != wanted:
-            volume = wanted + (volume - wanted) * smoothing
+            volume = wanted + (volume - wanted) * mixer.smoothing
             if abs(volume - wanted) < 1e-7:
                 volume = wanted
         left, right = mix[frame, 0] * volume, mix[frame, 1] * volume
@@ -169,15 +159,11 @@ def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped
     """PaStreamCallback; `user` is the mixer."""
     mixer = mixer_at(user)
     clock = carray(times, (3,), np.float64)
-    now_s = clock[1]
-    dac_s = clock[2]
-    count = np.int64(frames)
-    sounding = mixer.active > 0
-    length_s = count / mixer.rate_hz
-    missed_s = dac_s - mixer.dac_s - length_s
+    now_s, dac_s, count = clock[1], clock[2], np.int64(frames)
+    missed_s = dac_s - mixer.dac_s - count / mixer.rate_hz
     if flags & UNDERFLOW and mixer.calls > 0:
         mixer.underflows += 1
-        if sounding:
+        if mixer.active > 0:
             note_gap(mixer, mixer.frames, 1000 * max(missed_s, 0.0), CAUSE_DEVICE)
     mixer.now_s, mixer.dac_s = now_s, dac_s
     mixer.calls += 1

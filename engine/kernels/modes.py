@@ -10,63 +10,67 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.fields import slots
-from engine.kernels.memory import address_of, behind, fence, matrix, reals, wish_at
+from engine.kernels.memory import behind, fence, shaped, wish_at
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import VOICE, WEIGHT_ROWS, WISH, Voice
 
 TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
-BEHIND_VOICE, BEHIND_WISH = slots(VOICE), slots(WISH)
+BEHIND_VOICE, BEHIND_WISH = slots(at.VOICE), slots(at.WISH)
 
 
-@njit(**COMPILED)
-def weights(voice: Voice, which: int, point: int, part: int) -> np.ndarray:
+@kernel
+def weights(voice: at.Voice, which: int, point: int, part: int) -> np.ndarray:
     """The weights (modes,) of a set, at a point, of the real (0) or imaginary (1) parts."""
     return behind(voice, BEHIND_VOICE + ((which * 2 + point) * 2 + part) * voice.modes, voice.modes)
 
 
-@njit(**COMPILED)
-def rows(voice: Voice, first: int, count: int) -> np.ndarray:
+@kernel
+def rows(voice: at.Voice, first: int, count: int) -> np.ndarray:
     """Rows of a voice, (count * modes,), one after the other."""
-    return behind(voice, BEHIND_VOICE + (WEIGHT_ROWS + first) * voice.modes, count * voice.modes)
+    return behind(voice, BEHIND_VOICE + (at.WEIGHT_ROWS + first) * voice.modes, count * voice.modes)
 
 
-@njit(**COMPILED)
-def row(voice: Voice, which: int) -> np.ndarray:
+@kernel
+def row(voice: at.Voice, which: int) -> np.ndarray:
     """The row (modes,) of that number of a voice."""
     return rows(voice, which, 1)
 
 
-@njit(**COMPILED)
-def table(voice: Voice, first: int, count: int) -> np.ndarray:
+@inlined
+def motion(voice: at.Voice) -> tuple[np.ndarray, np.ndarray]:
+    """The two rows that move: amplitude and speed, or x and y."""
+    return row(voice, 0), row(voice, 1)
+
+
+@kernel
+def table(voice: at.Voice, first: int, count: int) -> np.ndarray:
     """The same as an array (count, modes)."""
-    return matrix(reals(address_of(voice)), BEHIND_VOICE + (WEIGHT_ROWS + first) * voice.modes, count, voice.modes)
+    return shaped(rows(voice, first, count), 0, (count, voice.modes))
 
 
-@njit(**COMPILED)
-def following(voice: Voice) -> np.ndarray:
+@kernel
+def following(voice: at.Voice) -> np.ndarray:
     """The values that follow from modes of latents with one tension, (7, modes): see `kernels.tension.prepare`."""
     return table(voice, at.FOLLOWING, 7)
 
 
-@njit(**COMPILED)
+@kernel
 def wished_rows(address: int, modes: int) -> np.ndarray:
     """The rows of the modes that are wished for, (RESONATOR_ROWS * modes,), one after the other."""
     return behind(wish_at(address), BEHIND_WISH, at.RESONATOR_ROWS * modes)
 
 
-@njit(**COMPILED)
-def gliding(voice: Voice) -> bool:
+@kernel
+def gliding(voice: at.Voice) -> bool:
     """Return True if the voice's modes are still to change."""
     return voice.resonator != voice.current_modes or voice.glide > 0
 
 
-@njit(**COMPILED)
-def glide(voice: Voice) -> None:
+@kernel
+def glide(voice: at.Voice) -> None:
     """A step towards the modes that it is to have."""
     wanted = voice.resonator
     if wanted != voice.current_modes:
@@ -80,20 +84,22 @@ def glide(voice: Voice) -> None:
     voice.glide = left - 1
 
 
-@njit(**COMPILED)
+@kernel
 def damped(omega_squared: float, sigma: float) -> float:
     """√(ω² - σ²); a mode that would no longer swing swings slowly."""
     return math.sqrt(max(omega_squared - sigma * sigma, 0.01 * omega_squared))
 
 
-@njit(**COMPILED)
-def run_up(voice: Voice, seconds: float) -> None:
-    """Advance amplitudes and speeds of a voice that has not begun by so long.
+@kernel
+def eased(share: float) -> float:
+    """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
+    return share * share * (3 - 2 * share)
 
-    Each mode moves alone, at rest's tension.
-    """
-    q = row(voice, 0)
-    v = row(voice, 1)
+
+@kernel
+def run_up(voice: at.Voice, seconds: float) -> None:
+    """Advance a voice that has not begun by so long; each mode moves alone, at rest's tension."""
+    q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas, lost = row(voice, at.SIGMA), row(voice, at.BRIDGE)
     for m in range(voice.modes):
@@ -102,7 +108,7 @@ def run_up(voice: Voice, seconds: float) -> None:
         q[m], v[m] = qq * q[m] + qv * v[m], vq * q[m] + vv * v[m]
 
 
-@njit(**COMPILED)
+@kernel
 def rest_silent(q: np.ndarray, v: np.ndarray, squares: np.ndarray, moving: int, silence: float) -> tuple[int, float]:
     """Lay the highest modes to rest whose amplitude is below a share of that of all.
 
@@ -120,7 +126,7 @@ def rest_silent(q: np.ndarray, v: np.ndarray, squares: np.ndarray, moving: int, 
     return moving, total
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def turn(
     q: np.ndarray,
     v: np.ndarray,
@@ -146,13 +152,12 @@ def turn(
     return stretch
 
 
-@njit(**COMPILED)
-def rest_above(voice: Voice, rate: float) -> int:
+@kernel
+def rest_above(voice: at.Voice, rate: float) -> int:
     """Lay modes to rest that lie too high for the rate; the highest of the others."""
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas = row(voice, at.SIGMA)
-    first = row(voice, 0)
-    second = row(voice, 1)
+    first, second = motion(voice)
     last = voice.modes - 1
     while last > 0 and damped(squares[last], sigmas[last]) > TOO_HIGH * rate:
         last -= 1

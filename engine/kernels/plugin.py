@@ -6,10 +6,10 @@ They are compiled for other systems too (`app.export.plugin.objects`), so nothin
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit, types
+from numba import carray, types
 
 from engine.kernels import amplifier, contact, convolver, kit, mixer, prepared, sympathy
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import convolver_at as record_of_convolver
 from engine.kernels.memory import mixer_at as record_of_mixer
 from engine.kernels.memory import pointer
@@ -29,24 +29,16 @@ BEGIN_CONVOLVER = types.void(ADDRESS, types.float64, COUNT)
 DRIVE = types.void(ADDRESS, types.float64, types.float64, types.float64)
 
 
-@njit(**COMPILED)
+@kernel
 def render(mixer_at: int, frames: int, out_at: int) -> None:
     """The next frames of a mixer, float32 (frames, 2)."""
     mixer.render(record_of_mixer(mixer_at), frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
 
 
-@njit(**COMPILED)
-def begin(player_at: int) -> None:
-    """Put the wheels and pedals of a new player at rest."""
-    events.begin(player_at)
-
-
-@njit(**COMPILED)
-def play(player_at: int, mixer_at: int) -> None:
-    """Play the events that are due before the mixer's next quantum."""
-    events.play(player_at, mixer_at)
-
-
+begin = events.begin
+play = events.play
+sound = contact.sound
+sympathise = sympathy.sympathise
 kit_begin = kit.begin
 kit_follow = kit.follow
 kit_prepare = kit.prepare
@@ -56,25 +48,13 @@ weigh = prepared.weigh
 mix = prepared.mix
 
 
-@njit(**COMPILED)
+@kernel
 def begin_convolver(convolver_at: int, rate_hz: float, frames: int) -> None:
     """Set up a convolver's memory, which is all 0, for responses of so many frames."""
     convolver.begin(record_of_convolver(convolver_at), rate_hz, frames)
 
 
-@njit(**COMPILED)
+@kernel
 def drive(mixer_at: int, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer."""
     amplifier.drive(record_of_mixer(mixer_at), drive_db, tone_db, level_db)
-
-
-@njit(**COMPILED)
-def sound(player_at: int, mixer_at: int) -> None:
-    """Add what touches strings and drums to the quantum."""
-    contact.sound(player_at, mixer_at)
-
-
-@njit(**COMPILED)
-def sympathise(player_at: int, mixer_at: int) -> None:
-    """Add what rings along to the quantum."""
-    sympathy.sympathise(player_at, mixer_at)

@@ -6,13 +6,12 @@ A plug-in computes the responses beside the sound, and mixes their partitions a 
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
 from engine.kernels import bodies, responses, rooms
 from engine.kernels import constants as of
 from engine.kernels.bodies import given_frames, rung_frames
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.convolver import BEHIND_IMPULSE, convolver_slots, partition, partitioned_slots
 from engine.kernels.fields import slots
 from engine.kernels.fourier import COSINES, ROWS, SINES, fill_circle, power_of_two
@@ -21,12 +20,12 @@ from engine.kernels.memory import (
     behind,
     body_at,
     impulse_at,
-    matrix,
     needs_at,
     part,
     pointer,
     reals,
     responses_at,
+    shaped,
 )
 from engine.kernels.mixer_records import WINDOW
 from engine.kernels.records import BODY, RESPONSES, Body
@@ -37,7 +36,7 @@ CURVES_HZ = float(of.CURVES_HZ)
 BODY_SLOTS, RESPONSES_SLOTS = slots(BODY), slots(RESPONSES)
 
 
-@njit(**COMPILED)
+@kernel
 def body_frames(body: Body, size: float, rate_hz: float) -> int:
     """The length of a body's response; 0: there is none."""
     if body.frames > 0:
@@ -45,14 +44,14 @@ def body_frames(body: Body, size: float, rate_hz: float) -> int:
     return rung_frames(body.seconds, size, rate_hz) if body.modes > 0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def longest(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The length of body and room in series."""
     room = resampled_frames(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz)
     return room + max(body_frames(body, size, rate_hz) - 1, 0)
 
 
-@njit(**COMPILED)
+@kernel
 def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The width of a work space for responses of a body and a room."""
     slots = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
@@ -65,7 +64,7 @@ def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     return power_of_two(slots)
 
 
-@njit(**COMPILED)
+@kernel
 def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_address: int) -> None:
     """Write the memory that `prepare` needs."""
     body, needs = body_at(body_address), needs_at(needs_address)
@@ -77,7 +76,7 @@ def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_
     needs.convolver = convolver_slots(needs.frames)
 
 
-@njit(**COMPILED)
+@kernel
 def prepare(
     body_address: int,
     noise_address: int,
@@ -99,17 +98,17 @@ def prepare(
     prepared = responses_at(found_address)
     memory = reals(memory_address)
     wide = width(body, rate_hz, size, t60_s)
-    work = matrix(memory, 0, ROWS, wide)
+    work = shaped(memory, 0, (ROWS, wide))
     fill_circle(work[COSINES], work[SINES])
     body_part, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
     first, room_frames = ROWS * wide, rooms.room_frames(t60_s)
-    one = matrix(memory, first, body_part, 2)
-    other = matrix(memory, first + 2 * body_part, frames - max(body_part - 1, 0), 2)
-    both = matrix(memory, first + 2 * (frames + 1), frames, 2)
+    one = shaped(memory, first, (body_part, 2))
+    other = shaped(memory, first + 2 * body_part, (frames - max(body_part - 1, 0), 2))
+    both = shaped(memory, first + 2 * (frames + 1), (frames, 2))
     scratch = part(memory, first + 2 * (2 * frames + 1), 1 << 40)
     if body_part > 0:
         _respond(work, body, size, rate_hz, scratch, one)
-    noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), matrix(scratch, 0, room_frames, 2)
+    noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), shaped(scratch, 0, (room_frames, 2))
     for frame in range(room_frames):
         made[frame, 0], made[frame, 1] = NOISE_UNIT * noise[frame, 0], NOISE_UNIT * noise[frame, 1]
     rooms.respond(work, t60_s, made, rate_hz, other)
@@ -124,61 +123,52 @@ def prepare(
             partition(work, response, frames, impulse_at(place))
     curve_frames = body_frames(body, size, CURVES_HZ)
     if curve_frames > 0:
-        response = matrix(scratch, 2 * body.frames, curve_frames, 2)
+        response = shaped(scratch, 2 * body.frames, (curve_frames, 2))
         _respond(work, body, size, CURVES_HZ, scratch, response)
         responses.curves(work, response, prepared.curves)
 
 
-@njit(**COMPILED)
+@kernel
 def _respond(
     work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, response: np.ndarray
 ) -> None:
     """Write the response of a body; `scratch` has room for the samples of one that is given."""
     if body.frames == 0:
-        modes = matrix(reals(address_of(body)), BODY_SLOTS, 4, body.modes)
+        modes = shaped(reals(address_of(body)), BODY_SLOTS, (4, body.modes))
         bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, response)
         return
     samples = carray(pointer(address_of(body) + 8 * BODY_SLOTS), (body.frames, body.channels), np.int32)
-    recorded = matrix(scratch, 0, body.frames, 2)
+    recorded = shaped(scratch, 0, (body.frames, 2))
     for frame in range(body.frames):
-        recorded[frame, 0], recorded[frame, 1] = (
-            body.unit * samples[frame, 0],
-            body.unit * samples[frame, body.channels - 1],
-        )
+        recorded[frame, 0] = body.unit * samples[frame, 0]
+        recorded[frame, 1] = body.unit * samples[frame, body.channels - 1]
     bodies.respond_as(work, recorded, body.hz, size, rate_hz, response)
 
 
-@njit(**COMPILED)
+@kernel
 def weigh(found_address: int, body_mix: float, room_mix: float, weights_address: int) -> None:
     """Write the weights (4,) of a mix."""
     responses.weigh(responses_at(found_address).powers, body_mix, room_mix, part(reals(weights_address), 0, 4))
 
 
-@njit(**COMPILED)
+@kernel
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
     """Write some slots of a mix of responses as the convolver reads it."""
     prepared = responses_at(found_address)
-    weights = reals(weights_address)
-    into = reals(into_address)
+    weights, into = reals(weights_address), reals(into_address)
     end = min(first + count, prepared.part)
     for place in range(first, end):
         into[place] = 0.0
     for number in range(3):
-        weight, response = (
-            weights[1 + number],
-            behind(prepared, RESPONSES_SLOTS + number * prepared.part, prepared.part),
-        )
+        weight, part_slot = weights[1 + number], RESPONSES_SLOTS + number * prepared.part
+        response = behind(prepared, part_slot, prepared.part)
         if weight != 0.0:
             for place in range(first, end):
                 into[place] += weight * response[place]
     for channel in range(2):  # a single sample at the beginning: the same at all frequencies
-        begin = BEHIND_IMPULSE + channel * 2 * (QUANTUM + 1)
-        for place in range(max(begin, first), min(begin + QUANTUM + 1, end)):
-            into[place] += weights[0] / (2 * QUANTUM)
+        begin = BEHIND_IMPULSE + channel * 2 * (of.QUANTUM + 1)
+        for place in range(max(begin, first), min(begin + of.QUANTUM + 1, end)):
+            into[place] += weights[0] / (2 * of.QUANTUM)
     if first == 0:
-        counts, room = (
-            into.view(np.int64),
-            behind(prepared, RESPONSES_SLOTS + prepared.part, prepared.part).view(np.int64),
-        )
-        for place in range(BEHIND_IMPULSE):
-            counts[place] = room[place]
+        room = behind(prepared, RESPONSES_SLOTS + prepared.part, BEHIND_IMPULSE)
+        into.view(np.int64)[:BEHIND_IMPULSE] = room.view(np.int64)

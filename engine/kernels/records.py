@@ -164,7 +164,6 @@ ATTACK = np.dtype(
 CHANNEL = np.dtype(
     [
         ("bend", R),
-        ("pedal", W),
         ("slide", W),  # 0 … 127; -1: never moved
         ("range_semitones", R),  # below 0: the instrument's
         ("plays", W),  # whether a note has come
@@ -173,7 +172,7 @@ CHANNEL = np.dtype(
         ("mute", R),  # 0 … 1
         ("slide_time", W),  # 0 … 127
         ("held", W, of.KEYS),  # whether each key is down
-        ("switches", W, of.SWITCHES),  # whether each footswitch is down
+        ("switches", W, of.SWITCHES),  # whether the pedal and each footswitch are down
         ("volume", W),  # 0 … 127
         ("expression", W),  # 0 … 127
         ("coarse_tuning", W),  # semitones
@@ -362,10 +361,7 @@ BODY = np.dtype(
 
 RESPONSES = np.dtype(
     [
-        (
-            "part",
-            W,
-        ),  # slots of each of the three responses that follow, as the convolver reads them: body, room, both
+        ("part", W),  # slots of each response that follows, as the convolver reads them: body, room, both
         ("powers", R, (4, 4, 4)),  # see `responses.all_powers`
         ("curves", R, of.BODY_SLOTS),  # of the body, for the loudness of keys
     ]

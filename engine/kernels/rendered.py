@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import behind, fence, pointer
 from engine.kernels.voice_records import RenderedProgram, Voice
 
 
-@njit(**COMPILED)
+@kernel
 def generate(voice: Voice, program: RenderedProgram, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM). Where the samples are not there yet it fades out, stands still, and counts."""
-    taps = program.taps
-    phases = program.phases
-    ratio = program.ratio
+    taps, phases, ratio = program.taps, program.phases, program.ratio
     table = behind(program, program.filter, 2 * taps * (phases + 2))
-    points = voice.points
+    points, looped = voice.points, voice.looped
     ready, length = voice.ready, voice.length
     fence()
     samples = carray(pointer(voice.samples), (length * points,), np.float32)
     first = voice.generated
     # of this quantum and the next, so that there is a quantum in which to fade out
     needed = int((first + 2 * QUANTUM) * ratio) + taps + 1
-    dry = ready < length and ready < needed
-    was_dry = voice.dry
+    dry, was_dry = ready < length and ready < needed, voice.dry
     if dry and (was_dry or first == 0):
         voice.dry = 1
         out[:] = 0.0
         voice.starved += QUANTUM
         return
-    looped = voice.looped
     for frame in range(QUANTUM):
         place = float((first + frame) % length) if looped else (first + frame) * ratio
         before = int(place)

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.fourier import ONE, SPARE, TWO, power_of_two, row, silence, turn, turn_any
-from engine.kernels.memory import matrix
+from engine.kernels.memory import shaped
 
 FADE_SHARE = 0.1  # of a response that is cut: its end
 FINEST_RATIO = 1000  # denominators of ratios of rates: within a cent
@@ -23,7 +22,7 @@ _LEAST = 1e-30
 _DRY, _BODY, _ROOM, _BOTH = range(4)  # parts of a mix; the three cases that something is heard of are numbered alike
 
 
-@njit(**COMPILED)
+@kernel
 def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
     """Write a response into a signal of the work space, with silence behind it."""
     re, im = row(work, signal, size), row(work, signal + 1, size)
@@ -33,14 +32,14 @@ def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
     silence(work, signal, frames, size)
 
 
-@njit(**COMPILED)
+@kernel
 def analyse(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
     """Write the spectrum of a response, as one signal, into the work space."""
     load(work, signal, sound, size)
     turn(work, signal, signal + 1, size)
 
 
-@njit(**COMPILED)
+@kernel
 def store(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
     """Transform a spectrum back into a response."""
     turn(work, signal + 1, signal, size)
@@ -49,7 +48,7 @@ def store(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
         sound[frame, 0], sound[frame, 1] = re[frame] / size, im[frame] / size
 
 
-@njit(**COMPILED)
+@kernel
 def _channels(work: np.ndarray, signal: int, k: int, size: int) -> tuple[complex, complex]:
     """The spectra of left and right at a frequency, from that of both as one signal."""
     re = row(work, signal, size)
@@ -60,7 +59,7 @@ def _channels(work: np.ndarray, signal: int, k: int, size: int) -> tuple[complex
     return left, right
 
 
-@njit(**COMPILED)
+@kernel
 def high_pass(work: np.ndarray, sound: np.ndarray, edge_hz: float, rate_hz: float) -> None:
     """Filter a response through Butterworth's high-pass of second order."""
     size = power_of_two(2 * len(sound))
@@ -84,7 +83,7 @@ def high_pass(work: np.ndarray, sound: np.ndarray, edge_hz: float, rate_hz: floa
     store(work, ONE, sound, size)
 
 
-@njit(**COMPILED)
+@kernel
 def fade(sound: np.ndarray) -> None:
     """Fade the end of a response to nothing."""
     frames = max(1, int(np.rint(FADE_SHARE * len(sound))))
@@ -94,7 +93,7 @@ def fade(sound: np.ndarray) -> None:
         sound[len(sound) - frames + frame, 1] *= share
 
 
-@njit(**COMPILED)
+@kernel
 def fraction(ratio: float) -> tuple[int, int]:
     """The nearest fraction with a denominator up to FINEST_RATIO, of a ratio in 2⁻¹⁰ … 2¹⁰.
 
@@ -102,10 +101,8 @@ def fraction(ratio: float) -> tuple[int, int]:
     """
     denominator = 1 << 54
     over, under = int(ratio * denominator), denominator
-    before = 0
-    before_under = 1
-    last = 1
-    last_under = 0
+    before, before_under = 0, 1
+    last, last_under = 1, 0
     while under > 0:
         whole = over // under
         next_under = before_under + whole * last_under
@@ -122,13 +119,13 @@ def fraction(ratio: float) -> tuple[int, int]:
     return before + more * last, before_under + more * last_under
 
 
-@njit(**COMPILED)
+@kernel
 def resampled_frames(frames: int, from_hz: float, to_hz: float) -> int:
     """The length of a response at another rate."""
     return frames if from_hz == to_hz else max(1, int(np.rint(frames * to_hz / from_hz)))
 
 
-@njit(**COMPILED)
+@kernel
 def _periods(frames: int, from_hz: float, to_hz: float) -> tuple[int, int]:
     """The frames at either rate of a response with at least as much silence, which are whole at both."""
     numerator, denominator = fraction(to_hz / from_hz)
@@ -136,7 +133,7 @@ def _periods(frames: int, from_hz: float, to_hz: float) -> tuple[int, int]:
     return 2 * units * denominator, 2 * units * numerator
 
 
-@njit(**COMPILED)
+@kernel
 def work_size(frames: int, from_hz: float, to_hz: float) -> int:
     """The width of a work space for a response, and for bringing it to another rate."""
     resampled = resampled_frames(frames, from_hz, to_hz)
@@ -144,19 +141,18 @@ def work_size(frames: int, from_hz: float, to_hz: float) -> int:
     return size if from_hz == to_hz else max(size, _resampling_size(frames, resampled, from_hz, to_hz))
 
 
-@njit(**COMPILED)
+@kernel
 def _resampling_size(frames: int, resampled: int, from_hz: float, to_hz: float) -> int:
     """The size of transforms between a response and its frequencies at either rate."""
     padded, made = _periods(frames, from_hz, to_hz)
     return power_of_two(max(frames, resampled) + min(padded, made))
 
 
-@njit(**COMPILED)
+@kernel
 def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, resampled: np.ndarray) -> None:
-    """Write a response at another rate, by its Fourier series with as much silence: any ratio, in bounded time.
+    """Write a response at another rate, as far as there is room, by its Fourier series with as much silence.
 
-    Args:
-        found: its first frames, as many as there is room for.
+    It takes any ratio, in bounded time.
     """
     if from_hz == to_hz:
         for frame in range(len(resampled)):
@@ -176,7 +172,7 @@ def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, 
         resampled[frame, 0], resampled[frame, 1] = re[frame] / padded, -im[frame] / padded
 
 
-@njit(**COMPILED)
+@kernel
 def _measured(frames: int, rate_hz: float) -> tuple[int, int, int]:
     """The size of the transform that loudness is measured by, the first frequency of it that counts, and the last."""
     size = power_of_two(max(frames, int(rate_hz) // 4))
@@ -184,7 +180,7 @@ def _measured(frames: int, rate_hz: float) -> tuple[int, int, int]:
     return size, int(first), min(int(last), size // 2)
 
 
-@njit(**COMPILED)
+@kernel
 def level(work: np.ndarray, sound: np.ndarray, rate_hz: float) -> None:
     """Scale a response: noise of equal power in each octave keeps it, in the mean of both channels."""
     size, first, last = _measured(len(sound), rate_hz)
@@ -200,7 +196,7 @@ def level(work: np.ndarray, sound: np.ndarray, rate_hz: float) -> None:
         sound[frame, 1] *= factor
 
 
-@njit(**COMPILED)
+@kernel
 def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, shares: np.ndarray) -> None:
     """The power of noise through each part of a mix, and what each two have in common, (4, 4).
 
@@ -210,9 +206,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
     analyse(work, ONE, body, size)
     analyse(work, TWO, room, size)
     total = 0.0
-    for i in range(4):
-        for j in range(4):
-            shares[i, j] = 0.0
+    shares[:] = 0.0
     for k in range(first, last + 1):
         one, two = _channels(work, ONE, k, size), _channels(work, TWO, k, size)
         total += 2 / k
@@ -227,7 +221,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
             shares[i, j] /= total
 
 
-@njit(**COMPILED)
+@kernel
 def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarray) -> None:
     """Write the response of a body in a room, (frames + frames − 1, 2)."""
     size = power_of_two(len(both))
@@ -244,7 +238,7 @@ def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarra
     store(work, ONE, both, size)
 
 
-@njit(**COMPILED)
+@kernel
 def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, shares: np.ndarray) -> None:
     """Write `powers` of the cases that the body is heard, the room, and both, at their places of (4, 4, 4)."""
     powers(work, body, room[:0], rate_hz, shares[_BODY])
@@ -252,13 +246,9 @@ def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: fl
     powers(work, body, room, rate_hz, shares[_BOTH])
 
 
-@njit(**COMPILED)
+@kernel
 def weigh(cases: np.ndarray, body_mix: float, room_mix: float, weights: np.ndarray) -> None:
-    """Write the weights (4,) of the parts of a mix, with which pink noise keeps its level.
-
-    Args:
-        cases: as `all_powers` writes them.
-    """
+    """Write the weights (4,) of the parts of a mix, with which pink noise keeps its level, of `all_powers`."""
     weights[_DRY] = (1 - body_mix) * (1 - room_mix)
     weights[_BODY] = body_mix * (1 - room_mix)
     weights[_ROOM] = (1 - body_mix) * room_mix
@@ -272,13 +262,13 @@ def weigh(cases: np.ndarray, body_mix: float, room_mix: float, weights: np.ndarr
         weights[part] /= max(math.sqrt(power), _LEAST)
 
 
-@njit(**COMPILED)
+@kernel
 def curves_size(frames: int) -> int:
     """The size of the spectrum that a body's curves are taken from."""
     return power_of_two(max(frames, int(np.rint(of.CURVES_HZ / CURVES_FINEST_HZ))))
 
 
-@njit(**COMPILED)
+@kernel
 def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
     """Write the effect of a body on the loudness of keys (BODY_SLOTS,), see `constants`.
 
@@ -287,7 +277,7 @@ def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
     Args:
         body: its response at CURVES_HZ.
     """
-    common = matrix(curve, 0, 4, 4)
+    common = shaped(curve, 0, (4, 4))
     powers(work, body, body[:0], float(of.CURVES_HZ), common)
     curve[of.BODY_CROSS] = common[_DRY, _BODY]
     left = right = highest = 0.0
@@ -319,7 +309,7 @@ def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
             curve[of.BODY_HEADER + which * of.BODY_POINTS + point] = mean
 
 
-@njit(**COMPILED)
+@kernel
 def _between(values: np.ndarray, place: float) -> float:
     """The value at a place between two: linear, and the last beyond."""
     if place >= len(values) - 1:

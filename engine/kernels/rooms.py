@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.fourier import ONE, TWO, power_of_two, row, silence, turn
 from engine.kernels.responses import fade, high_pass, level, load, resample, store
 
@@ -22,13 +21,13 @@ BANDS_T60 = (1.15, 1.0, 0.8, 0.4)  # times the T60
 SUBSONIC_HZ = 40.0
 
 
-@njit(**COMPILED)
+@kernel
 def room_frames(t60_s: float) -> int:
     """The length of a room's response at ROOM_HZ."""
     return int(np.rint(t60_s * of.ROOM_HZ))
 
 
-@njit(**COMPILED)
+@kernel
 def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, sound: np.ndarray) -> None:
     """Write the response of a room.
 
@@ -54,14 +53,11 @@ def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, so
     level(work, sound, rate_hz)
 
 
-@njit(**COMPILED)
+@kernel
 def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> float:
     """Write the reflections of walls that reflect all, as signal ONE; the direct sound's way in m.
 
-    They start when the direct sound arrives as 1.
-
-    Args:
-        grown: the sides, times SIDES_M.
+    They start when the direct sound arrives as 1. `grown`: the sides, times SIDES_M.
     """
     square = 0.0
     for axis in range(3):
@@ -86,14 +82,14 @@ def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> flo
     return direct_m
 
 
-@njit(**COMPILED)
+@kernel
 def _apart(number: int, axis: int, furthest: int, grown: float) -> float:
     """The distance from listener to image along an axis in m; image number `2 furthest` is the source itself."""
     mirrored = -1.0 if number % 2 else 1.0
     return grown * SIDES_M[axis] * (2 * (number // 2 - furthest) + mirrored * SOURCE[axis] - LISTENER[axis])
 
 
-@njit(**COMPILED)
+@kernel
 def _add(sound: np.ndarray, place: float, height: float) -> None:
     """Add a sample between two frames."""
     before = int(place)
@@ -102,7 +98,7 @@ def _add(sound: np.ndarray, place: float, height: float) -> None:
         sound[before + 1] += (place - before) * height
 
 
-@njit(**COMPILED)
+@kernel
 def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
     """Give each band its own decay; bands overlap, and are the whole together."""
     size = power_of_two(2 * len(sound))
@@ -127,7 +123,7 @@ def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
     store(work, TWO, sound, size)
 
 
-@njit(**COMPILED)
+@kernel
 def _share(band: int, hz: float) -> float:
     """The part that a band has in a frequency: linear over octaves between its neighbours, all beyond the ends."""
     before, after = BANDS_HZ[max(band - 1, 0)], BANDS_HZ[min(band + 1, len(BANDS_HZ) - 1)]

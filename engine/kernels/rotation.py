@@ -19,9 +19,4 @@ def rotation(sigma: Number, omega: Number, time_s: Number) -> tuple[Number, Numb
     cosine = np.cos(omega * time_s)
     sine = np.sin(omega * time_s) / omega
     stiffness = sigma * sigma + omega * omega
-    return (
-        decay * (cosine + sigma * sine),
-        decay * sine,
-        -decay * stiffness * sine,
-        decay * (cosine - sigma * sine),
-    )
+    return (decay * (cosine + sigma * sine), decay * sine, -decay * stiffness * sine, decay * (cosine - sigma * sine))

@@ -227,9 +227,7 @@ def loss(string: Row, partial: Mode, air: float, friction: float, bending: float
 
 
 def mute(string: Row, modes: int, pairs: int, share: float, out: Out) -> None:
-    """Add to σ the losses to a hand that lies on the string from the bridge on.
-
-    `out` is as of `rows`.
+    """Add to σ, of `out` as of `rows`, the losses to a hand that lies on the string from the bridge on.
 
     A resistance per length from 0 to a gives σ_n = σ∞ (1 - sin(2ηa) / 2ηa): low partials ring on, high ones stop.
     Length and σ∞ are estimates: E2 of a guitar then falls by 60 dB in half a second, its tenth partial in 20 ms.
@@ -242,9 +240,7 @@ def mute(string: Row, modes: int, pairs: int, share: float, out: Out) -> None:
 
 
 def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
-    """Add to σ the losses to a finger that touches the string at 1/node of its length.
-
-    `out` is as of `rows`.
+    """Add to σ, of `out` as of `rows`, the losses to a finger that touches the string at 1/node of its length.
 
     A resistance R at x gives σ_n = R/(ρAℓ) sin²(nπx/ℓ), to first order (Rayleigh, Theory of Sound, § 102): partials
     with a node there stay as they are. With R = √(TρA) the largest is 2 f₁.
@@ -256,17 +252,14 @@ def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
         out[modes + mode] = max(before, min(before + largest * moves, most))
 
 
-def stand(string: Row, modes: int, pairs: int, conductance: float, second_conductance: float, out: Out) -> None:
-    """Move what pairs lose to a bridge that others share from σ to the place behind η².
+def stand(string: Row, modes: int, pairs: int, conductance: tuple[float, float], out: Out) -> None:
+    """Move what pairs lose to a bridge from σ of `out`, as of `rows`, to the place behind η²: what is shared of it.
 
-    `out` is as of `rows`.
-
-    Args:
-        conductance, second_conductance: of what is shared, in both directions; 0: nothing is.
+    `conductance`: of that, in both directions.
     """
     pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):
-        lost = pull * (second_conductance if direction_of(mode, pairs) == 1 else conductance)
+        lost = pull * conductance[direction_of(mode, pairs)]
         shared = min(lost, out[modes + mode]) if mode < 2 * pairs else 0.0
         out[modes + mode] -= shared
         out[4 * modes + mode] = shared
@@ -287,33 +280,29 @@ def rows(
     modes: int,
     pairs: int,
     detuning: float,
-    conductance: float,
-    second_conductance: float,
-    air: float,
-    friction: float,
-    bending: float,
+    conductance: tuple[float, float],
+    losses: tuple[float, float, float],
     out: Out,
 ) -> None:
     """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,).
 
-    Of two polarisations, see `engine.values.string.Polarisations`. Each value is a number by itself, since tables,
-    notes and Python's classes hold them in records of different kinds.
+    Of two polarisations, see `engine.values.string.Polarisations`.
 
     Args:
         pairs: partials of two modes, whose ω² are in the ratio `detuning`; 0: there is one direction.
-        conductance, second_conductance: of the bridge in both directions, in s/kg.
-        air, friction, bending: losses by mode, 0 for none.
+        conductance: of the bridge in both directions, in s/kg.
+        losses: by mode, to the air, by friction and by bending; 0 for none.
     """
     pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):
-        partial, second = partial_of(mode, pairs), direction_of(mode, pairs) == 1
+        partial, direction = partial_of(mode, pairs), direction_of(mode, pairs)
         squared = omega_squared(string, partial)
-        if second:
+        if direction == 1:
             squared *= detuning
         sigma = decay_rate(string, partial)
-        added = pull * (second_conductance if second else conductance)
-        if air + friction + bending > 0.0:
-            added += loss(string, partial, air, friction, bending)
+        added = pull * conductance[direction]
+        if losses[0] + losses[1] + losses[2] > 0.0:
+            added += loss(string, partial, *losses)
         out[mode] = squared
         out[modes + mode] = min(sigma + added, of.HIGHEST_SIGMA * math.sqrt(squared)) if added > 0.0 else sigma
         out[2 * modes + mode] = coupling(string, partial)

@@ -19,15 +19,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import strings
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import mixer_at, player_at, table_at
 from engine.kernels.mixer_records import LARGEST
-from engine.kernels.playing.keys import string_of
+from engine.kernels.playing.keys import pitch_of, string_of
 from engine.kernels.records import Player, Sympathy, Table
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
@@ -36,23 +34,16 @@ STOPS = 0.98  # what is left in a frame of a string that is touched
 NOTHING = 1e-12  # of full scale: below it all rest
 
 
-@njit(**COMPILED)
+@kernel
 def tune(player: Player, table: Table) -> None:
     """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
     string_row, bank = player.own, player.sympathy
-    count = 0
-    rate_hz = player.rate_hz
+    count, rate_hz = 0, player.rate_hz
     everyone = table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
-        if everyone:
-            inside = table.low <= number <= table.high
-            key = number
-            string = -1
-            pitch_hz = table.pitches_hz[number] if inside else 0.0
-        else:
-            key = int(table.open[number].note)
-            string = number
-            pitch_hz = table.open[number].pitch_hz
+        key, string, pitch_hz = number, -1, pitch_of(table, number)
+        if not everyone:
+            key, string, pitch_hz = int(table.open[number].note), number, table.open[number].pitch_hz
         if not pitch_hz > 0.0:
             continue
         modes, _ = string_of(player, table, key, string, pitch_hz, False, string_row)
@@ -74,14 +65,12 @@ def tune(player: Player, table: Table) -> None:
     bank.partials = count
 
 
-@njit(**COMPILED)
+@kernel
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
     count = bank.partials
-    x = bank.x[:count]
-    y = bank.y[:count]
-    cosine = bank.cosine[:count]
-    sine = bank.sine[:count]
+    x, y = bank.x[:count], bank.y[:count]
+    cosine, sine = bank.cosine[:count], bank.sine[:count]
     gain, played = bank.gain[:count], bank.played[:count]
     for frame in range(len(force)):
         driven, total = force[frame], 0.0
@@ -98,7 +87,7 @@ def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     return largest
 
 
-@njit(**COMPILED)
+@kernel
 def sympathise(player_address: int, mixer_address: int) -> None:
     """Add what strings ring that are not played to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
@@ -113,12 +102,9 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     count = bank.partials
     if count == 0:
         return
-    mixer = mixer_at(mixer_address)
-    mix = mixer.mix[:]
-    force = mixer.scratch[:QUANTUM]
-    out = mixer.scratch[QUANTUM : 2 * QUANTUM]
-    driven = False
-    for frame in range(QUANTUM):
+    mixer, driven = mixer_at(mixer_address), False
+    mix, force, out = mixer.mix[:], mixer.scratch[: of.QUANTUM], mixer.scratch[of.QUANTUM : 2 * of.QUANTUM]
+    for frame in range(of.QUANTUM):
         mono = 0.5 * (mix[frame, 0] + mix[frame, 1])
         force[frame] = mono if abs(mono) < LARGEST else 0.0  # also where it is not a number
         driven = driven or abs(mono) > NOTHING
@@ -132,15 +118,12 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if bank.stops > 0:
         bank.stops -= 1
         played[:] = 1.0
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.state != of.RINGS:
             continue
-        string = note.key
-        if not everyone:
-            string = note.string
-            if string < 0:
-                string = strings.chosen(table.open, table.strings, note.key)
+        string = note.key if everyone else note.string
+        if string < 0:
+            string = strings.chosen(table.open, table.strings, note.key)
         for n in range(count):
             if bank.owner[n] == string:
                 played[n] = 1.0
@@ -150,6 +133,6 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if not rings and not driven:
         bank.x[:count] = 0.0
         bank.y[:count] = 0.0
-    for frame in range(QUANTUM):
+    for frame in range(of.QUANTUM):
         mix[frame, 0] += out[frame]
         mix[frame, 1] += out[frame]

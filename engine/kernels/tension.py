@@ -9,33 +9,27 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import lanes
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import slots
 from engine.kernels.memory import behind
-from engine.kernels.modes import damped, following, glide, gliding, rest_above, rest_silent, row, weights
+from engine.kernels.modes import damped, following, glide, gliding, motion, rest_above, rest_silent, row, weights
 from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
-from engine.kernels.voice_records import TENSION_PROGRAM, TensionProgram, Voice
 
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 FEWER_QUANTA = 64  # from one look at whether a string's modes that still move need so many nodes to the next
-BEHIND_PROGRAM = slots(TENSION_PROGRAM)
+BEHIND_PROGRAM = slots(at.TENSION_PROGRAM)
 
 
-@njit(**COMPILED)
+@kernel
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
-
-    Args:
-        rows: (7, modes), see `advance`.
-    """
+    """Copy modes, in this order, with their rows, see `advance`, into blocks of `kernels.lanes`; the rest is 0."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
         if number < len(order):
@@ -48,15 +42,27 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
                 memory[slot + row * lanes.LANES] = 0.0
 
 
-@njit(**COMPILED)
-def load_weights(point_weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
-    """Copy the weights of one ear into the blocks that `load` fills."""
-    for number in range(lanes.LANES * lanes.blocks_of(len(order))):
-        slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
-        memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
+@kernel
+def order_of(voice: at.Voice) -> np.ndarray:
+    """The numbers of a voice's modes, in the order in which they are taken."""
+    return row(voice, at.ORDER).view(np.int64)
 
 
-@njit(**COMPILED)
+@kernel
+def take(voice: at.Voice, order: np.ndarray, fading: bool, audible: bool, memory: np.ndarray, first: int) -> int:
+    """Copy modes of a voice, in this order, and their weights into blocks; return the ears that hear them."""
+    x, y = motion(voice)
+    load(x, y, following(voice), order, memory, first)
+    ears = (2 if fading else 1) * voice.points if audible else 0
+    for ear in range(ears):
+        point_weights = weights(voice, ear // voice.points, ear % voice.points, 0)
+        for number in range(lanes.LANES * lanes.blocks_of(len(order))):
+            slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
+            memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
+    return ears
+
+
+@kernel
 def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
     """Copy modes back from their blocks."""
     for number in range(len(order)):
@@ -64,7 +70,7 @@ def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, fi
         x[order[number]], y[order[number]] = memory[slot], memory[slot + lanes.LANES]
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def node(
     memory: np.ndarray,
     first: int,
@@ -78,17 +84,15 @@ def node(
 ) -> tuple[float, float]:
     """The kick of the common tension and the turn to the next node, in place.
 
-    It leads from S and R here to those there. It takes each number by itself, so that all stay in registers.
-
     Args:
-        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.
+        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks there.
     """
     tension = min(sums[0] + rest[0], largest_stretch)
     linear, squared = tension * (1 - 2 * (sums[1] + rest[1])), tension * tension
     return lanes.turn(memory, first, near, far, ears, linear, squared, at_points)
 
 
-@njit(**COMPILED)
+@kernel
 def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
     """Hold Σ ω² |z|² of blocks below the largest; return Σ |z|², and whether anything has changed."""
     total, energy = lanes.energies(memory, first, blocks)
@@ -108,7 +112,7 @@ def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> 
     return total, held
 
 
-@njit(**COMPILED)
+@kernel
 def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
     """Lay the highest modes to rest that are silent; those left."""
     while moving > 1:
@@ -123,7 +127,7 @@ def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: flo
     return moving
 
 
-@njit(**COMPILED)
+@kernel
 def advance(
     x: np.ndarray,
     y: np.ndarray,
@@ -174,13 +178,9 @@ def advance(
         save(x[string], y[string], order, memory, first)
 
 
-@njit(**COMPILED)
-def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
-    """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
-
-    Args:
-        kick: Σ η² k (q² + v²/ω²).
-    """
+@kernel
+def _nodes(voice: at.Voice, program: at.TensionProgram, kick: float) -> int:
+    """The nodes in a frame for the modes that move, as `KoopmanTension.step`; `kick`: Σ η² k (q² + v²/ω²)."""
     last = voice.moving - 1
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     first_rate = damped(squares[0], sigmas[0]) / program.node_phase
@@ -190,8 +190,8 @@ def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
     return (nodes + steps - 1) // steps * steps
 
 
-@njit(**COMPILED)
-def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
+@kernel
+def _needs_fewer_nodes(voice: at.Voice, program: at.TensionProgram) -> bool:
     """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
     if voice.steps == 1 or program.unheard > 0:
         return False
@@ -199,17 +199,15 @@ def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     if voice.refresh > 0:
         return False
     voice.refresh = FEWER_QUANTA
-    x = row(voice, 0)
-    y = row(voice, 1)
-    kick = 0.0
+    (x, y), kick = motion(voice), 0.0
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     for m in range(voice.moving):
         kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
     return _nodes(voice, program, kick) < voice.steps
 
 
-@njit(**COMPILED)
-def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
+@kernel
+def prepare(voice: at.Voice, program: at.TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
     """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
     n, rate = voice.modes, program.rate_hz
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
@@ -250,7 +248,7 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
     if drum or not voice.prepared:
         voice.refresh = 0 if drum else FEWER_QUANTA
     voice.decay = math.exp(-2 * slowest / rate)
-    order = row(voice, at.ORDER).view(np.int64)
+    order = order_of(voice)
     for m in range(n):
         order[m] = m
     voice.heard = voice.felt = voice.moving
@@ -259,32 +257,29 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
     voice.javari.give = 0.0
 
 
-@njit(**COMPILED)
-def _turn(voice: Voice, mode: int, sign: float) -> None:
+@kernel
+def _turn(voice: at.Voice, mode: int, sign: float) -> None:
     """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
 
     Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
     """
     if voice.nodes == 0:
         return
-    x = row(voice, 0)
-    y = row(voice, 1)
+    x, y = motion(voice)
     rows = following(voice)
     angle = voice.nodes * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice.stretched
     cosine, sine = math.cos(angle), sign * math.sin(angle)
     x[mode], y[mode] = cosine * x[mode] - sine * y[mode], sine * x[mode] + cosine * y[mode]
 
 
-@njit(**COMPILED)
-def _fall(voice: Voice) -> None:
+@kernel
+def _fall(voice: at.Voice) -> None:
     """Modes that rest because nobody hears or feels them decay to the present."""
     frames = voice.rested * QUANTUM
     if frames == 0:
         return
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    x, y = motion(voice)
+    rows, order = following(voice), order_of(voice)
     steps = voice.steps * frames // 2  # a quantum is even
     for place in range(voice.felt, voice.moving):
         m = order[place]
@@ -301,11 +296,11 @@ def _fall(voice: Voice) -> None:
     voice.rested = 0
 
 
-@njit(**COMPILED)
-def _wake(voice: Voice) -> None:
+@kernel
+def _wake(voice: at.Voice) -> None:
     """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    order = order_of(voice)
     if voice.felt < voice.moving:
         voice.refresh = 0
     for place in range(voice.felt, voice.moving):
@@ -313,25 +308,18 @@ def _wake(voice: Voice) -> None:
     voice.felt = voice.moving
 
 
-@njit(**COMPILED)
-def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray) -> None:
-    """Order the modes of a drum: those that are heard, others that stretch it, and those that rest.
+@kernel
+def _look(voice: at.Voice, program: at.TensionProgram, sets: int, scratch: np.ndarray) -> None:
+    """Order the modes of a drum: those that so many sets of weights hear, others that stretch it, those that rest.
 
-    The highest that are silent are laid to rest for good.
-
-    Args:
-        sets: of weights that hear it.
-        scratch: room for three rows (modes,).
+    The highest that are silent are laid to rest for good. The scratch has room for three rows (modes,).
     """
     _fall(voice)
     moving = voice.moving
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    sigmas = row(voice, at.SIGMA)
-    stretches, order = rows[3], row(voice, at.ORDER).view(np.int64)
-    sizes = scratch[:moving]
-    largest_shares = scratch[moving : 2 * moving]
+    x, y = motion(voice)
+    rows, sigmas = following(voice), row(voice, at.SIGMA)
+    stretches, order = rows[3], order_of(voice)
+    sizes, largest_shares = scratch[:moving], scratch[moving : 2 * moving]
     rested = scratch[2 * moving : 3 * moving]
     for place in range(moving):
         rested[order[place]] = 1.0 if place >= voice.felt else 0.0
@@ -382,7 +370,7 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
     voice.refresh = LOOKS_QUANTA
 
 
-@njit(**COMPILED)
+@kernel
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
     """Apply half of the kick that `node` begins with to y in place, forward or back."""
     first = second = 0.0
@@ -396,16 +384,15 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
         y[m] += sign * 0.5 * rows[2, m] * (linear - rows[4, m] * squared) * x[m]
 
 
-@njit(**COMPILED)
-def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
+@kernel
+def physical(voice: at.Voice, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     n = voice.modes
     _wake(voice)
-    x, y = row(voice, 0), row(voice, 1)
+    x, y = motion(voice)
     rows = following(voice)
     sigmas, stretches = row(voice, at.SIGMA), row(voice, at.STRETCH)
-    for m in range(n):
-        v[m] = y[m]
+    v[:] = y
     _half_kick(rows, x, voice.largest_stretch, v, 1.0)
     tension = 0.0  # S₀ of x = q (1 + κ p S₀), by Newton's method
     for _ in range(NEWTON_STEPS):
@@ -428,21 +415,16 @@ def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
         v[m] = v[m] * (1 + rows[5, m] * tension) + 2 * rows[5, m] * q[m] * moved
 
 
-@njit(**COMPILED)
-def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
+@kernel
+def set_out(voice: at.Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
-    As `KoopmanTension._set_out`.
-
-    Args:
-        bounded: the largest energy is there, and may only fall; otherwise it follows from the input.
+    As `KoopmanTension._set_out`. `bounded`: the largest energy is there, and may only fall; else it is set.
     """
     n = voice.modes
-    x, y = row(voice, 0), row(voice, 1)
-    rows = following(voice)
-    sigmas = row(voice, at.SIGMA)
-    couplings = row(voice, at.COUPLING)
-    stretches = row(voice, at.STRETCH)
+    x, y = motion(voice)
+    rows, sigmas = following(voice), row(voice, at.SIGMA)
+    couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
         omega, square = math.sqrt(rows[6, m]), q[m] * q[m]
@@ -468,15 +450,14 @@ def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     _half_kick(rows, x, voice.largest_stretch, y, -1.0)
 
 
-@njit(**COMPILED)
-def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
+@kernel
+def bring_up_to_date(voice: at.Voice, program: at.TensionProgram) -> None:
     """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
     n = voice.modes
     fewer = voice.prepared and _needs_fewer_nodes(voice, program)
     if voice.prepared and not gliding(voice) and not fewer:
         return
-    q = row(voice, at.PHYSICAL)
-    v = row(voice, at.PHYSICAL + 1)
+    q, v = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1)
     squares = following(voice)[6]
     if voice.prepared:
         physical(voice, q, v)
@@ -504,37 +485,27 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     voice.prepared = 1
 
 
-@njit(**COMPILED)
+@kernel
 def generate(
-    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
+    voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     bring_up_to_date(voice, program)
-    n = voice.modes
-    nodes = voice.steps
-    points = voice.points
-    sets, rests = 2 if fading else 1, program.unheard > 0
-    ears = sets * points if audible else 0
-    rest = (0.0, 0.0)
+    nodes, points = voice.steps, voice.points
+    rests, rest = program.unheard > 0, (0.0, 0.0)
     if not rests:
         voice.heard = voice.felt = voice.moving
     elif fading or voice.refresh == 0:
-        _look(voice, program, sets, scratch)
+        _look(voice, program, 2 if fading else 1, scratch)
     if rests:
         rest = (voice.rest_stretch, voice.rest_second)
-    x = row(voice, 0)
-    y = row(voice, 1)
-    rows = following(voice)
-    order = row(voice, at.ORDER).view(np.int64)
+    x, y = motion(voice)
+    order = order_of(voice)
     loud, quiet = order[: voice.heard], order[voice.heard : voice.felt]
-    first = lanes.aligned(scratch)
-    near = lanes.blocks_of(len(loud))
-    far = lanes.blocks_of(len(quiet))
-    ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
-    load(x, y, rows, loud, scratch, first)
-    load(x, y, rows, quiet, scratch, behind)
-    for ear in range(ears):
-        load_weights(weights(voice, ear // points, ear % points, 0), loud, scratch, first, ear)
+    first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
+    ear_sums, behind = scratch[first + lanes.slots(voice.modes) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
+    ears = take(voice, loud, fading, audible, scratch, first)
+    load(x, y, following(voice), quiet, scratch, behind)
     moving = len(loud)
     total = 0.0
     apart = 2 if points == 1 else 1

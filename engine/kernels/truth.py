@@ -8,18 +8,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
-from engine.kernels.modes import damped, glide, gliding, rest_above, rest_silent, row, table, turn, weights
+from engine.kernels.modes import damped, glide, gliding, motion, rest_above, rest_silent, row, table, turn, weights
 from engine.kernels.rotation import rotation
-from engine.kernels.voice_records import TruthProgram, Voice
 
 
-@njit(**COMPILED)
-def _sub_steps(voice: Voice, program: TruthProgram) -> int:
+@kernel
+def _sub_steps(voice: at.Voice, program: at.TruthProgram) -> int:
     """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
     n = voice.modes
     squares, couplings = row(voice, at.OMEGA_SQUARED), row(voice, at.COUPLING)
@@ -31,8 +29,8 @@ def _sub_steps(voice: Voice, program: TruthProgram) -> int:
     return count if steps == 0 else (count + steps - 1) // steps * steps
 
 
-@njit(**COMPILED)
-def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
+@kernel
+def _prepare(voice: at.Voice, program: at.TruthProgram, sub_steps: int) -> None:
     """The exact damped rotations between kicks, of half the palindrome."""
     n = voice.modes
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
@@ -48,8 +46,8 @@ def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
     voice.javari.give = 0.0
 
 
-@njit(**COMPILED)
-def set_up(voice: Voice, program: TruthProgram) -> int:
+@kernel
+def set_up(voice: at.Voice, program: at.TruthProgram) -> int:
     """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     changed = gliding(voice)
     if changed:
@@ -61,30 +59,14 @@ def set_up(voice: Voice, program: TruthProgram) -> int:
     return sub_steps
 
 
-@njit(**COMPILED)
-def advance(
-    voice: Voice,
-    program: TruthProgram,
-    sub_steps: int,
-    frame: int,
-    fading: bool,
-    audible: bool,
-    out: np.ndarray,
-) -> None:
-    """Advance by one frame of a quantum, after it is heard."""
-    hear(voice, program, frame, fading, audible, out)
-    ring(voice, program, sub_steps, max(sub_steps, 1))
-
-
-@njit(**COMPILED)
-def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
+@kernel
+def hear(voice: at.Voice, program: at.TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The output of a frame.
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
     a contact may wake them they are not.
     """
-    q = row(voice, 0)
-    v = row(voice, 1)
+    q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
     silence = program.silence if voice.javari.steps == 0 else 0.0
     moving = voice.moving
@@ -100,12 +82,11 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible:
         voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
-@njit(**COMPILED)
-def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
+@kernel
+def ring(voice: at.Voice, program: at.TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
     moving = voice.moving
-    q = row(voice, 0)
-    v = row(voice, 1)
+    q, v = motion(voice)
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     step_s = 1 / (max(sub_steps, 1) * program.rate_hz)
     for _ in range(count):
@@ -116,10 +97,11 @@ def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> Non
             stretch = turn(q, v, moving, table(voice, first, 4), kick, couplings, stretches)
 
 
-@njit(**COMPILED)
-def generate(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
+@kernel
+def generate(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     sub_steps = set_up(voice, program)
     for frame in range(QUANTUM):
-        advance(voice, program, sub_steps, frame, fading, audible, out)
+        hear(voice, program, frame, fading, audible, out)
+        ring(voice, program, sub_steps, max(sub_steps, 1))
     voice.generated += QUANTUM

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import bank, javari, rendered, tension, truth
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import (
     bank_program_at,
@@ -20,9 +19,8 @@ from engine.kernels.memory import (
     voice_at,
     wish_at,
 )
-from engine.kernels.mixer_records import CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, REACH, Mixer
-from engine.kernels.modes import row, weights
-from engine.kernels.voice_records import Voice
+from engine.kernels.mixer_records import CAUSE_RUNAWAY, GAPS, REACH, Mixer
+from engine.kernels.modes import eased, motion, row, weights
 
 MOVE_S = 0.020  # the fade to another listening point
 END_S = 0.020  # the fade of a voice that has become silent
@@ -30,8 +28,8 @@ FLUX_CURVES = 2.0  # e-folds up to which the flux is a curve: its series rises e
 WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 
-@njit(**COMPILED)
-def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
+@kernel
+def generate(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     kind = voice.kind
     if kind == at.RENDERED:
@@ -51,8 +49,8 @@ def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scra
         move_points(voice, audible, rate_hz, out)
 
 
-@njit(**COMPILED)
-def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
+@kernel
+def move_points(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
     """Fade what a quantum is at its points to what it is at others."""
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
     for point in range(voice.points):
@@ -63,62 +61,47 @@ def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) ->
     if voice.weights_faded >= frames or not audible:
         for point in range(2):
             for part in range(2):
-                present, following = weights(voice, 0, point, part), weights(voice, 1, point, part)
-                for mode in range(voice.modes):
-                    present[mode] = following[mode]
+                weights(voice, 0, point, part)[:] = weights(voice, 1, point, part)
             voice.bias[0, point] = voice.bias[1, point]
         voice.weights_faded = 0
         fence()
         voice.next_weights = 0
 
 
-@njit(**COMPILED)
-def _velocity(
-    voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
-) -> None:
-    """Generate the motion of `_generate`, differentiated; the voice is generated a quantum ahead for that."""
-    begins = is_first(voice)
-    for turn in range(2 if begins else 1):
-        _generate(voice, audible, rate_hz, out, scratch)
-        remember(voice, audible, begins and turn == 0, out)
-    differentiate(voice, out, taps)
-
-
-@njit(**COMPILED)
-def is_first(voice: Voice) -> bool:
+@kernel
+def is_first(voice: at.Voice) -> bool:
     """Return True if a voice is not yet ahead of what was heard of it."""
     return voice.generated == voice.frame
 
 
-@njit(**COMPILED)
-def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
+@kernel
+def remember(voice: at.Voice, audible: bool, first: bool, out: np.ndarray) -> None:
     """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `warm` has reached `WARMED`: at the pluck at once, else two quanta later.
     """
-    quantum = QUANTUM
     if first:
         voice.warm = 0
     voice.warm = min(voice.warm + 1, WARMED) if audible else 0
     for point in range(voice.points):
         past = voice.history[point]
-        for frame in range(2 * quantum):
-            past[frame] = past[frame + quantum]
+        for frame in range(2 * QUANTUM):
+            past[frame] = past[frame + QUANTUM]
         near = voice.nearness
-        for frame in range(quantum):
+        for frame in range(QUANTUM):
             moved = min(max(near * out[point, frame], -FLUX_CURVES), FLUX_CURVES)
             curved = 1.0 + moved * (0.5 + moved / 6)
-            past[2 * quantum + frame] = out[point, frame] * curved
+            past[2 * QUANTUM + frame] = out[point, frame] * curved
         if first and voice.frame == 0:
-            mirrored = 1 if voice.joins else quantum  # at rest before the pluck: the mirror of what follows
+            mirrored = 1 if voice.joins else QUANTUM  # at rest before the pluck: the mirror of what follows
             for frame in range(1, mirrored):
-                past[2 * quantum - frame] = past[2 * quantum + frame]
+                past[2 * QUANTUM - frame] = past[2 * QUANTUM + frame]
             voice.warm = WARMED - 1
 
 
-@njit(**COMPILED)
-def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
+@kernel
+def differentiate(voice: at.Voice, out: np.ndarray, taps: np.ndarray) -> None:
     """The velocity of the quantum before the latest, (2, QUANTUM) of `out`."""
     for point in range(voice.points):
         past = voice.history[point]
@@ -129,17 +112,15 @@ def differentiate(voice: Voice, out: np.ndarray, taps: np.ndarray) -> None:
             out[point, frame] = total
 
 
-@njit(**COMPILED)
-def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
+@kernel
+def take_over(voice: at.Voice, now: int, scratch: np.ndarray) -> None:
     """Take over the string of the voice before: stop its motion as this one begins, or add this pluck to it.
 
     One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
     the voice before that one, which is left as what is to be taken over.
     """
-    before = voice_at(voice.previous_voice)
-    stops = voice.stops_in
-    waits = before.state == at.WAITING
-    earlier = 0
+    before, stops = voice_at(voice.previous_voice), voice.stops_in
+    waits, earlier = before.state == at.WAITING, 0
     later = before.begin_at >= now + QUANTUM and before.joins == 0
     if waits and (later or stops > 0):
         _never_begin(before)
@@ -152,15 +133,15 @@ def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
     voice.previous_voice = earlier
 
 
-@njit(**COMPILED)
-def _never_begin(voice: Voice) -> None:
+@kernel
+def _never_begin(voice: at.Voice) -> None:
     """A voice that waits ends without a sound."""
     voice.gain = voice.gain_to = voice.wanted_gain = 0.0
     voice.release = 1
 
 
-@njit(**COMPILED)
-def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
+@kernel
+def _join(voice: at.Voice, before: at.Voice, now: int, scratch: np.ndarray) -> None:
     """The pluck is added to the motion of the voice before, which fades as this one begins.
 
     One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
@@ -177,9 +158,8 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
         if voice.kind == at.TENSION and rings:
             tension.physical(before, q, v)
         else:
-            q[:], v[:] = row(before, 0), row(before, 1)
-        amplitudes = row(voice, 0)
-        speeds = row(voice, 1)
+            q[:], v[:] = motion(before)
+        amplitudes, speeds = motion(voice)
         squares = row(voice, at.OMEGA_SQUARED)
         widest = 0.0
         for mode in range(min(n, m)):
@@ -198,8 +178,8 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
         voice.joins = joins
 
 
-@njit(**COMPILED)
-def _past(voice: Voice, before: Voice) -> None:
+@kernel
+def _past(voice: at.Voice, before: at.Voice) -> None:
     """Displacement before the pluck: the motion so far, and the string held where the pluck begins."""
     pulled = row(voice, 0)
     for point in range(voice.points):
@@ -211,14 +191,8 @@ def _past(voice: Voice, before: Voice) -> None:
             history[frame] = other[frame] + held
 
 
-@njit(**COMPILED)
-def _eased(share: float) -> float:
-    """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
-    return share * share * (3 - 2 * share)
-
-
-@njit(**COMPILED)
-def _look_at_wishes(voice: Voice, now: int) -> None:
+@kernel
+def _look_at_wishes(voice: at.Voice, now: int) -> None:
     """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     latest = voice.resonator
     address = voice.pending_modes if latest == 0 else wish_at(latest).next
@@ -231,37 +205,14 @@ def _look_at_wishes(voice: Voice, now: int) -> None:
         address = wish.next
 
 
-@njit(**COMPILED)
-def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
-    """Add the next quantum of a voice to the mix, (QUANTUM, 2). Return its state, which it leaves to the caller."""
-    state = begin(voice, mixer)
-    if state != at.SOUNDING:
-        return state
-    out = mixer.out[0]
-    scratch = mixer.scratch[:]
-    rate_hz = mixer.rate_hz
-    audible = is_heard(voice)
-    was_dry, generated = voice.dry, voice.generated
-    if voice.velocity:
-        _velocity(voice, audible, rate_hz, out, scratch, mixer.taps[:])
-    else:
-        _generate(voice, audible, rate_hz, out, scratch)
-    if voice.dry and not was_dry:
-        note_gap(mixer, mixer.frames, 0.0, CAUSE_STARVED)
-    return end(voice, mixer, now_s, out, voice.generated > generated)
-
-
-@njit(**COMPILED)
-def is_heard(voice: Voice) -> bool:
+@kernel
+def is_heard(voice: at.Voice) -> bool:
     return voice.gain != 0 or voice.gain_to != 0
 
 
-@njit(**COMPILED)
-def begin(voice: Voice, mixer: Mixer) -> int:
-    """Begin a voice's next quantum before it is generated.
-
-    Returns its state where none is: it waits, or is over.
-    """
+@kernel
+def begin(voice: at.Voice, mixer: Mixer) -> int:
+    """Begin a voice's next quantum before it is generated; return its state where none is: it waits, or is over."""
     mix, now = mixer.mix[:], mixer.frames
     if voice.state == at.WAITING:
         if voice.begin_at >= now + QUANTUM:
@@ -287,58 +238,48 @@ def begin(voice: Voice, mixer: Mixer) -> int:
     return at.SOUNDING
 
 
-@njit(**COMPILED)
-def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
-    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
-
-    Args:
-        moved: whether it was generated, else it stands still.
-    """
+@kernel
+def end(voice: at.Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
+    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state. One that is not `moved` stands still."""
     mix = mixer.mix[:]
     left_over = voice.left_over[:]
-    quantum = QUANTUM
-    now = mixer.frames
-    points = voice.points
-    late = voice.late
-    release = voice.release
+    points, late, release = voice.points, voice.late, voice.release
     audible = is_heard(voice)
     if audible and (not voice.velocity or voice.warm == WARMED):
         limit = voice.limit
         for point in range(points):
-            for frame in range(quantum):
+            for frame in range(QUANTUM):
                 if not abs(out[point, frame]) <= limit:  # also where it is not a number
                     note_gap(mixer, mixer.frames, 0.0, CAUSE_RUNAWAY)
                     return at.RUNAWAY
         first, attack = voice.frame, voice.attack
-        source = voice.gain_from
-        goal = voice.gain_to
-        done = voice.gain_done
-        length = voice.fade_frames
-        for frame in range(quantum):
+        source, goal = voice.gain_from, voice.gain_to
+        done, length = voice.gain_done, voice.fade_frames
+        for frame in range(QUANTUM):
             gain = goal
             if done + frame < length:
-                gain = source + (goal - source) * _eased((done + frame + 1) / length)
+                gain = source + (goal - source) * eased((done + frame + 1) / length)
             if first + frame < attack:
                 if voice.joins:
-                    gain *= _eased((first + frame + 1) / attack)
+                    gain *= eased((first + frame + 1) / attack)
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
             place = frame + late
-            if place < quantum:
+            if place < QUANTUM:
                 mix[place, 0] += gain * out[0, frame]
                 mix[place, 1] += gain * out[points - 1, frame]
             else:
-                left_over[place - quantum, 0] = gain * out[0, frame]
-                left_over[place - quantum, 1] = gain * out[points - 1, frame]
-        voice.gain_done = min(done + quantum, length)
+                left_over[place - QUANTUM, 0] = gain * out[0, frame]
+                left_over[place - QUANTUM, 1] = gain * out[points - 1, frame]
+        voice.gain_done = min(done + QUANTUM, length)
         voice.gain = goal
-        if done + quantum < length:
-            voice.gain = source + (goal - source) * _eased((done + quantum) / length)
+        if done + QUANTUM < length:
+            voice.gain = source + (goal - source) * eased((done + QUANTUM) / length)
     if moved:
         if voice.began_frame < 0:
-            voice.began_frame = now + late
+            voice.began_frame = mixer.frames + late
             voice.began_s = now_s
-        voice.frame += quantum
+        voice.frame += QUANTUM
     faded = voice.gain == 0 and voice.gain_to == 0 and late == 0
     if release > 0 and (not audible or faded):
         return at.OVER
@@ -347,7 +288,7 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
     return at.SOUNDING
 
 
-@njit(**COMPILED)
+@kernel
 def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
     """Note one more silence that nobody asked for."""
     gap = mixer.gaps[mixer.gap_count % GAPS]
@@ -358,8 +299,8 @@ def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
     mixer.gap_count += 1
 
 
-@njit(**COMPILED)
-def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
+@kernel
+def forward(voice: at.Voice, mixer: Mixer, frames: int) -> None:
     """Let a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
     quanta = (frames + QUANTUM // 2) // QUANTUM
     if voice.kind == at.RENDERED:  # there need not be samples yet
@@ -367,5 +308,5 @@ def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
         quanta = 0
     _look_at_wishes(voice, 0)
     for _ in range(quanta):
-        _generate(voice, False, mixer.rate_hz, mixer.out[0], mixer.scratch[:])
+        generate(voice, False, mixer.rate_hz, mixer.out[0], mixer.scratch[:])
     voice.frame = voice.generated

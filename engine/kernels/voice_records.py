@@ -28,15 +28,9 @@ LONGEST_S = 1e9  # of a voice that never ends
 BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 # A voice's state
-WAITING = 0
-SOUNDING = 1
-OVER = 2
-RUNAWAY = 3
+WAITING, SOUNDING, OVER, RUNAWAY = range(4)
 # A voice's kind
-BANK = 0
-TRUTH = 1
-RENDERED = 2
-TENSION = 3
+BANK, TRUTH, RENDERED, TENSION = range(4)
 
 JAVARI_EDGE = np.dtype(  # of the bridge, which a string may meet
     [
@@ -133,28 +127,20 @@ VOICE = np.dtype(
 WEIGHT_ROWS = 8
 
 # Rows (modes,) of a bank
-LEVEL_0 = 0
-ANGLE_0 = 1
-ENERGY_0 = 2
+LEVEL_0, ANGLE_0, ENERGY_0 = range(3)
 CONSTANT = 3  # two: what the linear term adds up to in the end
 INTEGRAL = 5  # two: of the higher orders up to the node
 AT_LEFT = 7
 AT_MIDDLE = 9
 AT_RIGHT = 11  # two each: the higher orders at the node, half-way and at the next
-LEVEL = 13
-PHASE = 14
-LEVEL_RATE = 15
-PHASE_RATE = 16  # where the last segment ended
+LEVEL, PHASE, LEVEL_RATE, PHASE_RATE = range(13, 17)  # where the last segment ended
 ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
 CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
 BANK_ROWS = 21
 
 # Rows of a voice with modes (the truth, or latents that share a tension): two that move, amplitude and speed or x and
 # y; five of its resonator as it is now; and what follows from them
-OMEGA_SQUARED = 2
-SIGMA = 3
-COUPLING = 4
-STRETCH = 5
+OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = range(2, 6)
 BRIDGE = 6  # 1/s: what it loses to a bridge on which other strings of its course stand, beside SIGMA
 FOLLOWING = 7
 RESONATOR_ROWS = FOLLOWING - OMEGA_SQUARED

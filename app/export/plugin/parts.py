@@ -17,7 +17,7 @@ from engine.effects.body import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels.fields import record_of, slots
-from engine.kernels.kit_records import KIT, KIT_DRUM
+from engine.kernels.kit import KIT, KIT_DRUM
 from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 from engine.resonators.drum import around as around_of

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import contact
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import voice_at
 from engine.kernels.modes import rows, wished_rows
 from engine.kernels.playing import channels, keys, slots, voices
@@ -19,11 +17,9 @@ DAMPER_S = 0.012  # of the glide to other modes
 LANDS = 0.03  # strength of what lands on a string at rest: an estimate
 
 
-@njit(**COMPILED)
+@kernel
 def landing(table: Table, note: Note) -> float:
-    """The strength of the noise of what lands on a note's string.
-
-    It is the string's motion, over that of a stroke of the reference.
+    """The motion of a note's string over that of a reference stroke: the strength of the noise of what lands there.
 
     A mechanism, whose noise follows nothing, falls alike on every string.
     """
@@ -32,15 +28,15 @@ def landing(table: Table, note: Note) -> float:
     return max(LANDS, voices.swing_m(note) / note.swing_m)
 
 
-@njit(**COMPILED)
-def retune(
-    player: Player,
-    table: Table,
-    note: Note,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def level_of(player: Player, table: Table, note: Note, which: int) -> float:
+    """The level of the noise of a note's stroke or release, in dB."""
+    loudness = max(channels.loudness(player, table.mode, note.channel), 1e-9)
+    return keys.value_of(player, table, which) + 20 * math.log10(loudness)
+
+
+@kernel
+def retune(player: Player, table: Table, note: Note, seconds: float, frame: int, now: int) -> None:
     """Let a note glide to its string as knobs, wheels and damper have changed it, where they have."""
     string, changed = player.bent, False
     if note.drum != 0:
@@ -48,7 +44,7 @@ def retune(
     keys.string_now(player, table, note, string)
     for place in range(of.STRING):
         changed = changed or string[place] != note.string_now[place]
-        note.string_now[place] = string[place]
+    note.string_now = player.bent
     mute = keys.mute_of(player, table, note.channel)
     changed = changed or mute != note.mute
     note.mute = mute
@@ -59,8 +55,7 @@ def retune(
         return
     filled = 0
     for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address == 0 or slots.voice_over(address):
+        if slots.voice_over(note.voices[source]):
             continue
         wish = voices.add_wish(player, note, source, seconds, frame, now)
         target_rows = wished_rows(wish, note.modes)
@@ -68,72 +63,50 @@ def retune(
             voices.fill(player, table, note, string, target_rows)
             filled = wish
         else:
-            others = wished_rows(filled, note.modes)
-            for place in range(len(target_rows)):
-                target_rows[place] = others[place]
+            target_rows[:] = wished_rows(filled, note.modes)
 
 
-@njit(**COMPILED)
-def damp(
-    player: Player,
-    table: Table,
-    note: Note,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def damp(player: Player, table: Table, note: Note, frame: int, now: int) -> None:
     """Put the damper on a string or a drum that nothing holds."""
-    held = note.held + note.kept + note.damped
-    if held != 0 or table.let_ring != 0:
+    if note.held + note.kept + note.damped != 0 or table.let_ring != 0:
         return
     note.damped = 1
     if note.drum == 0:
         retune(player, table, note, DAMPER_S, frame, now)
         if note.member != 0:
             return
-        level_db = keys.value_of(player, table, of.DAMPER_DB)
-        level_db += channels.loudness_db(player, table.mode, note.channel)
+        level_db = level_of(player, table, note, of.DAMPER_DB)
         stroke, strength = note.age if table.variation > 0.0 else 0, landing(table, note)
         by = contact.Touch(of.RELEASE, level_db, strength, 1.0, stroke, note.key, frame, 0.0, 0.0)
         contact.touch(player, table, by)
         return
     t60_s = keys.value_of(player, table, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address == 0 or slots.voice_over(address):
+        if slots.voice_over(note.voices[source]):
             continue
-        voice = voice_at(address)
-        n, present = voice.modes, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS)
-        target_rows = wished_rows(voices.add_wish(player, note, source, DAMPER_S, frame, now), n)
-        for place in range(len(target_rows)):
-            target_rows[place] = present[place]
-            if n <= place < 2 * n:  # σ
-                target_rows[place] += math.log(1000.0) / t60_s
+        voice = voice_at(note.voices[source])
+        target_rows = wished_rows(voices.add_wish(player, note, source, DAMPER_S, frame, now), voice.modes)
+        target_rows[:] = rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS)
+        for place in range(voice.modes, 2 * voice.modes):  # σ
+            target_rows[place] += math.log(1000.0) / t60_s
 
 
-@njit(**COMPILED)
+@kernel
 def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
     """Put the damper on strings that a pedal kept, and keep no longer."""
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.kept == 0 or not slots.sounds(note):
             continue
-        if not channels.pedal_down(player, table.mode, note.channel):
+        if not channels.switched(player, table.mode, note.channel, of.PEDAL):
             note.kept = 0
             damp(player, table, note, frame, now)
 
 
-@njit(**COMPILED)
-def glide(
-    player: Player,
-    table: Table,
-    channel: int,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> None:
+@kernel
+def glide(player: Player, table: Table, channel: int, seconds: float, frame: int, now: int) -> None:
     """Let strings follow the wheels of a channel; -1: all, whatever has changed."""
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         moved = channel < 0 or channels.acts_on(table.mode, channel, note.channel)
         if moved and slots.sounds(note):
             retune(player, table, note, seconds, frame, now)

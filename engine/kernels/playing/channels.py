@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import midi
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.records import Event, Player, Table
 
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
@@ -27,43 +25,40 @@ WIDEST_SEMITONES = 96.0  # that messages may ask for
 HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another key; of a slide, at times of 0 and 127
 
 
-@njit(**COMPILED)
-def rest(player: Player, number: int, pedal: int, plays: int) -> None:
-    """A channel as if nobody had moved anything on it, except for these."""
+@kernel
+def rest(player: Player, number: int) -> None:
+    """A channel as if nobody had moved anything on it but pedals and footswitches."""
     channel = player.channels[number]
     channel.bend = 0.0
     channel.range_semitones = -1.0
-    channel.pedal = pedal
     channel.slide = -1
-    channel.plays = plays
     channel.coarse = midi.NO_PARAMETER
     channel.fine = midi.NO_PARAMETER
     channel.coarse_tuning = 0
     channel.fine_tuning = 0
 
 
-@njit(**COMPILED)
+@kernel
 def reset(player: Player, number: int) -> None:
     """Reset wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
     channel = player.channels[number]
     channel.bend = channel.mute = 0.0
-    channel.pedal = 0
     channel.coarse = midi.NO_PARAMETER
     channel.fine = midi.NO_PARAMETER
     channel.expression = 127
-    for switch in range(of.SWITCHES):
-        channel.switches[switch] = 0
+    channel.switches[:] = 0
 
 
-@njit(**COMPILED)
+@kernel
 def begin(player: Player, number: int) -> None:
     """Put a channel in the state in which nobody has played on it."""
     reset(player, number)
-    rest(player, number, 0, 0)
+    rest(player, number)
+    player.channels[number].plays = 0
     player.channels[number].volume = of.USUAL_VOLUME
 
 
-@njit(**COMPILED)
+@kernel
 def loudness(player: Player, mode: int, channel: int) -> float:
     """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
     share = 1.0
@@ -74,13 +69,7 @@ def loudness(player: Player, mode: int, channel: int) -> float:
     return share * share
 
 
-@njit(**COMPILED)
-def loudness_db(player: Player, mode: int, channel: int) -> float:
-    """The same in dB."""
-    return 20 * math.log10(max(loudness(player, mode, channel), 1e-9))
-
-
-@njit(**COMPILED)
+@kernel
 def is_master(mode: int, channel: int, other: int) -> bool:
     """Return True if the channel is the other's master in MPE, or the other itself.
 
@@ -89,22 +78,13 @@ def is_master(mode: int, channel: int, other: int) -> bool:
     return channel == other or (mode == of.MPE and channel == of.FIRST and other != of.ON_SCREEN)
 
 
-@njit(**COMPILED)
+@kernel
 def acts_on(mode: int, channel: int, other: int) -> bool:
     """Return True if wheel and pedal of a channel hold for what was struck on another."""
     return channel == other or (channel == of.FIRST and (mode == of.MPE or other == of.ON_SCREEN))
 
 
-@njit(**COMPILED)
-def pedal_down(player: Player, mode: int, channel: int) -> bool:
-    """Return True if a pedal holds what was struck on a channel."""
-    down = False
-    for number in range(of.CHANNELS):
-        down = down or (player.channels[number].pedal != 0 and acts_on(mode, number, channel))
-    return down
-
-
-@njit(**COMPILED)
+@kernel
 def semitones(player: Player, mode: int, channel: int) -> float:
     """The bend by pitch wheels of what was struck on a channel, plus its tuning, in semitones."""
     total = 0.0
@@ -117,12 +97,12 @@ def semitones(player: Player, mode: int, channel: int) -> float:
     return total
 
 
-@njit(**COMPILED)
+@kernel
 def _is_member(mode: int, number: int) -> bool:
     return mode == of.MPE and number != of.FIRST and number != of.ON_SCREEN
 
 
-@njit(**COMPILED)
+@kernel
 def _bend_range(player: Player, mode: int, number: int) -> float:
     """Semitones of a whole bend of a channel."""
     wide = player.channels[number].range_semitones
@@ -131,7 +111,7 @@ def _bend_range(player: Player, mode: int, number: int) -> float:
     return MPE_BEND_SEMITONES if _is_member(mode, number) else player.values[of.BEND_SEMITONES]
 
 
-@njit(**COMPILED)
+@kernel
 def set_parameter(player: Player, mode: int, number: int, controller: int, value: int) -> bool:
     """Follow the controllers that choose a registered parameter and set it; whether they set one that counts here.
 
@@ -176,7 +156,7 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def _is_string(player: Player, table: Table, channel: int) -> bool:
     """Return True if a channel is one string of a guitar. The first one is, once another string has played."""
     if table.mode != of.GUITAR:
@@ -190,12 +170,9 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
     return channel < count and others > 0
 
 
-@njit(**COMPILED)
+@kernel
 def place_of(player: Player, table: Table, event: Event) -> int:
-    """The string of the instrument that an event's note has.
-
-    256 (n + 1): string n of a set, which was given.
-    """
+    """The string of the instrument that an event's note has; 256 (n + 1): string n of a set, which was given."""
     channel, string = event.channel, event.string
     if _is_string(player, table, channel):
         return 256 * (channel + 1)
@@ -204,19 +181,7 @@ def place_of(player: Player, table: Table, event: Event) -> int:
     return (256 * (channel + 1) if table.mode == of.MPE else 0) + event.key + 1
 
 
-@njit(**COMPILED)
-def hold(player: Player, channel: int, key: int, down: bool) -> None:
-    """Note whether a key is down."""
-    player.channels[channel].held[key] = down
-
-
-@njit(**COMPILED)
-def strike(player: Player, channel: int, key: int) -> None:
-    """Count a stroke of a key."""
-    player.channels[channel].strokes[key] += 1
-
-
-@njit(**COMPILED)
+@kernel
 def release_latest(player: Player, channel: int, key: int) -> bool:
     """Take a release of a key for its earliest stroke that has none; return whether that is the latest."""
     strokes = player.channels[channel].strokes
@@ -224,35 +189,29 @@ def release_latest(player: Player, channel: int, key: int) -> bool:
     return strokes[key] == 0
 
 
-@njit(**COMPILED)
-def is_down(player: Player, channel: int, key: int) -> bool:
-    return player.channels[channel].held[key] != 0
-
-
-@njit(**COMPILED)
+@kernel
 def release_key(player: Player, channel: int, key: int) -> None:
     """A key is not down, and none of its strokes awaits a release."""
-    hold(player, channel, key, False)
-    player.channels[channel].strokes[key] = 0
+    player.channels[channel].held[key] = player.channels[channel].strokes[key] = 0
 
 
-@njit(**COMPILED)
+@kernel
 def release_keys(player: Player, channel: int) -> None:
     """Release all keys of a channel."""
-    for key in range(of.KEYS):
-        release_key(player, channel, key)
+    player.channels[channel].held[:] = 0
+    player.channels[channel].strokes[:] = 0
 
 
-@njit(**COMPILED)
+@kernel
 def switched(player: Player, mode: int, channel: int, which: int) -> bool:
-    """Return True if a footswitch, by its number, holds for a channel."""
+    """Return True if the pedal or a footswitch, by its number, holds for a channel."""
     down = False
     for number in range(of.CHANNELS):
         down = down or (player.channels[number].switches[which] != 0 and acts_on(mode, number, channel))
     return down
 
 
-@njit(**COMPILED)
+@kernel
 def moves_in_s(player: Player, mode: int, channel: int) -> float:
     """The time in which a note moves to another key of its channel."""
     for number in range(of.CHANNELS):

@@ -6,10 +6,9 @@ Its first note begins at once, the others wait their turns in the queue.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import copy, table_at
 from engine.kernels.playing import channels, keys, notes, slots
 from engine.kernels.records import Event, Player, Table
@@ -18,7 +17,7 @@ CHORD_S = 0.03  # in which notes come that are one chord: an estimate
 USUAL_STRUM_MS = 12.0  # of its footswitch
 
 
-@njit(**COMPILED)
+@kernel
 def _height(player: Player, table: Table, event: Event) -> int:
     """Rises from the lowest note of a chord to the highest: by strings where these are given, else by keys."""
     place = channels.place_of(player, table, event)
@@ -26,56 +25,49 @@ def _height(player: Player, table: Table, event: Event) -> int:
     return string * of.KEYS + event.key
 
 
-@njit(**COMPILED)
+@kernel
 def _strums_in(player: Player, table: Table, event: Event) -> int:
     """The frames from string to string of the chord of an event's note; 0: notes begin as they come."""
-    note_on = event.kind == of.NOTE_ON and event.value > 0.0
-    channel = event.channel
-    by_hand = event.position > 0.0
-    if not note_on or by_hand or not 0 <= channel < of.CHANNELS or table.drums != 0:
+    strikes = event.kind == of.NOTE_ON and event.value > 0.0 and event.position <= 0.0
+    if not strikes or not 0 <= event.channel < of.CHANNELS or table.drums != 0:
         return 0
-    switch = of.STRUMS
-    milliseconds = keys.technique_of(player, table, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
+    milliseconds = keys.technique_of(player, table, event.channel, of.STRUM_MS, of.STRUMS, USUAL_STRUM_MS)
     return slots.frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def _continues(player: Player, frame: int) -> bool:
     """Return True if a note that comes at a frame belongs to the latest chord."""
     since = frame - player.chord_began
     return player.chord != 0 and 0 <= since <= slots.frames(player, CHORD_S)
 
 
-@njit(**COMPILED)
+@kernel
 def _goes_up(player: Player, table: Table) -> bool:
     """Return True if the next strum goes from the highest note to the lowest."""
     strokes = round(keys.value_of(player, table, of.STROKES))
     return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 
 
-@njit(**COMPILED)
+@kernel
 def _swap(player: Player, first: Event, second: Event) -> None:
     """Exchange two events; each place keeps its frame."""
-    kept = player.kept_event
-    frame = first.frame
-    other_frame = second.frame
-    copy(kept, first)
+    copy(player.kept_event, first)
     copy(first, second)
-    copy(second, kept)
-    first.frame, second.frame = frame, other_frame
+    copy(second, player.kept_event)
+    first.frame, second.frame = second.frame, first.frame
 
 
-@njit(**COMPILED)
+@kernel
 def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) -> None:
     """Let the first string of a chord come first, of notes that come at the same frame.
 
-    Args:
-        ring: events (count,), of which `place` is played next, and `end` is the last one's successor.
+    Of the ring's events, `place` is played next, and `end` is the last one's successor.
     """
-    address, event = player.table, ring[place % len(ring)]
-    if address == 0 or event.chord != 0:
+    event = ring[place % len(ring)]
+    if player.table == 0 or event.chord != 0:
         return
-    table, frame = table_at(address), max(event.frame, now)
+    table, frame = table_at(player.table), max(event.frame, now)
     if _strums_in(player, table, event) == 0 or _continues(player, frame):
         return
     up, best = _goes_up(player, table), event
@@ -84,13 +76,12 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
         together = max(other.frame, now) == frame and other.chord == 0
         if not together or _strums_in(player, table, other) == 0:
             break
-        higher = _height(player, table, other) > _height(player, table, best)
-        if higher == up:
+        if (_height(player, table, other) > _height(player, table, best)) == up:
             best = other
     _swap(player, event, best)
 
 
-@njit(**COMPILED)
+@kernel
 def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     """Let a note wait for its turn in a chord; False: it begins now."""
     chord = player.chord
@@ -131,45 +122,35 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Put what is meant for a note behind it where that waits for its turn in a chord.
-
-    Returns True if it does.
-    """
-    id = event.id
-    channel = event.channel
-    key = event.key
-    by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
+    """Put what is meant for a note behind it where that waits for its turn in a chord; return True if it does."""
+    by_id = event.id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):
         waiting = player.queue[place]
-        if waiting.chord == 0:
-            continue
-        meant = waiting.channel == channel and waiting.key == key
+        meant = waiting.channel == event.channel and waiting.key == event.key
         meant = meant and event.string in (0, waiting.string)
         if by_id:
-            meant = waiting.id == id
-        if meant and player.queued < of.QUEUED:
-            later = waiting.frame - waiting.came
-            event.frame = max(event.frame, now) + later
+            meant = waiting.id == event.id
+        if waiting.chord != 0 and meant and player.queued < of.QUEUED:
+            event.frame = max(event.frame, now) + waiting.frame - waiting.came
             queue(player, event)
             return True
     return False
 
 
-@njit(**COMPILED)
+@kernel
 def forget_turns(player: Player, mode: int, channel: int) -> None:
     """Forget notes that wait for their turns in a chord: those of a channel, or all, -1."""
     for place in range(player.queued):
         event = player.queue[place]
-        meant = channel < 0 or channels.is_master(mode, channel, event.channel)
-        if event.chord != 0 and meant:
+        if event.chord != 0 and (channel < 0 or channels.is_master(mode, channel, event.channel)):
             notes.refuse(player, event)
             event.chord = 0
             event.kind = of.NOTHING
 
 
-@njit(**COMPILED)
+@kernel
 def queue(player: Player, event: Event) -> None:
     """Put an event behind those of its frame and of earlier ones."""
     place = player.queued

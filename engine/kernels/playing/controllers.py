@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from engine.kernels import constants as of
-from engine.kernels import contact, midi
-from engine.kernels.compiled import COMPILED
+from engine.kernels import midi
+from engine.kernels.compiled import kernel
 from engine.kernels.playing import changes, channels, chords, hands, slots, voices
 from engine.kernels.records import Player, Table
 
 KNOB_S = 0.04  # of the glide to other modes
 
 
-@njit(**COMPILED)
+@kernel
 def stop(player: Player, seconds: float, frame: int) -> None:
     """Let all strings fade out, those too that nobody plays, and forget their places."""
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.state == of.RINGS:
             voices.release_note(player, note, seconds, frame)
             note.has_place = 0
@@ -25,53 +22,42 @@ def stop(player: Player, seconds: float, frame: int) -> None:
         channels.release_keys(player, channel)
     chords.forget_turns(player, of.POLY, -1)
     player.next_up = 0
-    player.sympathy.stops = slots.quanta(player, max(seconds, hands.STOP_S)) + 2
-    contact.hush(player, slots.quanta(player, max(seconds, hands.STOP_S)))
+    quanta = slots.quanta(player, max(seconds, hands.STOP_S))
+    player.sympathy.stops = quanta + 2
+    for noise in player.noises:
+        noise.stops = quanta
 
 
-@njit(**COMPILED)
-def controller(
-    player: Player,
-    table: Table,
-    channel: int,
-    number: int,
-    value: int,
-    frame: int,
-    now: int,
-) -> None:
-    mode = table.mode
-    state = player.channels[channel]
-    wheel = table.wheel
-    turns = 0 <= wheel < of.KNOBS or wheel == of.MUTE
+# By the numbers of `constants.PEDAL` and those after it
+SWITCHED_BY = (midi.SUSTAIN, midi.LEGATO, midi.PORTAMENTO, midi.HARMONICS, midi.TREMOLO, midi.STRUM)
+
+
+@kernel
+def controller(player: Player, table: Table, channel: int, number: int, value: int, frame: int, now: int) -> None:
+    mode, state = table.mode, player.channels[channel]
+    turns = 0 <= table.wheel < of.KNOBS or table.wheel == of.MUTE
+    value = min(max(value, 0), 127)
+    for switch in range(of.SWITCHES):
+        if number == SWITCHED_BY[switch]:
+            state.switches[switch] = value >= midi.PEDAL_DOWN
     if number == midi.SUSTAIN:
-        state.pedal = value >= midi.PEDAL_DOWN
         changes.damp_unkept(player, table, frame, now)
     elif number == midi.SLIDE:
-        state.slide = max(value, 0)
+        state.slide = value
     elif number == midi.SOFT:
-        state.mute = min(max(value, 0), 127) / 127
+        state.mute = value / 127
         changes.glide(player, table, channel, changes.DAMPER_S, frame, now)
-    elif number == midi.LEGATO:
-        state.switches[of.LEGATO] = value >= midi.PEDAL_DOWN
-    elif number == midi.PORTAMENTO:
-        state.switches[of.SLIDES] = value >= midi.PEDAL_DOWN
-    elif number == midi.HARMONICS:
-        state.switches[of.HARMONICS] = value >= midi.PEDAL_DOWN
-    elif number == midi.TREMOLO:
-        state.switches[of.TREMOLO] = value >= midi.PEDAL_DOWN
-    elif number == midi.STRUM:
-        state.switches[of.STRUMS] = value >= midi.PEDAL_DOWN
     elif number == midi.SLIDE_TIME:
-        state.slide_time = min(max(value, 0), 127)
+        state.slide_time = value
     elif number == midi.MOD_WHEEL:
-        player.wheel = min(max(value, 0), 127)
+        player.wheel = value
         player.wheel_by = channel
         if turns:
             changes.glide(player, table, -1, KNOB_S, frame, now)
     elif number == midi.VOLUME:
-        state.volume = min(max(value, 0), 127)
+        state.volume = value
     elif number == midi.EXPRESSION:
-        state.expression = min(max(value, 0), 127)
+        state.expression = value
     elif number == midi.SOUND_OFF:
         stop(player, hands.STOP_S, frame)
     elif midi.NOTES_OFF <= number <= midi.LAST_MODE:
@@ -79,8 +65,7 @@ def controller(
             if channels.is_master(mode, channel, other):
                 channels.release_keys(player, other)
         chords.forget_turns(player, mode, channel)
-        for other in range(of.MOST_NOTES):
-            note = player.notes[other]
+        for note in player.notes:
             if channels.is_master(mode, channel, note.channel) and slots.sounds(note):
                 note.held = 0
                 note.kept = 0

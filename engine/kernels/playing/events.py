@@ -7,40 +7,35 @@ before it: slots, channels, keys, plucks, voices, gains, changes, notes, hands, 
 
 from __future__ import annotations
 
-from numba import njit
-
 from engine.kernels import constants as of
-from engine.kernels import drums, midi
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels import midi
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
 from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, chords, controllers, gains, hands, notes, voices
-from engine.kernels.records import Event, Player
+from engine.kernels.records import Event, Player, Table
 
 
-@njit(**COMPILED)
+@kernel
 def _take_table(player: Player, address: int, frame: int, now: int) -> None:
     """Play another instrument, or the same with a knob turned; strings that ring glide to it.
 
     Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
     """
     table, before = table_at(address), player.table
-    for which in range(of.VALUES):
-        player.values[which] = table.values[which]
+    player.values = table.values
     player.table = address
     gains.forget_gains(player)
     if before != 0 and table_at(before).instrument != table.instrument:
         player.wheel = 0
         for channel in range(of.CHANNELS):
-            state = player.channels[channel]
-            channels.rest(player, channel, state.pedal, state.plays)
+            channels.rest(player, channel)
     changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
     fence()
     player.serial = table.serial  # those before may be freed from here on
 
 
-@njit(**COMPILED)
+@kernel
 def _cancel(player: Player, id: int, now: int) -> None:
     """Forget the events whose frames are to come; but a table counts at once, for later events go by it.
 
@@ -60,63 +55,49 @@ def _cancel(player: Player, id: int, now: int) -> None:
     player.queued = kept
 
 
-@njit(**COMPILED)
+@kernel
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
     """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
-    kind = event.kind
-    frame = event.frame
-    now = mixer.frames
-    channel, key = event.channel, event.key
-    value, address = event.value, player.table
+    kind, frame, now = event.kind, event.frame, mixer.frames
     if kind == of.TABLE:
         _take_table(player, event.table, frame, now)
-        return
-    if kind == of.CANCEL:
+    elif kind == of.CANCEL:
         _cancel(player, event.id, now)
-        return
-    if kind == of.STOP:
-        controllers.stop(player, value, frame)
-        return
-    if kind in (of.CHOKE, of.TUNE) and chords.waits(player, event, now):
-        return
-    if kind == of.CHOKE:
-        hands.choke(player, event, frame)
-        return
-    if kind == of.TUNE and address != 0:
-        hands.tune(player, table_at(address), event, frame, now)
-        return
-    if not (0 <= channel < of.CHANNELS and 0 <= key < of.KEYS and address != 0):
-        if kind == of.NOTE_ON:
-            notes.refuse(player, event)
-        return
-    table = table_at(address)
+    elif kind == of.STOP:
+        controllers.stop(player, event.value, frame)
+    elif kind in (of.CHOKE, of.TUNE):
+        if chords.waits(player, event, now):
+            return
+        if kind == of.CHOKE:
+            hands.choke(player, event, frame)
+        elif player.table != 0:
+            hands.tune(player, table_at(player.table), event, frame, now)
+    elif player.table != 0 and 0 <= event.channel < of.CHANNELS and 0 <= event.key < of.KEYS:
+        _handle_on_channel(player, table_at(player.table), mixer, event)
+    elif kind == of.NOTE_ON:
+        notes.refuse(player, event)
+
+
+@kernel
+def _handle_on_channel(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
+    """Play an event of one of the channels."""
+    kind, frame, now = event.kind, event.frame, mixer.frames
+    channel, key, value = event.channel, event.key, event.value
     if kind == of.NOTE_ON and value > 0.0:
         if chords.strum(player, table, event, now):
             return
-        if event.position > 0.0:  # by hand: no key is down
-            notes.strike(player, table, mixer, event)
-            return
-        channels.hold(player, channel, key, True)
-        if event.string == 0:
-            channels.strike(player, channel, key)
-        if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
-            return
-        if table.drums != 0:
-            note = notes.free_note(player, mixer)
-            gain = drums.strike(player, table, event, note.number)
-            if gain == 0.0:
-                notes.refuse(player, event)
+        if event.position <= 0.0:  # else by hand: no key is down
+            player.channels[channel].held[key] = 1
+            player.channels[channel].strokes[key] += event.string == 0
+            if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
                 return
-            notes.note_on(player, table, mixer, event, 0)
-            note.gain = gain
-            return
         notes.strike(player, table, mixer, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if chords.waits(player, event, now):
             return
         if event.string == 0 and not channels.release_latest(player, channel, key):
             return
-        channels.hold(player, channel, key, False)
+        player.channels[channel].held[key] = 0
         hands.note_off(player, table, event, frame, now)
     elif kind == of.BEND:
         player.channels[channel].bend = min(max(value, -1.0), 1.0)
@@ -130,17 +111,14 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
         changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def _superseded(event: Event, following: Event) -> bool:
     """Return True if an event and the next move the same wheel: a burst costs one glide."""
-    kind, key = event.kind, event.key
-    same = kind == following.kind and key == following.key
-    if not same or event.channel != following.channel:
-        return False
-    return kind == of.BEND or (kind == of.CONTROLLER and key == midi.MOD_WHEEL)
+    same = event.kind == following.kind and event.key == following.key and event.channel == following.channel
+    return same and (event.kind == of.BEND or (event.kind == of.CONTROLLER and event.key == midi.MOD_WHEEL))
 
 
-@njit(**COMPILED)
+@kernel
 def play(player_address: int, mixer_address: int) -> None:
     """Play all events that are due in the mixer's next quantum, before it is rendered."""
     player, mixer = player_at(player_address), mixer_at(mixer_address)
@@ -165,7 +143,7 @@ def play(player_address: int, mixer_address: int) -> None:
     done = 0
     while done < player.queued:
         event = player.queue[done]
-        if event.frame >= now + QUANTUM:
+        if event.frame >= now + of.QUANTUM:
             break
         done += 1
         together = done < player.queued and player.queue[done].frame == event.frame
@@ -180,7 +158,7 @@ def play(player_address: int, mixer_address: int) -> None:
     voices.hear(player)
 
 
-@njit(**COMPILED)
+@kernel
 def begin(player_address: int) -> None:
     """Put all wheels and pedals of a new player at rest, and number its notes."""
     player = player_at(player_address)

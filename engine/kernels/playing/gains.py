@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numba import njit
-
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import loudness, recorded, strings, velocities
-from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import behind
+from engine.kernels.compiled import kernel
 from engine.kernels.playing import keys, plucks, voices
 from engine.kernels.records import Player, Table
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
@@ -19,25 +15,20 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 LEAST_SWING_M = 1e-9
 
 
-@njit(**COMPILED)
+@kernel
 def forget_gains(player: Player) -> None:
     """Gains of keys are computed again, each with the next note of its key."""
     player.limit = 0.0
-    for key in range(of.KEYS):
-        for which in range(of.GAINS):
-            player.gains[key, which] = 0.0
+    player.gains[:] = 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def _sound(player: Player, table: Table, key: int, string: int) -> int:
-    """Fill the sound of a key at the reference velocity, see `loudness`.
-
-    Returns how many modes it has; 0: it is silent.
+    """Fill the sound of a key at the reference velocity, see `loudness`, and return its modes; 0: it is silent.
 
     The modulation wheel and the mute do not count: what they change is heard as louder or softer.
     """
-    string_row = player.bent
-    pitch_hz = keys.pitch_of(table, key)
+    string_row, pitch_hz = player.bent, keys.pitch_of(table, key)
     if not pitch_hz > 0.0:
         return 0
     partials, shortened = keys.string_of(player, table, key, string, pitch_hz, False, string_row)
@@ -50,60 +41,34 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         player.amplitudes[mode] = pulled_m * player.reference[mode]
     release_s = velocities.contact_s(player.values[of.CONTACT_MS], player.values[of.CONTACT_HARD_MS], share)
     plucks.release_pluck(player, table, string_row, partials, release_s)
-    modes = partials
-    pairs = 0
-    learned = table.recorded != 0
-    if learned:
-        modes = keys.modes_of(table, partials)
-        pairs = (modes + 1) // 2
-        recorded.split(keys.additions(table), string_row, modes, player.amplitudes[:modes])
-    else:
-        pairs = plucks.split(player, table, partials, 0.0)
-        modes += pairs
+    modes, pairs = plucks.split(player, table, string_row, partials, 0.0)
     decay, inside = player.values[of.DECAY], player.values[of.BRIGHTNESS_DECAY]
     together = decay
     if table.course > 1 and not keys.has_octave(table, key, string):  # at first they are in phase
         together *= 1 + (table.course - 1) * table.bridge
     rows = player.sound[: of.SOUND_ROWS * modes]
-    strings.rows(
-        string_row,
-        modes,
-        pairs,
-        table.detuning,
-        together * table.conductance[0],
-        together * table.conductance[1],
-        decay * table.losses[0],
-        inside * table.losses[1],
-        inside * table.losses[2],
-        rows,
-    )
-    if learned:
+    conductance = together * table.conductance[0], together * table.conductance[1]
+    losses = decay * table.losses[0], inside * table.losses[1], inside * table.losses[2]
+    strings.rows(string_row, modes, pairs, table.detuning, conductance, losses, rows)
+    if table.recorded != 0:
         recorded.correct(keys.additions(table), string_row, modes, rows)
     for mode in range(modes):
         partial, direction = strings.partial_of(mode, pairs), strings.direction_of(mode, pairs)
         omega = math.sqrt(rows[mode])
         amplitude = player.amplitudes[mode]
-        if pairs > 0 and not learned:
+        if pairs > 0 and table.recorded == 0:
             amplitude *= table.heard[direction]
         if table.velocity != 0:
             amplitude *= omega * (FULL_SCALE_M / FULL_SCALE_M_S)
         rows[of.SOUND_OMEGA * modes + mode] = omega
-        left, right = player.values[of.POINT], player.values[of.POINT + 1]
-        stereo, aperture_m = table.points == 2, table.aperture_m
-        rows[of.SOUND_LEFT * modes + mode] = amplitude * voices.weight_of(string_row, partial, left, aperture_m)
-        rows[of.SOUND_RIGHT * modes + mode] = (
-            amplitude * voices.weight_of(string_row, partial, right, aperture_m) if stereo else 0.0
-        )
+        rows[of.SOUND_RIGHT * modes + mode] = 0.0
+        for point in range(table.points):
+            weight = voices.weight_of(string_row, partial, player.values[of.POINT + point], table.aperture_m)
+            rows[(of.SOUND_LEFT + point) * modes + mode] = amplitude * weight
     return modes
 
 
-@njit(**COMPILED)
-def _body(player: Player, table: Table) -> tuple[np.ndarray, float]:
-    """The curves of the body, and how much of it is heard."""
-    return behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
-
-
-@njit(**COMPILED)
+@kernel
 def _look_at_peaks(player: Player, table: Table) -> None:
     """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
     share = plucks.reference_share(player)
@@ -112,7 +77,7 @@ def _look_at_peaks(player: Player, table: Table) -> None:
     plucks.pull(player, table, table.shape, partials, player.values[of.POSITION], 1.0, width)
     for mode in range(partials):
         player.reference[mode] = player.amplitudes[mode]
-    (body, mix), highest = _body(player, table), 0.0
+    (body, mix), highest = keys.body_of(player, table), 0.0
     for number in range(loudness.LOOKED_AT):
         key = loudness.looked_at(table.low, table.high, number)
         modes = _sound(player, table, key, -1)
@@ -123,18 +88,16 @@ def _look_at_peaks(player: Player, table: Table) -> None:
     player.limit = loudness.limit(highest)
 
 
-@njit(**COMPILED)
+@kernel
 def gain_of(player: Player, table: Table, key: int, string: int) -> float:
-    """The factor that makes a key as loud as others on a string of a set.
-
-    -1: the string that the key chooses.
+    """The factor that makes a key as loud as others, on a string of a set or, -1, the one that the key chooses.
 
     Beside it is kept how far that string swings.
     """
     if player.gains[key, 1 + string] == 0.0:
         if player.limit == 0.0:
             _look_at_peaks(player, table)
-        body, mix = _body(player, table)
+        body, mix = keys.body_of(player, table)
         modes = _sound(player, table, key, string)
         sound = player.sound[: of.SOUND_ROWS * modes]
         gain = loudness.gain(sound, modes, table.points, body, mix)

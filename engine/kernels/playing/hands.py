@@ -13,12 +13,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import contact, strings
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import inlined, kernel
 from engine.kernels.memory import clear, table_at
 from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, keys, notes, slots, voices
@@ -31,37 +28,27 @@ USUAL_TREMOLO_HZ = 10.0  # of its footswitch
 VIBRATO_QUANTA = 8  # of a glide, of which a vibrato is made
 
 
-@njit(**COMPILED)
-def _move(
-    player: Player,
-    table: Table,
-    note: Note,
-    key: int,
-    frame: int,
-    now: int,
-) -> bool:
+@kernel
+def _move(player: Player, table: Table, note: Note, key: int, frame: int, now: int) -> bool:
     """Shorten or lengthen the string of a note for another key; False where it cannot play that key."""
-    count, mode = table.strings, table.mode
     pitch_hz, string = keys.pitch_of(table, key), note.string
-    if count > 0 and string < 0:
-        string = strings.chosen(table.open, count, note.key)
-    if pitch_hz <= 0.0 or (count > 0 and key < table.open[string].note):
+    if table.strings > 0 and string < 0:
+        string = strings.chosen(table.open, table.strings, note.key)
+    if pitch_hz <= 0.0 or (table.strings > 0 and key < table.open[string].note):
         return False
     modes, _ = keys.string_of(player, table, key, string, pitch_hz, False, player.own)
     if modes < 1:
         return False
     if note.place % 256 != 0:  # a place for each key
         note.place += key - note.key
-        for number in range(of.MOST_NOTES):
-            other = player.notes[number]
-            if number != note.number and slots.sounds(other) and other.place == note.place:
+        for other in player.notes:
+            if other.number != note.number and slots.sounds(other) and other.place == note.place:
                 other.has_place = 0
                 voices.release_note(player, other, notes.PLUCK_STOPS_S, frame)
     note.string, note.key = string, key
-    seconds = channels.moves_in_s(player, mode, note.channel)
+    seconds = channels.moves_in_s(player, table.mode, note.channel)
     if note.member == 0:
-        level_db = keys.value_of(player, table, of.DAMPER_DB)
-        level_db += channels.loudness_db(player, mode, note.channel)
+        level_db = changes.level_of(player, table, note, of.DAMPER_DB)
         if not strings.is_wound(note.own):
             level_db -= PLAIN_DB
         slid_m = abs(player.own[of.LENGTH] - note.string_now[of.LENGTH])
@@ -74,217 +61,151 @@ def _move(
     return True
 
 
-@njit(**COMPILED)
-def _move_others(
-    player: Player,
-    table: Table,
-    first: Note,
-    before: int,
-    key: int,
-    frame: int,
-    now: int,
-) -> None:
-    """Let the other strings of a course follow the first, a note that has moved."""
-    id, channel = first.id, first.channel
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
-        same = note.key == before and note.channel == channel
-        same = same and note.member != 0 and note.id == id
-        if same and slots.sounds(note):
+@kernel
+def _move_course(player: Player, table: Table, first: Note, key: int, frame: int, now: int) -> bool:
+    """Move a note, and the other strings of its course with it; False where it cannot play that key."""
+    before = first.key
+    if not _move(player, table, first, key, frame, now):
+        return False
+    for note in player.notes:
+        same = note.key == before and note.channel == first.channel and note.id == first.id
+        if same and note.member != 0 and slots.sounds(note):
             _move(player, table, note, key, frame, now)
-
-
-@njit(**COMPILED)
-def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) -> bool:
-    """Give a key the latest note that is held on its channel, where legato is on.
-
-    Returns True if it has one.
-
-    Where the event gives a string, only a note on that string.
-    """
-    channel = event.channel
-    key = event.key
-    ringing = -1
-    age = 0
-    place = channels.place_of(player, table, event)
-    if not channels.switched(player, table.mode, channel, of.LEGATO):
-        return False
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
-        held = note.held != 0 and note.channel == channel
-        if (
-            held
-            and note.member == 0
-            and (place % 256 != 0 or note.place == place)
-            and note.age > age
-            and slots.sounds(note)
-        ):
-            ringing, age = number, note.age
-    if ringing < 0:
-        return False
-    note = player.notes[ringing]
-    id, before = note.id, note.key
-    if key == before or not _move(player, table, note, key, frame, now):
-        return False
-    _move_others(player, table, note, before, key, frame, now)
-    notes.report(player, of.ENDED, id, channel, before, now, 0.0)
-    notes.reported(player)
-    for number in range(of.MOST_NOTES):
-        other = player.notes[number]
-        if other.member != 0 and other.id == id:
-            other.id = event.id
-    note.id = event.id
-    notes.report_began(player, table, event, note, player.own)
     return True
 
 
-@njit(**COMPILED)
-def _pull_off(
-    player: Player,
-    table: Table,
-    note: Note,
-    frame: int,
-    now: int,
-) -> bool:
-    """Give the note of a released key to the highest key that is down and has none.
+@kernel
+def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) -> bool:
+    """Give a key the latest note that is held on its channel, where legato is on; return True if it has one.
 
-    Returns True if there is one.
+    Where the event gives a string, only a note on that string.
     """
-    channel, before = note.channel, note.key
-    if not channels.switched(player, table.mode, channel, of.LEGATO):
+    latest, age = player.notes[0], 0
+    place = channels.place_of(player, table, event)
+    if not channels.switched(player, table.mode, event.channel, of.LEGATO):
+        return False
+    for note in player.notes:
+        held = note.held != 0 and note.member == 0 and note.channel == event.channel
+        held = held and (place % 256 != 0 or note.place == place)
+        if held and note.age > age and slots.sounds(note):
+            latest, age = note, note.age
+    id, before = latest.id, latest.key
+    if age == 0 or event.key == before or not _move_course(player, table, latest, event.key, frame, now):
+        return False
+    notes.report(player, of.ENDED, id, event.channel, before, now, 0.0)
+    notes.reported(player)
+    for other in player.notes:
+        if other.member != 0 and other.id == id:
+            other.id = event.id
+    latest.id = event.id
+    notes.report_began(player, table, event, latest, player.own)
+    return True
+
+
+@kernel
+def _pull_off(player: Player, table: Table, note: Note, frame: int, now: int) -> bool:
+    """Give the note of a released key to the highest key that is down and has none; return True if there is one."""
+    if not channels.switched(player, table.mode, note.channel, of.LEGATO):
         return False
     for key in range(of.KEYS - 1, -1, -1):
-        free = channels.is_down(player, channel, key)
-        for number in range(of.MOST_NOTES):
-            other = player.notes[number]
-            same = other.key == key and other.channel == channel
-            same = same and other.member == 0
+        free = player.channels[note.channel].held[key] != 0
+        for other in player.notes:
+            same = other.key == key and other.channel == note.channel and other.member == 0
             free = free and not (same and other.held != 0 and slots.sounds(other))
-        if free and _move(player, table, note, key, frame, now):
-            _move_others(player, table, note, before, key, frame, now)
+        if free and _move_course(player, table, note, key, frame, now):
             return True
     return False
 
 
-@njit(**COMPILED)
-def note_off(
-    player: Player,
-    table: Table,
-    event: Event,
-    frame: int,
-    now: int,
-) -> None:
-    channel, key = event.channel, event.key
+@kernel
+def note_off(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
+    """Damp the strings of a released key, or give them to another that is down."""
     place = channels.place_of(player, table, event)
     for turn in range(2 * of.MOST_NOTES):  # first strings of courses first, which the others follow
         note = player.notes[turn % of.MOST_NOTES]
-        same = note.key == key and note.channel == channel
+        same = note.key == event.key and note.channel == event.channel
         same = same and (note.member == 0) == (turn < of.MOST_NOTES)
-        has_string = event.string != 0
-        same = same and (not has_string or note.place % notes.MEMBERS_APART == place)
+        same = same and (event.string == 0 or note.place % notes.MEMBERS_APART == place)
         if same and note.held != 0 and slots.sounds(note):
             if note.member == 0 and _pull_off(player, table, note, frame, now):
                 continue
             note.held = 0
-            note.kept = channels.pedal_down(player, table.mode, channel)
+            note.kept = channels.switched(player, table.mode, note.channel, of.PEDAL)
             changes.damp(player, table, note, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def _is_meant(event: Event, note: Note) -> bool:
-    """Return True if an event is for a note.
-
-    Its number, channel and key count as far as they are given.
-    """
-    id = event.id
-    channel = event.channel
-    key = event.key
-    if note.state != of.RINGS or (id != 0 and note.id != id):
+    """Return True if an event is for a note. Its number, channel and key count as far as they are given."""
+    if note.state != of.RINGS or event.id not in (0, note.id):
         return False
-    return channel in (of.ANY, note.channel) and key in (of.ANY, note.key)
+    return event.channel in (of.ANY, note.channel) and event.key in (of.ANY, note.key)
 
 
-@njit(**COMPILED)
+@kernel
 def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
     """Bend single notes."""
     semitones = min(max(event.value, -channels.WIDEST_SEMITONES), channels.WIDEST_SEMITONES)
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if _is_meant(event, note) and slots.sounds(note):
             note.tuned = semitones
             changes.retune(player, table, note, BEND_S, frame, now)
 
 
-@njit(**COMPILED)
+@kernel
 def choke(player: Player, event: Event, frame: int) -> None:
     """Let single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
-    id = event.id
-    channel = event.channel
-    key = event.key
     seconds = event.value if event.value > 0.0 else STOP_S
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if _is_meant(event, note):
             if note.has_place != 0:
                 channels.release_key(player, note.channel, note.key)
             voices.release_note(player, note, seconds, frame)
             note.has_place = 0
-    if id != 0 and key == of.ANY:
+    if event.id != 0 and event.key == of.ANY:
         return
     for held in range(of.CHANNELS * of.KEYS):  # whose notes may have ended
-        if channel in (of.ANY, held // of.KEYS) and key in (of.ANY, held % of.KEYS):
+        if event.channel in (of.ANY, held // of.KEYS) and event.key in (of.ANY, held % of.KEYS):
             channels.release_key(player, held // of.KEYS, held % of.KEYS)
 
 
-@njit(**COMPILED)
+@kernel
 def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
     """Let a note glide to where its vibrato is some quanta later; all strings of a course alike."""
     depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
     if depth == 0.0 and note.vibrato == 0.0:
         return
-    ahead = now + VIBRATO_QUANTA * QUANTUM - note.began
+    ahead = now + VIBRATO_QUANTA * of.QUANTUM - note.began
     hz = keys.value_of(player, table, of.VIBRATO_HZ)
     note.vibrato = depth * math.sin(2 * math.pi * hz * max(ahead, 0) / player.rate_hz)
-    seconds = VIBRATO_QUANTA * QUANTUM / player.rate_hz
+    seconds = VIBRATO_QUANTA * of.QUANTUM / player.rate_hz
     changes.retune(player, table, note, seconds, 0, now)
 
 
-@njit(inline="always", **COMPILED)
+@inlined
 def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
     """Lift fingers from strings that they touch, and pluck again what a tremolo plucks, in the next quantum."""
-    address = player.table
-    if address == 0:
+    if player.table == 0 or table_at(player.table).drums != 0:
         return
-    table, end = table_at(address), now + QUANTUM
-    if table.drums != 0:
-        return
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    table, end = table_at(player.table), now + of.QUANTUM
+    for note in player.notes:
         if note.state != of.RINGS:
             continue
         if note.touched != 0 and note.lifted < end:
             changes.retune(player, table, note, LIFT_S, note.lifted, now)
-        if (now - note.began) // QUANTUM % VIBRATO_QUANTA == 0:
+        if (now - note.began) // of.QUANTUM % VIBRATO_QUANTA == 0:
             _vibrate(player, table, note, now)
-        if note.held == 0 or note.released != 0 or not slots.sounds(note):
+        again = note.held != 0 and note.released == 0 and note.member == 0 and note.by_hand == 0
+        if not again or not slots.sounds(note):
             continue
-        channel, switch = note.channel, of.TREMOLO
-        if note.member != 0 or note.by_hand != 0:
-            continue
-        hz = keys.technique_of(player, table, channel, of.TREMOLO_HZ, switch, USUAL_TREMOLO_HZ)
+        hz = keys.technique_of(player, table, note.channel, of.TREMOLO_HZ, of.TREMOLO, USUAL_TREMOLO_HZ)
         due = note.began + slots.frames(player, 1 / hz) if hz > 0.0 else end
         if due < end:
             _pluck_again(player, table, mixer, note, max(due, now))
 
 
-@njit(inline="always", **COMPILED)
-def _pluck_again(
-    player: Player,
-    table: Table,
-    mixer: Mixer,
-    note: Note,
-    frame: int,
-) -> None:
+@inlined
+def _pluck_again(player: Player, table: Table, mixer: Mixer, note: Note, frame: int) -> None:
     """Pluck the string of a note again: another note with its number, which ends without a report of its own."""
     event = player.again
     clear(event)
@@ -298,8 +219,7 @@ def _pluck_again(
     note.id, note.began = 0, frame
     tuned, before = note.tuned, player.age
     notes.strike(player, table, mixer, event)
-    for number in range(of.MOST_NOTES):
-        made = player.notes[number]
+    for made in player.notes:
         if tuned != 0.0 and made.state == of.RINGS and made.age > before:
             made.tuned = tuned
             changes.retune(player, table, made, 0.0, 0, mixer.frames)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import recorded, strings
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import address_of, behind, recorded_at
 from engine.kernels.playing import channels
 from engine.kernels.records import RECORDED, Note, Player, Recorded, Table
@@ -16,7 +15,7 @@ RECORDED_SLOTS = RECORDED.itemsize // 8
 USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimate, as those of other techniques
 
 
-@njit(**COMPILED)
+@kernel
 def value_of(player: Player, table: Table, which: int) -> float:
     """The instrument's value of that number, as the modulation wheel turns it."""
     value, wheel = player.values[which], player.wheel
@@ -25,7 +24,7 @@ def value_of(player: Player, table: Table, which: int) -> float:
     return value
 
 
-@njit(**COMPILED)
+@kernel
 def mute_of(player: Player, table: Table, channel: int) -> float:
     """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
     share = value_of(player, table, of.MUTE)
@@ -35,58 +34,41 @@ def mute_of(player: Player, table: Table, channel: int) -> float:
     return share
 
 
-@njit(**COMPILED)
-def technique_of(
-    player: Player,
-    table: Table,
-    channel: int,
-    which: int,
-    switch: int,
-    usual: float,
-) -> float:
-    """The value of a technique for a channel.
+@kernel
+def body_of(player: Player, table: Table) -> tuple[np.ndarray, float]:
+    """The curves of the body, and how much of it is heard."""
+    return behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
 
-    It is the usual one where its footswitch is down and the value is off.
-    """
+
+@kernel
+def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
+    """The value of a technique for a channel: the usual one where its footswitch is down and the value is off."""
     value, off = value_of(player, table, which), 1.0 if which == of.HARMONIC else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual
     return value
 
 
-@njit(**COMPILED)
+@kernel
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
     """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
-    switch = of.HARMONICS
-    node = round(technique_of(player, table, channel, of.HARMONIC, switch, USUAL_HARMONIC))
+    node = round(technique_of(player, table, channel, of.HARMONIC, of.HARMONICS, USUAL_HARMONIC))
     return node if 1 < node <= partials else 0
 
 
-@njit(**COMPILED)
+@kernel
 def string_of(
-    player: Player,
-    table: Table,
-    key: int,
-    number: int,
-    pitch_hz: float,
-    wheeled: bool,
-    out: np.ndarray,
+    player: Player, table: Table, key: int, number: int, pitch_hz: float, wheeled: bool, out: np.ndarray
 ) -> tuple[int, float]:
-    """The string of a key, before bends.
-
-    Returns its partials, 0 where there is none, and its share of the whole string.
+    """The string of a key, before bends. Return its partials, 0 where there is none, and its share of the whole.
 
     Args:
         number: on which of a set it is wanted, as of `strings.played`.
         wheeled: whether with the knob that the modulation wheel turns, as far as it does.
     """
-    whole = player.whole
-    knobs = player.knobs
-    count = table.strings
+    whole, knobs, count = player.whole, player.knobs, table.strings
     for which in range(of.KNOBS):
-        knobs[which] = player.values[which]
-        if wheeled:
-            knobs[which] = value_of(player, table, which)
+        knobs[which] = value_of(player, table, which) if wheeled else player.values[which]
     first = table.open[strings.played(table.open, count, key, number) if count > 0 else 0]
     slackened = pitch_hz / first.pitch_hz if count > 0 and key < first.note else 1.0
     if not strings.stop(first.string, knobs, slackened, pitch_hz, whole, out):
@@ -95,28 +77,25 @@ def string_of(
     return modes, out[of.LENGTH] / whole[of.LENGTH]
 
 
-@njit(**COMPILED)
+@kernel
 def has_octave(table: Table, key: int, number: int) -> bool:
-    """Return True if a key's course has octave strings, on a string of a set.
-
-    -1: on the string that the key chooses.
-    """
+    """Return True if a key's course has octave strings, on a string of a set or, -1, the one that the key chooses."""
     count, octaves = table.strings, table.octaves
     return octaves > 0 and (number if number >= 0 else strings.chosen(table.open, count, key)) >= count - octaves
 
 
-@njit(**COMPILED)
+@kernel
 def _recorded(table: Table) -> Recorded:
     return recorded_at(address_of(table) + 8 * table.recorded)
 
 
-@njit(**COMPILED)
+@kernel
 def modes_of(table: Table, partials: int) -> int:
     """The number of modes of so many partials of a recorded string."""
     return min(2 * partials, _recorded(table).modes)
 
 
-@njit(**COMPILED)
+@kernel
 def additions(table: Table) -> recorded.Additions:
     """The additions of a recording to a string's law, of a table that has them."""
     recorded_rows = _recorded(table)
@@ -126,7 +105,7 @@ def additions(table: Table) -> recorded.Additions:
     return recorded_rows.pitch_hz, recorded_rows.rest, smooth[0], smooth[1], rows
 
 
-@njit(**COMPILED)
+@kernel
 def pitch_of(table: Table, key: int) -> float:
     """The pitch of a key in Hz; 0: it is silent."""
     if not table.low <= key <= table.high:
@@ -134,25 +113,19 @@ def pitch_of(table: Table, key: int) -> float:
     return table.pitches_hz[key]
 
 
-@njit(**COMPILED)
+@kernel
 def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> None:
-    """Write the string of a note with the present knobs, wheels and damper.
-
-    Where there is none, it stays as it is.
-    """
-    key, mode = note.key, table.mode
-    pitch_hz, fits = pitch_of(table, key), True
+    """Write the string of a note with the present knobs, wheels and damper; where there is none, it stays."""
+    pitch_hz, fits = pitch_of(table, note.key), True
     if pitch_hz > 0.0:
-        number = note.string
         wheeled = player.wheel != 0 and 0 <= table.wheel < of.KNOBS
-        modes, _ = string_of(player, table, key, number, pitch_hz, wheeled, out)
+        modes, _ = string_of(player, table, note.key, note.string, pitch_hz, wheeled, out)
         if note.octave != 0:
             strings.thin(out, pitch_hz)
         fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
     else:
-        for place in range(of.STRING):
-            out[place] = note.own[place]
-    semitones = channels.semitones(player, mode, note.channel)
+        out[:] = note.own
+    semitones = channels.semitones(player, table.mode, note.channel)
     semitones += note.tuned + note.apart + note.vibrato
     ratio = 2.0 ** (semitones / 12)
     if fits and ratio != 1.0:
@@ -165,5 +138,4 @@ def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> Non
         out[of.D1] = strings.damped(out, value_of(player, table, of.RELEASE_S))
         fits = strings.possible(out)
     if not fits:
-        for place in range(of.STRING):
-            out[place] = note.string_now[place]
+        out[:] = note.string_now

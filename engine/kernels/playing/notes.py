@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
-from engine.kernels import contact, drums, recorded, strings, velocities
+from engine.kernels import contact, drums, strings, velocities
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import clear, copy, fence, voice_at
 from engine.kernels.mixer_records import MOST_VOICES, Mixer
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
@@ -35,7 +34,7 @@ MEMBERS_APART = 1 << 16  # places of the strings of a course
 COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 
 
-@njit(**COMPILED)
+@kernel
 def report(player: Player, kind: int, id: int, channel: int, key: int, frame: int, velocity: float) -> Report:
     """The next report, for the caller to complete. `reported` publishes it."""
     made = player.reports[player.reported % of.REPORTS]
@@ -48,20 +47,20 @@ def report(player: Player, kind: int, id: int, channel: int, key: int, frame: in
     return made
 
 
-@njit(**COMPILED)
+@kernel
 def reported(player: Player) -> None:
     fence()
     player.reported += 1
 
 
-@njit(**COMPILED)
+@kernel
 def refuse(player: Player, event: Event) -> None:
     """Report a note that no string can play, or that was cancelled."""
     report(player, of.REFUSED, event.id, event.channel, event.key, event.frame, event.value)
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def _forget(player: Player, note: Note, frame: int) -> None:
     """A note has ended: its place is free."""
     note.state = of.FREE
@@ -71,22 +70,20 @@ def _forget(player: Player, note: Note, frame: int) -> None:
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def _begun(note: Note) -> bool:
     """Return True if any voice of a note has sounded."""
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address != 0 and voice_at(address).state != at.WAITING:
-            return True
-    return False
+    begun = False
+    for address in note.voices:
+        begun = begun or (address != 0 and voice_at(address).state != at.WAITING)
+    return begun
 
 
-@njit(**COMPILED)
+@kernel
 def free_note(player: Player, mixer: Mixer) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
     best, best_rank = player.notes[0], 3
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.state != of.FREE and slots.over(note):
             _forget(player, note, mixer.frames)
         if note.state == of.FREE:
@@ -96,21 +93,21 @@ def free_note(player: Player, mixer: Mixer) -> Note:
             rank = 1 if _begun(note) else 0
         if rank < best_rank or (rank == best_rank and note.age < best.age):
             best, best_rank = note, rank
-    for source in range(of.MOST_SOURCES):
-        if best.voices[source] != 0:
-            voices.take_out(mixer, best.voices[source])
+    for address in best.voices:
+        if address != 0:
+            voices.take_out(mixer, address)
     player.cut += 1
     _forget(player, best, mixer.frames)
     return best
 
 
-@njit(**COMPILED)
+@kernel
 def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
     """A note has the string of the one before, which is stopped, or whose motion continues in it."""
     stops = slots.frames(player, PLUCK_STOPS_S)
     for source in range(of.MOST_SOURCES):
         address, other = note.voices[source], before.voices[source]
-        if other == 0 or slots.voice_over(other):
+        if slots.voice_over(other):
             continue
         if address == 0:
             voices.release(other, stops)
@@ -119,25 +116,22 @@ def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
         voice_at(address).stops_in = stops if table.stops != 0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def _cost(note: Note) -> int:
     """The notes that one counts as: two with a string that may meet its bridge, whose steps cost many times more."""
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
+    for address in note.voices:
         if address != 0 and voice_at(address).javari.steps > 0:
             return 2
     return 1
 
 
-@njit(**COMPILED)
+@kernel
 def _make_room(player: Player) -> None:
     """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
     while True:
-        notes = 0
-        cost = 0
+        notes = cost = 0
         oldest = player.notes[0]
-        for number in range(of.MOST_NOTES):
-            note = player.notes[number]
+        for note in player.notes:
             if note.state == of.FREE or note.released != 0 or slots.over(note):
                 continue
             if notes == 0 or note.age < oldest.age:
@@ -149,7 +143,7 @@ def _make_room(player: Player) -> None:
         voices.release_note(player, oldest, STOLEN_S if _begun(oldest) or _cost(oldest) == 1 else 0.0, 0)
 
 
-@njit(**COMPILED)
+@kernel
 def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     """Play all strings of a key's course, one after the other; the first is the one that is reported."""
     note_on(player, table, mixer, event, 0)
@@ -162,7 +156,7 @@ def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     event.frame = frame
 
 
-@njit(**COMPILED)
+@kernel
 def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: int) -> None:
     """Play a note, of a course one string. A string that is impossible is refused, unless another sounds.
 
@@ -171,14 +165,11 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
     draft = player.draft
     clear(draft)
     _identify(player, table, event, member, draft)
-    if table.drums != 0:
-        draft.drum, draft.gain = 1, 1.0
-        draft.strength, draft.hardness = drums.contact_of(player, table, draft.key, draft.velocity)
-    else:
-        if not _take_string(player, table, draft):
-            if member == 0:
-                refuse(player, event)
-            return
+    if not (drums.take(player, table, draft) if table.drums != 0 else _take_string(player, table, draft)):
+        if member == 0:
+            refuse(player, event)
+        return
+    if draft.drum == 0:
         _pluck(player, table, event, draft)
     note = free_note(player, mixer)
     player.age += 1
@@ -187,23 +178,19 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
     draft.began = max(event.frame, mixer.frames)
     copy(note, draft)
     _keep_of_table(player, table, note)
-    _make_voices(player, table, note)
+    _make_voices(player, table, event, note)
     _take_place(player, table, note)
     _begin_voices(player, mixer, event, note)
     changes.retune(player, table, note, 0.0, 0, mixer.frames)
     if member == 0:
-        level_db = keys.value_of(player, table, of.ONSET_DB)
-        level_db += channels.loudness_db(player, table.mode, note.channel)
-        strength = note.strength
-        hardness = note.hardness
-        frame = event.frame
-        stroke = contact.Touch(of.STROKE, level_db, strength, hardness, note.stroke, note.key, frame, 0.0, 0.0)
-        contact.touch(player, table, stroke)
+        level_db, begins = changes.level_of(player, table, note, of.ONSET_DB), event.frame
+        by = contact.Touch(of.STROKE, level_db, note.strength, note.hardness, note.stroke, note.key, begins, 0.0, 0.0)
+        contact.touch(player, table, by)
     _make_room(player)
     report_began(player, table, event, note, note.own)
 
 
-@njit(**COMPILED)
+@kernel
 def _identify(player: Player, table: Table, event: Event, member: int, note: Note) -> None:
     """Set the note's identity, and the string that it is played on."""
     note.state, note.held = of.RINGS, 1
@@ -224,18 +211,17 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
     note.octave = member > 0 and keys.has_octave(table, note.key, note.string)
 
 
-@njit(**COMPILED)
+@kernel
 def _take_string(player: Player, table: Table, note: Note) -> bool:
     """The string of a note's key with its modes and its gain; False: it is impossible."""
     pitch_hz, string_row = keys.pitch_of(table, note.key), note.own
-    note.shortened = 1.0
-    if pitch_hz > 0.0:
-        modes, shortened = keys.string_of(player, table, note.key, note.string, pitch_hz, False, string_row)
-        note.modes, note.shortened = modes, shortened
-    if note.octave != 0 and note.modes > 0:
+    if not pitch_hz > 0.0:
+        return False
+    modes, shortened = keys.string_of(player, table, note.key, note.string, pitch_hz, False, string_row)
+    note.modes, note.shortened = modes, shortened
+    if note.octave != 0 and modes > 0:
         strings.thin(string_row, pitch_hz)
-        modes = min(note.modes, strings.modes_below(string_row, of.HIGHEST_HZ)) if strings.possible(string_row) else 0
-        note.modes = modes
+        note.modes = min(modes, strings.modes_below(string_row, of.HIGHEST_HZ)) if strings.possible(string_row) else 0
     if note.modes < 1 or strings.overdamped(string_row, note.modes):
         return False
     note.gain = gains.gain_of(player, table, note.key, note.string)
@@ -243,18 +229,17 @@ def _take_string(player: Player, table: Table, note: Note) -> bool:
     return True
 
 
-@njit(**COMPILED)
+@kernel
 def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
-    shortened = note.shortened
     curve, soft = keys.value_of(player, table, of.CURVE), keys.value_of(player, table, of.SOFTEST_MM)
     share = velocities.share(note.velocity, curve)
     harder = keys.value_of(player, table, of.HARDEST_MM) / soft
-    amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
+    amplitude_mm = min(soft * harder**share * note.shortened, LARGEST_AMPLITUDE_MM)
     if note.by_hand != 0:
         amplitude_mm = min(event.amplitude_mm, LARGEST_AMPLITUDE_MM)
         if harder != 1.0:
-            share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
+            share = min(max(math.log(amplitude_mm / soft / note.shortened) / math.log(harder), 0.0), 1.0)
     note.strength = harder ** (share - velocities.share(of.REFERENCE_VELOCITY, curve))
     note.hardness = 1.0
     widths = keys.value_of(player, table, of.WIDTH), keys.value_of(player, table, of.WIDTH_HARD)
@@ -263,9 +248,8 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     if note.by_hand != 0:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
-        position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
-    turned = 0.0
-    varies = table.variation
+        position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * slide / 127
+    turned, varies = 0.0, table.variation
     softest_ms = keys.value_of(player, table, of.CONTACT_MS)
     release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
     if varies > 0.0:
@@ -284,76 +268,63 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     shape = event.shape if note.by_hand != 0 else table.shape
     note.highest_m = plucks.pull(player, table, shape, note.modes, position, amplitude_mm / 1000, width)
     plucks.release_pluck(player, table, note.own, note.modes, release_s)
-    if table.recorded != 0:
-        note.modes = keys.modes_of(table, note.modes)
-        note.pairs = (note.modes + 1) // 2
-        recorded.split(keys.additions(table), note.own, note.modes, player.amplitudes[: note.modes])
-    else:
-        note.pairs = plucks.split(player, table, note.modes, turned)
-        note.modes += note.pairs
+    note.modes, note.pairs = plucks.split(player, table, note.own, note.modes, turned)
 
 
-@njit(**COMPILED)
+@kernel
 def _keep_of_table(player: Player, table: Table, note: Note) -> None:
     """Keep in a note what it needs of the table that it was struck by."""
     key, member = note.key, note.member
     note.detuning, note.aperture_m = table.detuning, table.aperture_m
     note.points, note.solo = table.points, table.solo
-    for slot in range(3):
-        note.losses[slot] = table.losses[slot]
+    note.losses, note.conductance = table.losses, table.conductance
     polarised = note.pairs > 0 and table.recorded == 0
     for slot in range(2):
         note.heard[slot] = table.heard[slot] if polarised else 1.0
-        note.conductance[slot] = table.conductance[slot]
         note.point[slot] = player.values[of.POINT + slot]
     octaves = keys.has_octave(table, key, note.string)
     if note.drum == 0 and not octaves and table.course > 1 and table.conductance[0] > 0.0 and note.pairs > 0:
         note.bridge = table.bridge
     if member > 0:  # above and below the first by turns, each key a little otherwise
-        apart = (
-            (member + 1) // 2 * (1 if member % 2 == 1 else -1) * (1 + COURSES_VARY * plucks.varied(0, key, member))
-        )
-        note.apart = apart * table.apart_cents / 100
+        steps = (member + 1) // 2 * (1 if member % 2 == 1 else -1)
+        note.apart = steps * (1 + COURSES_VARY * plucks.varied(0, key, member)) * table.apart_cents / 100
     if note.touched > 0:
         note.lifted = note.began + slots.frames(player, TOUCH_PERIODS / strings.pitch_hz(note.own))
     note.mute = keys.mute_of(player, table, note.channel)
-    for place in range(of.STRING):
-        note.string_now[place] = note.own[place]
+    note.string_now = note.own
 
 
-@njit(**COMPILED)
-def _make_voices(player: Player, table: Table, note: Note) -> None:
-    """The voices of a note, one of each source; those of a drum are made."""
+@kernel
+def _make_voices(player: Player, table: Table, event: Event, note: Note) -> None:
+    """The voices of a note, one of each source."""
     for source in range(table.sources):
         address = slots.address_of_voice(player, note.number, source)
-        if note.drum == 0:
+        if note.drum != 0:
+            drums.make_voice(player, table, address, event, source)
+        else:
             voices.make_voice(player, table, address, note, source)
-            begun = note.gain * player.source_gains[source]
-            begun *= channels.loudness(player, table.mode, note.channel)
-            slots.set_gain(address, begun)
-            if note.bridge > 0.0:
-                first = player.age - note.member  # of this player, for another may ring as well
-                voice_at(address).course = player.here + of.MOST_SOURCES * first + source
+        begun = note.gain * player.source_gains[source]
+        begun *= channels.loudness(player, table.mode, note.channel)
+        slots.set_gain(address, begun)
+        if note.bridge > 0.0:
+            first = player.age - note.member  # of this player, for another may ring as well
+            voice_at(address).course = player.here + of.MOST_SOURCES * first + source
         note.voices[source] = address
 
 
-@njit(**COMPILED)
+@kernel
 def _take_place(player: Player, table: Table, note: Note) -> None:
     """A note is the latest of its place, and follows the one before."""
-    for number in range(of.MOST_NOTES):
-        before = player.notes[number]
+    for before in player.notes:
         if before.state == of.RINGS and before.has_place != 0 and before.place == note.place:
             before.has_place = 0
             _follow(player, table, note, before)
     note.has_place = 1
 
 
-@njit(**COMPILED)
+@kernel
 def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> None:
-    """Hand the voices of a note to the mixer.
-
-    Those that have no room there, or that nobody hears, are over.
-    """
+    """Hand the voices of a note to the mixer; those that have no room there, or that nobody hears, are over."""
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0:
@@ -369,7 +340,7 @@ def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> Non
             voice_at(address).state = at.OVER
 
 
-@njit(**COMPILED)
+@kernel
 def report_began(player: Player, table: Table, event: Event, note: Note, string_row: np.ndarray) -> None:
     """Report the note of an event, and the string of its key."""
     if note.member != 0:
@@ -387,10 +358,9 @@ def report_began(player: Player, table: Table, event: Event, note: Note, string_
     reported(player)
 
 
-@njit(**COMPILED)
+@kernel
 def tend(player: Player, now: int) -> None:
     """Report notes that have ended."""
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
+    for note in player.notes:
         if note.state == of.RINGS and slots.over(note):
             _forget(player, note, now)

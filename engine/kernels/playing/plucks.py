@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
-from engine.kernels import pulses, strings, velocities
-from engine.kernels.compiled import COMPILED
+from engine.kernels import pulses, recorded, strings, velocities
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import behind, mixed
+from engine.kernels.playing import keys
 from engine.kernels.records import Player, Table
 from engine.levels import MOST_PERIODS
 
@@ -19,24 +19,12 @@ LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by
 
 # By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
 # differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
-VARIES_PLACE = 0.08
-VARIES_DB = 1.0
-VARIES_WIDTH = 0.12  # shares, dB
+VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
 
 
-@njit(**COMPILED)
-def pull(
-    player: Player,
-    table: Table,
-    shape: int,
-    modes: int,
-    position: float,
-    peak_m: float,
-    width: float,
-) -> float:
-    """The amplitudes of the modes of a pluck, and its highest point in m.
-
-    They come from its shape on the grid, then sines.
+@kernel
+def pull(player: Player, table: Table, shape: int, modes: int, position: float, peak_m: float, width: float) -> float:
+    """The amplitudes of the modes of a pluck, from its shape on the grid by sines, and its highest point in m.
 
     Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
     """
@@ -76,20 +64,14 @@ def pull(
     return highest
 
 
-@njit(**COMPILED)
+@kernel
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
-    """The amplitudes of the modes of a rounded triangle, up to its height `pulses.corner`.
-
-    It peaks where the force pulls: elsewhere it is straight.
-    """
+    """The amplitudes of the modes of a rounded triangle, which peaks where the force pulls; else it is straight."""
     turn = len(sines)
-    grid = len(sines) // 2 + 1
-    highest = 0.0
-    near = int((position - width / 2) * (grid - 1)) - 1
-    far = int((position + width / 2) * (grid - 1)) + 2
-    low, high = max(near, 1), min(far, grid - 2) + 1
-    for point in range(low, high):
-        player.pulled[point] = 0.0
+    grid = turn // 2 + 1
+    low = max(int((position - width / 2) * (grid - 1)) - 1, 1)
+    high = min(int((position + width / 2) * (grid - 1)) + 2, grid - 2) + 1
+    player.pulled[low:high] = 0.0
     for mode in range(1, grid - 1):
         amplitude, place = pulses.corner(mode, position, width), mode * low % turn
         for point in range(low, high):
@@ -99,13 +81,12 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
                 place -= turn
         if mode <= modes:
             player.amplitudes[mode - 1] = amplitude
-    for point in range(low, high):
-        highest = max(highest, player.pulled[point])
+    highest = max(player.pulled[low:high].max(), 0.0)
     for mode in range(modes):
         player.amplitudes[mode] *= peak_m / highest
 
 
-@njit(**COMPILED)
+@kernel
 def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials: int, release_s: float) -> None:
     """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
 
@@ -120,13 +101,13 @@ def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials
         player.amplitudes[mode] *= pulses.spectrum(turns)
 
 
-@njit(**COMPILED)
+@kernel
 def varied(stroke: int, key: int, which: int) -> float:
     """A number in -1 … 1 for each stroke: the same for the same strokes."""
     return float(np.uint64(mixed(stroke * 4096 + key * 16 + which + 1)) >> np.uint64(12)) / 2.0**51 - 1
 
 
-@njit(**COMPILED)
+@kernel
 def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, float, float]:
     """Position, amplitude and width of the nearest pluck within the ranges of `engine.pluck.Pluck`."""
     return (
@@ -136,7 +117,7 @@ def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, 
     )
 
 
-@njit(**COMPILED)
+@kernel
 def vary(
     position: float, amplitude_mm: float, width: float, varies: float, stroke: int, key: int
 ) -> tuple[float, float, float]:
@@ -148,13 +129,24 @@ def vary(
     )
 
 
-@njit(**COMPILED)
-def split(player: Player, table: Table, partials: int, turned: float) -> int:
-    """Split a pluck's partials into modes of both polarisations; how many partials have two.
+@kernel
+def split(player: Player, table: Table, string_row: np.ndarray, partials: int, turned: float) -> tuple[int, int]:
+    """Split a pluck's partials into modes of both polarisations; how many these are, and how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.
     """
+    if table.recorded == 0:
+        pairs = _polarise(player, table, partials, turned)
+        return partials + pairs, pairs
+    modes = keys.modes_of(table, partials)
+    recorded.split(keys.additions(table), string_row, modes, player.amplitudes[:modes])
+    return modes, (modes + 1) // 2
+
+
+@kernel
+def _polarise(player: Player, table: Table, partials: int, turned: float) -> int:
+    """Split partials of strings that were not recorded; how many have two modes."""
     pairs = min(table.pairs, partials)
     if pairs == 0:
         return 0
@@ -170,7 +162,7 @@ def split(player: Player, table: Table, partials: int, turned: float) -> int:
     return pairs
 
 
-@njit(**COMPILED)
+@kernel
 def reference_share(player: Player) -> float:
     """The share of the velocities at which keys are equally loud."""
     return velocities.share(of.REFERENCE_VELOCITY, player.values[of.CURVE])

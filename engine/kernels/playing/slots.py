@@ -4,68 +4,63 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from engine.kernels import constants as of
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import clear, voice_at
 from engine.kernels.modes import rows
 from engine.kernels.records import PLAYER, Note, Player, Table
-from engine.kernels.voice_records import WEIGHT_ROWS, Voice
 
 VOICES_AT = PLAYER.itemsize
-voice_bytes = njit(**COMPILED)(at.voice_bytes)
+voice_bytes = kernel(at.voice_bytes)
 
 
-@njit(**COMPILED)
+@kernel
 def frames(player: Player, seconds: float) -> int:
     return max(1, round(seconds * player.rate_hz))
 
 
-@njit(**COMPILED)
+@kernel
 def quanta(player: Player, seconds: float) -> int:
-    return max(1, round(seconds * player.rate_hz / QUANTUM))
+    return max(1, round(seconds * player.rate_hz / of.QUANTUM))
 
 
-@njit(**COMPILED)
+@kernel
 def voice_over(address: int) -> bool:
-    state = voice_at(address).state
-    return state == at.OVER or state == at.RUNAWAY
+    """Return True if there is no voice, or one that has ended."""
+    return address == 0 or voice_at(address).state in (at.OVER, at.RUNAWAY)
 
 
-@njit(**COMPILED)
+@kernel
 def over(note: Note) -> bool:
     """Return True if all voices of a note are over."""
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address != 0 and not voice_over(address):
-            return False
-    return True
+    rings = False
+    for address in note.voices:
+        rings = rings or not voice_over(address)
+    return not rings
 
 
-@njit(**COMPILED)
+@kernel
 def sounds(note: Note) -> bool:
     """Return True if a note has its place and rings."""
     return note.state == of.RINGS and note.has_place == 1 and not over(note)
 
 
-@njit(**COMPILED)
+@kernel
 def address_of_voice(player: Player, number: int, source: int) -> int:
     """The player's own voice for one of its notes and a source."""
     return player.here + VOICES_AT + (number * of.MOST_SOURCES + source) * voice_bytes(player.modes)
 
 
-@njit(**COMPILED)
+@kernel
 def set_gain(address: int, gain: float) -> None:
     """Set the gain of a voice that begins."""
     voice = voice_at(address)
     voice.wanted_gain = voice.gain = voice.gain_from = voice.gain_to = gain
 
 
-@njit(**COMPILED)
-def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> Voice:
+@kernel
+def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> at.Voice:
     """A voice of a source at rest, with as many rows as are used set to zero."""
     voice, rate_hz = voice_at(address), player.rate_hz
     clear(voice)
@@ -78,7 +73,5 @@ def blank_voice(player: Player, table: Table, address: int, source: int, modes: 
     voice.fade_frames = round(at.FADE_S * rate_hz)
     voice.ends_at, voice.ends_in = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice.silent = at.SILENT_DB * math.log(10.0) / 20
-    behind = rows(voice, -WEIGHT_ROWS, WEIGHT_ROWS + used)
-    for place in range(len(behind)):
-        behind[place] = 0.0
+    rows(voice, -at.WEIGHT_ROWS, at.WEIGHT_ROWS + used)[:] = 0.0
     return voice

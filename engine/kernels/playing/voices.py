@@ -5,25 +5,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drums, javari, recorded, strings, tension
 from engine.kernels import voice_records as at
-from engine.kernels.compiled import COMPILED
-from engine.kernels.constants import QUANTUM
+from engine.kernels.compiled import kernel
 from engine.kernels.memory import fence, table_at, voice_at, wish_at
 from engine.kernels.mixer_records import Mixer
-from engine.kernels.modes import TOO_HIGH, row, rows, run_up, weights
+from engine.kernels.modes import TOO_HIGH, motion, row, rows, run_up, weights
 from engine.kernels.playing import channels, keys, slots
 from engine.kernels.records import Note, Player, Table
-from engine.kernels.voice_records import WISH, Voice
 from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
 
-WISH_BYTES = WISH.itemsize
+WISH_BYTES = at.WISH.itemsize
 
 
-@njit(**COMPILED)
+@kernel
 def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
     """The level at a listening point of a partial's amplitude of 1 m, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
@@ -33,12 +30,9 @@ def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: fl
     return averaged * math.sin(math.pi * partial * place) / FULL_SCALE_M
 
 
-@njit(**COMPILED)
-def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
-    """Set one of the two sets of weights of a voice for the points of its note.
-
-    Modes too high are not heard.
-    """
+@kernel
+def _weigh(player: Player, voice: at.Voice, which: int, note: Note) -> None:
+    """Set one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
     solo, pairs = note.solo, note.pairs
     string_row, highest = note.own, TOO_HIGH * player.rate_hz
     for mode in range(note.modes):
@@ -55,57 +49,27 @@ def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
     voice.javari.heard = note.heard[0] / FULL_SCALE_N if at_bridge else 0.0
 
 
-@njit(**COMPILED)
-def fill(
-    player: Player,
-    table: Table,
-    note: Note,
-    string: np.ndarray,
-    out: np.ndarray,
-) -> None:
+@kernel
+def fill(player: Player, table: Table, note: Note, string: np.ndarray, out: np.ndarray) -> None:
     """ω², σ, k, η² and the bridge's part of a note's modes, of its string as it is now."""
     losses = keys.value_of(player, table, of.DECAY)
     inside = keys.value_of(player, table, of.BRIGHTNESS_DECAY)
-    strings.rows(
-        string,
-        note.modes,
-        note.pairs,
-        note.detuning,
-        losses * note.conductance[0],
-        losses * note.conductance[1],
-        losses * note.losses[0],
-        inside * note.losses[1],
-        inside * note.losses[2],
-        out,
-    )
+    conductance = losses * note.conductance[0], losses * note.conductance[1]
+    by_mode = losses * note.losses[0], inside * note.losses[1], inside * note.losses[2]
+    strings.rows(string, note.modes, note.pairs, note.detuning, conductance, by_mode, out)
     if note.mute > 0.0:
         strings.mute(string, note.modes, note.pairs, note.mute, out)
     if note.touched > 0:
         strings.touch(string, note.modes, note.pairs, note.touched, out)
     if table.recorded != 0:
         recorded.correct(keys.additions(table), string, note.modes, out)
-    strings.stand(
-        string,
-        note.modes,
-        min(note.pairs, of.MOST_PAIRS),
-        note.bridge * losses * note.conductance[0],
-        note.bridge * losses * note.conductance[1],
-        out,
-    )
+    shared = note.bridge * losses * note.conductance[0], note.bridge * losses * note.conductance[1]
+    strings.stand(string, note.modes, min(note.pairs, of.MOST_PAIRS), shared, out)
 
 
-@njit(**COMPILED)
-def make_voice(
-    player: Player,
-    table: Table,
-    address: int,
-    note: Note,
-    source: int,
-) -> None:
-    """A voice of the modes of a note's own string: as `Voice`.
-
-    It sets out with the amplitudes of a pluck.
-    """
+@kernel
+def make_voice(player: Player, table: Table, address: int, note: Note, source: int) -> None:
+    """A voice of the modes of a note's own string, that sets out with the amplitudes of a pluck."""
     rate_hz, n = player.rate_hz, note.modes
     voice = slots.blank_voice(player, table, address, source, n, at.TRUTH_ROWS)
     voice.points = note.points
@@ -114,12 +78,9 @@ def make_voice(
     voice.attack, peak = round(at.ATTACK_S * rate_hz), max(note.highest_m, LEAST_PEAK_M)
     brighter = at.BRIGHTER if table.velocity != 0 else 1.0
     voice.peak, voice.limit = peak, RUNAWAY_FACTOR * peak / FULL_SCALE_M * brighter
-    amplitudes = row(voice, 0)
-    speeds = row(voice, 1)
-    string_row = note.own
-    for mode in range(n):
-        amplitudes[mode] = player.amplitudes[mode]
-    fill(player, table, note, string_row, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS))
+    amplitudes, speeds = motion(voice)
+    amplitudes[:] = player.amplitudes[:n]
+    fill(player, table, note, note.own, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS))
     if note.bridge > 0.0:
         voice.bridged = 2 * min(note.pairs, of.MOST_PAIRS)
     squares = row(voice, at.OMEGA_SQUARED)
@@ -127,7 +88,7 @@ def make_voice(
         speeds[mode] = amplitudes[mode] * math.sqrt(squares[mode])
         amplitudes[mode] = 0.0
     if table.javari[0] > 0.0:
-        javari.fit(voice, string_row, note.pairs, table.javari, rate_hz)
+        javari.fit(voice, note.own, note.pairs, table.javari, rate_hz)
     behind = lag_of(player, table, note.member)
     if behind > 0:
         run_up(voice, behind / rate_hz)
@@ -139,16 +100,14 @@ def make_voice(
         voice.limit = max(voice.limit, RUNAWAY_FACTOR * largest)
 
 
-@njit(**COMPILED)
+@kernel
 def swing_m(note: Note) -> float:
     """The swing of a note's string now: the root of its modes' summed squares. 0: it is over."""
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address == 0 or slots.voice_over(address):
+    for address in note.voices:
+        if slots.voice_over(address):
             continue
         voice, squared = voice_at(address), 0.0
-        q = row(voice, 0)
-        v = row(voice, 1)
+        q, v = motion(voice)
         squares = row(voice, at.OMEGA_SQUARED)
         if voice.kind == at.TENSION and voice.prepared != 0:
             q, v = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1)
@@ -159,7 +118,7 @@ def swing_m(note: Note) -> float:
     return 0.0
 
 
-@njit(**COMPILED)
+@kernel
 def release(address: int, frames: int) -> None:
     """Let a voice fade out; a release under way continues."""
     voice = voice_at(address)
@@ -167,19 +126,18 @@ def release(address: int, frames: int) -> None:
         voice.release = frames
 
 
-@njit(**COMPILED)
+@kernel
 def release_note(player: Player, note: Note, seconds: float, frame: int) -> None:
     """Let a note fade out; from a frame to come on, where that is above 0."""
     note.released = 1
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
+    for address in note.voices:
         if address != 0 and frame > 0:
             voice_at(address).release_at = frame
         elif address != 0:
             release(address, slots.frames(player, seconds))
 
 
-@njit(**COMPILED)
+@kernel
 def _due(address: int, now: int) -> int:
     """The latest frame for which modes count with a voice's next quantum."""
     voice = voice_at(address)
@@ -191,24 +149,14 @@ def _due(address: int, now: int) -> int:
     return due
 
 
-@njit(**COMPILED)
-def add_wish(
-    player: Player,
-    note: Note,
-    source: int,
-    seconds: float,
-    frame: int,
-    now: int,
-) -> int:
+@kernel
+def add_wish(player: Player, note: Note, source: int, seconds: float, frame: int, now: int) -> int:
     """The address of a wish for the modes that a voice is to have from a frame on: linked, its rows to be filled.
 
     At most two are still to be reached: those that are due in this quantum, and those for the next.
     """
-    address = note.voices[source]
-    voice = voice_at(address)
+    voice, due = voice_at(note.voices[source]), _due(note.voices[source], now)
     latest = voice.resonator
-    taken = voice.current_modes
-    due = _due(address, now)
     first = voice.pending_modes if latest == 0 else wish_at(latest).next
     tail, block_address = 0, first
     while block_address != 0:
@@ -220,7 +168,7 @@ def add_wish(
         end = slots.address_of_voice(player, note.number, source + 1)
         for place in range(of.BLOCKS):
             block = end - (of.BLOCKS - place) * size
-            used, block_address = block in (latest, taken), first
+            used, block_address = block in (latest, voice.current_modes), first
             while block_address != 0 and not used:
                 used = block_address == block
                 block_address = wish_at(block_address).next
@@ -241,7 +189,7 @@ def add_wish(
     return free
 
 
-@njit(**COMPILED)
+@kernel
 def take_out(mixer: Mixer, address: int) -> None:
     """Take a voice out of the mixer at once; it is over."""
     kept = 0
@@ -257,36 +205,33 @@ def take_out(mixer: Mixer, address: int) -> None:
     voice_at(address).state = at.OVER
 
 
-@njit(**COMPILED)
+@kernel
 def lag_of(player: Player, table: Table, member: int) -> int:
     """The frames from the stroke of a course's string to its beginning, in step with the first; 0: at once."""
     later = round(member * table.apart_s * player.rate_hz)
-    return -later % QUANTUM if table.bridge > 0.0 else 0
+    return -later % of.QUANTUM if table.bridge > 0.0 else 0
 
 
-@njit(**COMPILED)
+@kernel
 def hear(player: Player) -> None:
     """Let notes follow the gains of sources and the listening points."""
     if player.table == 0:
         return
     table = table_at(player.table)
-    for number in range(of.MOST_NOTES):
-        note = player.notes[number]
-        if note.state == of.RINGS and note.drum == 0:
-            gain = note.gain * channels.loudness(player, table.mode, note.channel)
-            for source in range(of.MOST_SOURCES):
-                address = note.voices[source]
-                if address != 0:
-                    voice = voice_at(address)
-                    voice.wanted_gain = gain * player.source_gains[source]
-                    if voice.javari.steps != 0:
-                        voice.javari.gap_m = keys.value_of(player, table, of.JAVARI_UM) * 1e-6
-            _listen(player, table, note)
-        elif note.state == of.RINGS:
-            drums.hear(player, table, note)
+    for note in player.notes:
+        if note.state != of.RINGS:
+            continue
+        gain = note.gain * channels.loudness(player, table.mode, note.channel)
+        for source in range(of.MOST_SOURCES):
+            if note.voices[source] != 0:
+                voice = voice_at(note.voices[source])
+                voice.wanted_gain = gain * player.source_gains[source]
+                if voice.javari.steps != 0:
+                    voice.javari.gap_m = keys.value_of(player, table, of.JAVARI_UM) * 1e-6
+        _listen(player, table, note)
 
 
-@njit(**COMPILED)
+@kernel
 def _listen(player: Player, table: Table, note: Note) -> None:
     """Let a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
     moved = note.solo != table.solo
@@ -294,19 +239,26 @@ def _listen(player: Player, table: Table, note: Note) -> None:
         moved = moved or note.point[point] != player.values[of.POINT + point]
     if not moved or note.points != table.points:
         return
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
-        if address != 0:
-            voice = voice_at(address)
-            if voice.next_weights != 0 or voice.velocity != table.velocity:
-                return
+    for address in note.voices:
+        if address != 0 and not _may_move(table, note, voice_at(address)):
+            return
     note.solo = table.solo
     for point in range(2):
         note.point[point] = player.values[of.POINT + point]
-    for source in range(of.MOST_SOURCES):
-        address = note.voices[source]
+    for address in note.voices:
         if address != 0:
             voice = voice_at(address)
-            _weigh(player, voice, 1, note)
+            if note.drum != 0:
+                drums.weigh(player, table, voice, 1, note.key)
+            else:
+                _weigh(player, voice, 1, note)
             voice.weights_faded = 0
             voice.next_weights = 1
+
+
+@kernel
+def _may_move(table: Table, note: Note, voice: at.Voice) -> bool:
+    """Return True if a voice of a note can be heard at other points of the instrument."""
+    if note.drum != 0 and not drums.has_modes(table, note.key, voice.modes):
+        return False
+    return voice.next_weights == 0 and (note.drum != 0 or voice.velocity == table.velocity)

@@ -65,7 +65,7 @@ def flow(sigma: float, omega: float, time_s: float) -> Signal:
 
 def rows(kernel: Any) -> Signal:
     found = np.empty(4 * 60)
-    kernel(np.array(astuple(STEEL)), 60, 0, 1.0, *[0.0] * 5, found)
+    kernel(np.array(astuple(STEEL)), 60, 0, 1.0, (0.0, 0.0), (0.0, 0.0, 0.0), found)
     return found
 
 
@@ -80,7 +80,7 @@ def modes_of_the_equation() -> Signal:
 def polarised_rows(kernel: Any) -> Signal:
     """Two partials of two modes and one of one, with a bridge that moves and losses by mode."""
     found = np.empty(4 * 5)
-    kernel(np.array(astuple(STEEL)), 5, 2, 1.01, 0.01, 0.002, 1.2, 1e-4, 0.02, found)
+    kernel(np.array(astuple(STEEL)), 5, 2, 1.01, (0.01, 0.002), (1.2, 1e-4, 0.02), found)
     return found
 
 
@@ -252,7 +252,7 @@ def test_a_transform_of_any_period_is_the_sum_over_its_frequencies(size: int, pe
 def touched(node: int, modes: int, pairs: int = 0) -> Signal:
     """σ in 1/s that a touch adds to modes (modes,)."""
     found, string = np.zeros(4 * modes), np.array(astuple(FLEXIBLE))
-    strings.rows(string, modes, pairs, 1.0, *[0.0] * 5, found)
+    strings.rows(string, modes, pairs, 1.0, (0.0, 0.0), (0.0, 0.0, 0.0), found)
     strings.touch(string, modes, pairs, node, found)
     return found[modes : 2 * modes]
 
@@ -279,7 +279,7 @@ def test_a_touch_adds_the_rates_of_the_modes_that_it_couples(node: int) -> None:
 @pytest.mark.parametrize("string", [StringParameters(), STEEL, replace(STEEL, youngs_modulus_pa=0.0)])
 def test_a_resonator_and_a_string_are_those_of_the_kernels(string: StringParameters) -> None:
     resonator, found = resonator_of(string, 60), np.empty(4 * 60)
-    strings.rows(string.row, 60, 0, 1.0, *[0.0] * 5, found)
+    strings.rows(string.row, 60, 0, 1.0, (0.0, 0.0), (0.0, 0.0, 0.0), found)
     own = np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch])
     np.testing.assert_allclose(own, found, rtol=1e-13)
     eta = np.arange(1, 61) * np.pi / string.length_m

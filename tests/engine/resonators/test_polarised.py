@@ -33,7 +33,7 @@ def polarised(moving: Polarisations, string: StringParameters, partials: int, de
     direction = [strings.direction_of(mode, pairs) for mode in modes]
     conductances = decay * moving.conductance_s_kg, decay * moving.second_conductance_s_kg
     rows = np.empty(4 * len(modes))
-    strings.rows(string.row, len(modes), pairs, moving.detuning, *conductances, 0.0, 0.0, 0.0, rows)
+    strings.rows(string.row, len(modes), pairs, moving.detuning, conductances, (0.0, 0.0, 0.0), rows)
     squares, sigma, coupling, stretch = rows.reshape(4, -1)
     pulled, heard = (np.array(each)[direction] for each in (moving.pulled, moving.heard))
     pulled[2 * pairs :] = 1 / moving.heard[0]  # so that it is heard as the others are
