@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
-from app.views.controls.number_box import CountBox, NumberBox, prepared
 from app.views.controls.parts import filled, tool_button
 from app.views.controls.plain import Label
 
@@ -52,29 +51,6 @@ def check_box(text: str, on: bool, tip: str) -> QCheckBox:
     box.setMinimumHeight(28)
     box.setToolTip(tip)
     return box
-
-
-def spin_box(
-    name: str,
-    limits: tuple[float, float],
-    value: float,
-    tip: str,
-    suffix: str = "",
-    decimals: int = 0,
-    step: float = 1,
-    prefix: str = "",
-) -> NumberBox:
-    low, high = limits
-    spin = NumberBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, prefix=prefix, decimals=decimals)
-    prepared(spin, name, tip, 84)
-    spin.setValue(value)
-    return spin
-
-
-def count_box(name: str, most: int, value: int, tip: str) -> CountBox:
-    spin = CountBox(minimum=1, maximum=most, value=value)
-    prepared(spin, name, tip, 56)
-    return spin
 
 
 class FilePicker(QWidget):

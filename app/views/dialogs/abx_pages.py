@@ -14,14 +14,14 @@ from PySide6.QtWidgets import (
     QLayout,
     QProgressBar,
     QPushButton,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from app.analysis.abx.record import MEANING, AbxRecord, p_text
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, AbxChoices, needed_correct
-from app.views.controls.form import check_box, count_box, form_label, row_of
+from app.views.controls.form import check_box, form_label, row_of
+from app.views.controls.number_box import CountBox
 from app.views.controls.parts import filled, label, push_button
 from app.views.controls.plain import Label
 
@@ -43,8 +43,8 @@ class SetupPage(QWidget):
     def __init__(self, words: str, labels: Sequence[str], choices: AbxChoices) -> None:
         super().__init__()
         tip = "Fixed before the start: a test that could stop at any time would prove nothing"
-        self.trials: QSpinBox = count_box("Number of trials", MOST_TRIALS, choices.trials, tip)
-        self.trials.valueChanged.connect(self._show_trials)
+        self.trials = CountBox("Number of trials", MOST_TRIALS, choices.trials, tip)
+        self.trials.valueChanged.connect(lambda: self._show_trials(self.trials.value()))
         tip = "Otherwise the switch happens at the playhead, with a cross-fade"
         self.restart = check_box("Restart from the pluck at each switch", choices.restart, tip)
         self._needed, self._warning = label("faint"), label("warning")

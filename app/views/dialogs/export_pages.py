@@ -12,10 +12,8 @@ from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance
 from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QLayout,
-    QSpinBox,
     QWidget,
 )
 
@@ -37,8 +35,8 @@ from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
-from app.views.controls.form import FilePicker, check_box, count_box, form_label, row_of, spin_box
-from app.views.controls.note_box import NoteBox
+from app.views.controls.form import FilePicker, check_box, form_label, row_of
+from app.views.controls.number_box import CountBox, NoteBox, NumberBox
 from app.views.controls.parts import combo_box, faint, label
 from engine.result_file import WriteError, explain
 
@@ -163,12 +161,14 @@ class NotePage(ExportPage):
         self.length = combo_box("Length", ends, export.until_decayed)
         self.length.setToolTip("Where the file ends: when the sound has decayed, or after a fixed time")
         tip = "The sound ends where model and truth are this far below their peak"
-        self.decay = spin_box("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
+        self.decay = NumberBox("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
         tip = "A string that rings longer is faded out at this length"
-        self.longest = spin_box("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
-        self.seconds = spin_box("Duration", limits, export.seconds, "The end is faded out within 10 ms", " s", 1, 0.5)
+        self.longest = NumberBox("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
+        self.seconds = NumberBox(
+            "Duration", limits, export.seconds, "The end is faded out within 10 ms", " s", 1, 0.5
+        )
         tip, gain_db = "Gain of the difference, model − truth", export.difference_gain_db
-        self.gain = spin_box(
+        self.gain = NumberBox(
             "Gain of the difference", DIFFERENCE_GAIN_RANGE_DB, gain_db, tip, " dB", step=6, prefix="+"
         )
         self.file = FilePicker(export.folder, "With two files, the source is appended to each name")
@@ -313,11 +313,11 @@ class SamplerPage(ExportPage):
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
         self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
         tip = "One sample for so many keys; those between are transposed"
-        self.every = count_box("Keys a sample", WIDEST_STEP, choices.every, tip)
+        self.every = CountBox("Keys a sample", WIDEST_STEP, choices.every, tip)
         tip = "How many velocities are rendered of each key"
-        self.layers = count_box("Velocity layers", MOST_LAYERS, choices.layers, tip)
+        self.layers = CountBox("Velocity layers", MOST_LAYERS, choices.layers, tip)
         tip = "Silent ones end sooner; one that still rings is faded out"
-        self.seconds = spin_box("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
+        self.seconds = NumberBox("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
         self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
         self.source.setToolTip("What plays the instrument")
         tip = "A room in the samples ends with the release of each key"
@@ -517,7 +517,7 @@ def _watch(controls: Iterable[QWidget], changed: SignalInstance) -> list[SignalI
     for control in controls:
         if isinstance(control, QComboBox):
             signals.append(control.currentIndexChanged)
-        elif isinstance(control, QSpinBox | QDoubleSpinBox):
+        elif isinstance(control, NumberBox):
             signals.append(control.valueChanged)
         elif isinstance(control, QAbstractButton):
             signals.append(control.toggled)

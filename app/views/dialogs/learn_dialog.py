@@ -28,7 +28,8 @@ from app.patches.library import PatchError
 from app.playing.pair import Pair
 from app.shared.worker import Job
 from app.views.background import Background
-from app.views.controls.form import form_label, row_of, spin_box
+from app.views.controls.form import form_label, row_of
+from app.views.controls.number_box import NumberBox
 from app.views.controls.parts import combo_box, filled, label, read_only_text
 from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
@@ -88,8 +89,8 @@ class LearnDialog(GrowingDialog):
         self.kind = combo_box("Instrument", KINDS, "guitar")
         self.kind.setToolTip("For what a sound does not give: density and length")
         tip = "Type it where you know it; otherwise it is assumed"
-        self.length_m = spin_box("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
-        self.gauge_mm = spin_box("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
+        self.length_m = NumberBox("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
+        self.gauge_mm = NumberBox("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
         for box in (self.length_m, self.gauge_mm):
             box.setSpecialValueText("assumed")  # where it is 0
         self.state = label("faint", selectable=True)

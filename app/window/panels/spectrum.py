@@ -25,8 +25,8 @@ from app.session.shown import (
     shown_sources,
 )
 from app.views import theme
+from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view
-from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, fit_foot, frequency_ticks, keep_axes
 from app.views.plots.legend import Legend, set_curves
