@@ -5,7 +5,17 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QInputEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.shared.parameters import Parameter
@@ -21,6 +31,16 @@ HEIGHT, LOW_HEIGHT = 82, 60
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
+
+_STEPS = {
+    Qt.Key.Key_Up: 1,
+    Qt.Key.Key_Right: 1,
+    Qt.Key.Key_Down: -1,
+    Qt.Key.Key_Left: -1,
+    Qt.Key.Key_PageUp: COARSE,
+    Qt.Key.Key_PageDown: -COARSE,
+}
+_PLACES = (Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Delete)  # the least, the most, the default
 
 
 class _Editor(QLineEdit):
@@ -66,14 +86,21 @@ class _Editor(QLineEdit):
 
 
 class Knob(QWidget):
-    """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`."""
+    """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`.
+
+    Args:
+        width: in pixels, by the longest name or value.
+        low: smaller, for rows of many knobs.
+    """
 
     value_asked = Signal(float)
     figure_asked = Signal(float)  # a number that was typed where a figure is shown
     drag_started = Signal()
     drag_ended = Signal()
 
-    def __init__(self, parameter: Parameter, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, parameter: Parameter, parent: QWidget | None = None, width: int = WIDTH, low: bool = False
+    ) -> None:
         super().__init__(parent)
         self.parameter, self.default = parameter, parameter.default  # to which a double-click resets
         self._name = parameter.label
@@ -81,8 +108,7 @@ class Knob(QWidget):
         self._dragged_at: QPointF | None = None
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
-        self._width = WIDTH
-        self._low = False
+        self._width, self._low = width, low
         self._figure = self._why_barred = self._tip = ""
         self._stays = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -149,21 +175,7 @@ class Knob(QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Set the width for a window with little room, or the usual one."""
-        width = NARROW_WIDTH if narrow else WIDTH
-        if width != self._width:
-            self._width = width
-            self.updateGeometry()
-            self.update()
-
-    def set_width(self, pixels: int) -> None:
-        """Set the width in pixels, for long names and values."""
-        self._width = pixels
-        self.updateGeometry()
-        self.update()
-
-    def set_low(self, low: bool) -> None:
-        """Make the knob smaller, for rows of many knobs, or of its usual size."""
-        self._low = low
+        self._width = NARROW_WIDTH if narrow else WIDTH
         self.updateGeometry()
         self.update()
 
@@ -176,8 +188,7 @@ class Knob(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is None:
             return
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-        self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
+        self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * _fineness(event)
         self._dragged_at = event.position()
         self.value_asked.emit(self.parameter.value(self._dragged_share))
         say_above(self, self.accessibleDescription())
@@ -192,9 +203,8 @@ class Knob(QWidget):
         self.value_asked.emit(self.default)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
         notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
-        self.value_asked.emit(self.parameter.stepped(self._value, notches * fine))
+        self.value_asked.emit(self.parameter.stepped(self._value, notches * _fineness(event)))
         event.accept()
 
     def event(self, event: QEvent) -> bool:
@@ -202,23 +212,12 @@ class Knob(QWidget):
         return keeps_keys(event, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-        steps = {
-            Qt.Key.Key_Up: 1,
-            Qt.Key.Key_Right: 1,
-            Qt.Key.Key_Down: -1,
-            Qt.Key.Key_Left: -1,
-            Qt.Key.Key_PageUp: COARSE,
-            Qt.Key.Key_PageDown: -COARSE,
-        }.get(Qt.Key(event.key()))
+        steps = _STEPS.get(Qt.Key(event.key()))
+        places = dict(zip(_PLACES, (*self.parameter.limits, self.default), strict=True))
         if steps is not None:
-            self.value_asked.emit(self.parameter.stepped(self._value, steps * fine))
-        elif event.key() == Qt.Key.Key_Home:
-            self.value_asked.emit(self.parameter.limits[0])
-        elif event.key() == Qt.Key.Key_End:
-            self.value_asked.emit(self.parameter.limits[1])
-        elif event.key() == Qt.Key.Key_Delete:
-            self.value_asked.emit(self.default)
+            self.value_asked.emit(self.parameter.stepped(self._value, steps * _fineness(event)))
+        elif event.key() in places:
+            self.value_asked.emit(places[Qt.Key(event.key())])
         elif event.text() and event.text() in SIGNS:
             self._type(event.text())
         else:
@@ -309,3 +308,8 @@ class Knob(QWidget):
         painter.setFont(theme.small_font(10 if self._low else 12, grows=False))
         foot = QRectF(0, height - (17 if self._low else 23), width, 18)
         painter.drawText(foot, Qt.AlignmentFlag.AlignCenter, self._figure or self.text)
+
+
+def _fineness(event: QInputEvent) -> float:
+    """The factor of a gesture's steps: less than 1 with Shift."""
+    return FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0

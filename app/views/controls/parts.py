@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from PySide6.QtCore import QEvent, QMargins, Qt, SignalInstance
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QBoxLayout,
     QComboBox,
     QFrame,
@@ -27,6 +28,7 @@ from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.plain import Label
 
 Box = TypeVar("Box", bound=QBoxLayout)
+Button = TypeVar("Button", bound=QAbstractButton)
 Handler = Callable[..., object] | SignalInstance
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 NO_MARGINS = QMargins()
@@ -42,10 +44,7 @@ def tool_button(
         kind: its name in the style sheet.
         properties: further ones of Qt.
     """
-    button = QToolButton(text=text, accessibleName=name or text, toolTip=tip, objectName=kind, **properties)
-    if pressed is not None:
-        button.clicked.connect(pressed)
-    return button
+    return _prepared(QToolButton(**properties), text, name or text, tip, kind, pressed)
 
 
 def push_button(
@@ -53,7 +52,14 @@ def push_button(
 ) -> QPushButton:
     """A button that Enter presses only where it has the focus; arguments as of `tool_button`."""
     properties = {"autoDefault": False, **properties}
-    button = QPushButton(text, accessibleName=name, toolTip=tip, objectName=kind, **properties)
+    return _prepared(QPushButton(**properties), text, name, tip, kind, pressed)
+
+
+def _prepared(button: Button, text: str, name: str, tip: str, kind: str, pressed: Handler | None) -> Button:
+    button.setText(text)
+    button.setAccessibleName(name)
+    button.setToolTip(tip)
+    button.setObjectName(kind)
     if pressed is not None:
         button.clicked.connect(pressed)
     return button
@@ -88,7 +94,9 @@ def combo_box(
 
     `picked` is called with the data of the entry that the user picks.
     """
-    box = QComboBox(accessibleName=name, toolTip=tip)
+    box = QComboBox()
+    box.setAccessibleName(name)
+    box.setToolTip(tip)
     for text, data in entries:
         box.addItem(text, data)
     box.setCurrentIndex(max(0, box.findData(chosen)))
@@ -155,7 +163,9 @@ def lay_out_alone(view: QWidget, part: QWidget) -> None:
 
 def scrolled(part: QWidget) -> QScrollArea:
     """A part as wide as its place, which scrolls where it is higher."""
-    area = QScrollArea(widgetResizable=True, frameShape=QFrame.Shape.NoFrame, focusPolicy=Qt.FocusPolicy.NoFocus)
+    area = QScrollArea(widgetResizable=True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setWidget(part)
     return area
@@ -163,11 +173,14 @@ def scrolled(part: QWidget) -> QScrollArea:
 
 def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
     """Lines that can be selected; `name` is what a screen reader says."""
-    return QPlainTextEdit(text, readOnly=True, tabChangesFocus=True, accessibleName=name)
+    box = QPlainTextEdit(text, readOnly=True, tabChangesFocus=True)
+    box.setAccessibleName(name)
+    return box
 
 
 def vertical_rule() -> QFrame:
-    line = QFrame(objectName="rule")
+    line = QFrame()
+    line.setObjectName("rule")
     line.setFixedWidth(1)
     return line
 

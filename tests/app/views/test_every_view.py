@@ -49,14 +49,13 @@ from app.views import theme
 from app.views.controls import (
     browser,
     browser_rows,
+    choosers,
     deck,
     drop_sign,
     elided_label,
-    filter_button,
     focus_ring,
     form,
     knob,
-    name_button,
     notice_bar,
     number_box,
     overflow,
@@ -99,7 +98,7 @@ def made_deck() -> QWidget:
 
 
 def filtered() -> QWidget:
-    made = filter_button.FilterButton("presets")
+    made = choosers.FilterButton("presets", lambda: None)
     made.show_listed(2, 3)
     return made
 
@@ -165,11 +164,11 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     deck.Deck: made_deck,
     drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
     elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
-    filter_button.FilterButton: filtered,
+    choosers.FilterButton: filtered,
     focus_ring.FocusRing: with_ring,
     form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
     knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
-    name_button.NameButton: lambda: with_name(name_button.NameButton("A name")),
+    choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print, 60, 200)),
     number_box.NoteBox: lambda: number_box.NoteBox("Lowest key", "The lowest"),
     notice_bar.NoticeBar: notice,
     number_box.NumberBox: lambda: number_box.NumberBox("Length", (0, 5), 1, "The length", " m", 2),
