@@ -408,10 +408,10 @@ class PatchDesk(QObject):
             self._keep_octave_in_range("octave" in names)
         if names & {"octave", "velocity", "instrument", "patch"}:
             choices, pitches = self._session.choices, self._session.choices.plays_patch
-            self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
+            self._panel.bar.show_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
-            self._panel.show_letters(letters_of(choices.octave) if pitches else {})
+            self._panel.keys.show_letters(letters_of(choices.octave) if pitches else {})
         if names & {"instrument", "patch"}:
             self._judge_again()
         if names & {"instrument", "patch", *Monitor.model_fields}:

@@ -39,10 +39,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
         MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
         MenuEntry(
-            "sampler",
-            "Export for samplers …",
-            "Ctrl+Shift+E",
-            "export the instrument for samplers (SFZ, SoundFont)",
+            "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"
         ),
         MenuEntry("plugin", "Export plug-in …"),
         MenuEntry("quit", "Quit", "Ctrl+Q", "quit"),
@@ -110,8 +107,10 @@ class AppMenu(QMenu):
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
 
     def _add(self, menu: QMenu, entry: MenuEntry) -> None:
-        action = self.action[entry.name] = menu.addAction(_words(entry))
-        if entry.key != "Return":
+        plucks = entry.key == "Return"
+        action = menu.addAction(f"{entry.text}\t{entry.key_name}" if plucks else entry.text)
+        self.action[entry.name] = action
+        if not plucks:
             action.setShortcut(QKeySequence(entry.key))
             action.setAutoRepeat(False)
 
@@ -129,15 +128,9 @@ class AppMenu(QMenu):
         menu = above.addMenu(title)
         group = QActionGroup(menu)
         for text, value in values.items():
-            action = menu.addAction(text)
-            action.setCheckable(True)
+            action = self._looks[field, value] = QAction(text, group, checkable=True)
             action.triggered.connect(lambda _=False, value=value: self.look_asked.emit(field, value))
-            group.addAction(action)
-            self._looks[field, value] = action
-
-
-def _words(entry: MenuEntry) -> str:
-    return f"{entry.text}\t{entry.key_name}" if entry.key == "Return" else entry.text
+            menu.addAction(action)
 
 
 def menu_button(menu: QMenu) -> QToolButton:
