@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths, Qt, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFileDialog,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QHBoxLayout, QLabel, QLayout, QLineEdit, QWidget
 
 from app.views import theme
-from app.views.controls.parts import filled, tool_button
+from app.views.controls.parts import NO_MARGINS, filled, tool_button
 from app.views.controls.plain import Label
 
+Rows = Mapping[str, QWidget | QLayout]
 LABEL_WIDTH = 104
 FILTERS = {
     ".wav": "WAV (*.wav)",
@@ -31,18 +26,23 @@ FILTERS = {
 
 def form_label(text: str) -> QLabel:
     """A form's label; all are of one width, so that the forms of a dialog are aligned."""
-    title = Label(text)
+    title = Label(text, minimumHeight=28)
     title.setFixedWidth(theme.px(LABEL_WIDTH))
-    title.setMinimumHeight(28)
     title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return title
 
 
+def filled_form(form: QFormLayout, rows: Rows) -> QFormLayout:
+    """The form with rows, by their labels."""
+    form.setContentsMargins(NO_MARGINS)
+    for name, row in rows.items():
+        form.addRow(form_label(name), row)
+    return form
+
+
 def row_of(*widgets: QWidget) -> QHBoxLayout:
     """Side by side, with empty space at the end."""
-    row = filled(QHBoxLayout(), *widgets, None)
-    row.setContentsMargins(0, 0, 0, 0)
-    return row
+    return filled(QHBoxLayout(), *widgets, None, margins=NO_MARGINS)
 
 
 def check_box(text: str, on: bool, tip: str) -> QCheckBox:
@@ -70,9 +70,7 @@ class FilePicker(QWidget):
         self.edit.setAccessibleName("File")
         self.edit.setToolTip(tip)
         self.edit.textEdited.connect(self._name_edited)
-        browse = tool_button("Browse …", tip="Choose the file")
-        browse.clicked.connect(self.browse)
-        row = row_of(browse)
+        row = row_of(tool_button("Browse …", tip="Choose the file", pressed=self.browse))
         row.insertWidget(0, self.edit, 100)
         self.setLayout(row)
 
