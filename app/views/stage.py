@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
-from PySide6.QtGui import (
-    QColor,
-    QFontMetrics,
-    QLinearGradient,
-    QPainter,
-    QPen,
-    QPixmap,
-    QPolygonF,
-    QResizeEvent,
-)
+from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPen, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from app.session.shown import DEFAULT_SOURCES, ShownSource
@@ -100,7 +91,6 @@ class StageView(QWidget):
         raise NotImplementedError
 
     def _mark_under(self, at: QPointF) -> str | None:
-        """The side whose mark is there."""
         if at.y() < self.height() - MARGIN_BOTTOM - 6:
             return None
         near = {side: abs(at.x() - self._mark_x(point)) for side, point in self._listening.items()}

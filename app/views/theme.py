@@ -48,7 +48,6 @@ class Theme:
 
     @property
     def colours(self) -> dict[str, str]:
-        """The colour of each role."""
         return {role: dark if self.dark else light for role, (dark, light) in ROLES.items()}
 
     def __getattr__(self, role: str) -> str:
@@ -79,7 +78,6 @@ def __getattr__(name: str) -> str:
 
 
 def is_dark() -> bool:
-    """Return True if the present theme is the dark one, at any size of text."""
     return present.dark
 
 
@@ -190,7 +188,6 @@ class _Fixed(QObject):
 
 
 def fix_size(widget: QWidget, width: int | None = None, height: int | None = None) -> None:
-    """Fix a widget's size in pixels that grow with the text."""
     _Fixed(widget, width, height)
 
 

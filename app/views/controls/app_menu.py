@@ -134,7 +134,6 @@ class AppMenu(QMenu):
 
 
 def menu_button(menu: QMenu) -> QToolButton:
-    """The button in the header that opens the menu."""
     button = tool_button("☰", "Menu", "Open, record, export, instruments, settings, theme, text size and help (F10)")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)

@@ -186,7 +186,6 @@ class Browser(QFrame):
         self._fill()
 
     def _fill(self) -> None:
-        """List what passes the filter."""
         kinds = [box.currentData() for box in self.filters.values()]
         order = max(0, self.order.currentIndex())
         self._filling = True
@@ -296,7 +295,6 @@ class Browser(QFrame):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words that are searched for, in lower case."""
         return tuple(self.search.text().casefold().replace(",", " ").split())
 
     @property
@@ -356,11 +354,9 @@ class Browser(QFrame):
             self.dismiss()
 
     def ask_favourite(self) -> None:
-        """Ask for the selected row to become a favourite, or none."""
         self._emit_selected(self.favourite_asked)
 
     def play(self) -> None:
-        """Load the selected row, and have it played."""
         self._rest.stop()
         self.load(self.selected)
         self._emit_selected(self.played)
@@ -428,7 +424,6 @@ class Browser(QFrame):
 
 
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
-    """Refill a box with the kinds to filter by, after the entry for no filter; what is chosen stays."""
     with QSignalBlocker(box):
         previous = box.currentData()
         while box.count() > 1:

@@ -51,7 +51,6 @@ class FilterButton(QToolButton):
         self.clicked.connect(pressed)
 
     def show_listed(self, listed: int, total: int) -> None:
-        """Show the number of rows that pass the filter."""
         self.setVisible(listed < total)
         self.setText(f"{listed} of {total}  ✕")
         self.setAccessibleName(f"Filtered: {listed} of {total} {self._what}; clear the filter")

@@ -33,7 +33,6 @@ def form_label(text: str) -> QLabel:
 
 
 def filled_form(form: QFormLayout, rows: Rows) -> QFormLayout:
-    """The form with rows, by their labels."""
     form.setContentsMargins(NO_MARGINS)
     for name, row in rows.items():
         form.addRow(form_label(name), row)

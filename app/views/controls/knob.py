@@ -132,7 +132,6 @@ class Knob(QWidget):
 
     @property
     def text(self) -> str:
-        """The value in its unit."""
         return self.parameter.shown(self._value)
 
     def show_figure(self, figure: str) -> None:
@@ -311,5 +310,4 @@ class Knob(QWidget):
 
 
 def _fineness(event: QInputEvent) -> float:
-    """The factor of a gesture's steps: less than 1 with Shift."""
     return FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0

@@ -47,7 +47,6 @@ class Meter(QWidget):
 
     @property
     def _bar(self) -> QRectF:
-        """The bar at 0 dBFS."""
         return QRectF(12, 8, self.width() / theme.present.scale - 68, 9)
 
     @property

@@ -112,7 +112,6 @@ class NoticeBar(QFrame):
         return super().event(event)
 
     def _dismiss(self) -> None:
-        """Hide the notice, which has been read."""
         self.hide()
         self.bell.set_unseen(max(0, self.bell.unseen - 1))
 
@@ -179,7 +178,6 @@ class NoticeList(QDialog):
         column.setStretch(2, 2)
 
     def set_notices(self, notices: Sequence[Notice]) -> None:
-        """Show these notices, the latest last."""
         self._notices = list(reversed(notices))
         self._list.clear()
         for notice in self._notices:
@@ -190,7 +188,6 @@ class NoticeList(QDialog):
             self._details.setPlainText("No notices since the start.")
 
     def report(self) -> str:
-        """The whole list as text."""
         return "\n\n".join(
             f"{notice.last_reported} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
             for notice in self._notices

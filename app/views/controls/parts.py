@@ -114,7 +114,6 @@ def show_kind(widget: QWidget, kind: str) -> None:
 
 
 def faint(text: str = "") -> QLabel:
-    """A line of text in the faint colour."""
     return Label(text, objectName="faint")
 
 

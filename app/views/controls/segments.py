@@ -46,7 +46,6 @@ class Segments(QWidget):
 
     @property
     def key(self) -> str:
-        """The choice that is checked."""
         return self._keys[self._group.checkedId()]
 
     def show_key(self, key: str) -> None:

@@ -60,7 +60,6 @@ class SlotButtons(QWidget):
         self.show_choices(self._choices)
 
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
-        """Set the presets that a slot may hold."""
         self._entries = entries
         self._show()
 
@@ -98,7 +97,6 @@ class SlotButtons(QWidget):
                 button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
-        """The title of a source in full, and as a button shows it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
                 return entry.title, entry.title

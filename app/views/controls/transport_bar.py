@@ -5,15 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QMargins, QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLayout,
-    QSizePolicy,
-    QSpacerItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLayout, QSizePolicy, QSpacerItem, QVBoxLayout, QWidget
 
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
@@ -124,7 +116,6 @@ class TransportBar(QFrame):
         self._play.setText(words[0] if self._tight else words)
 
     def _show_verb(self, verb: str) -> None:
-        """Show the action of the button on string or drum."""
         if verb != self._verb:
             self._verb = verb
             self._play.setAccessibleName(f"{verb} or stop")

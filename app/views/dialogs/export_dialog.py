@@ -209,7 +209,6 @@ class ExportDialog(GrowingDialog):
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
-        """End the job, with this result."""
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)

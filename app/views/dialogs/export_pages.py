@@ -92,7 +92,6 @@ class ChoicesForm(QWidget):
         return filled_form(QFormLayout(self), rows)
 
     def values(self) -> dict[str, Any]:
-        """The fields of the choices, by name."""
         return {field: _value_of(control) for field, control in self._controls.items()}
 
 
@@ -507,7 +506,6 @@ def _value_of(control: Control) -> Any:
 
 
 def _change_of(control: Control) -> SignalInstance:
-    """The signal of each change of a control."""
     if isinstance(control, FilePicker):
         return control.changed
     if isinstance(control, QComboBox):

@@ -12,10 +12,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
-    QLayout,
     QLineEdit,
     QProgressBar,
-    QPushButton,
     QRadioButton,
     QStackedWidget,
     QVBoxLayout,
@@ -28,9 +26,9 @@ from app.patches.library import PatchError
 from app.playing.pair import Pair
 from app.shared.worker import Job
 from app.views.background import Background
-from app.views.controls.form import form_label, row_of
+from app.views.controls.form import Rows, filled_form, row_of
 from app.views.controls.number_box import NumberBox
-from app.views.controls.parts import combo_box, filled, label, read_only_text
+from app.views.controls.parts import NO_MARGINS, combo_box, filled, label, push_button, read_only_text
 from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
 from engine.plain_text import duration, name_text
@@ -84,10 +82,11 @@ class LearnDialog(GrowingDialog):
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
+        for choice in (self.string, self.body):
+            choice.toggled.connect(self._show_choice)
         self.name = QLineEdit(name_text(file.stem[:60]))
         self.name.setAccessibleName("Name of the instrument")
-        self.kind = combo_box("Instrument", KINDS, "guitar")
-        self.kind.setToolTip("For what a sound does not give: density and length")
+        self.kind = combo_box("Instrument", KINDS, "guitar", "For what a sound does not give: density and length")
         tip = "Type it where you know it; otherwise it is assumed"
         self.length_m = NumberBox("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
         self.gauge_mm = NumberBox("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
@@ -97,48 +96,38 @@ class LearnDialog(GrowingDialog):
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
         self.report = read_only_text("Report")
-        self.heard = {key: QPushButton(text) for key, text in HEARD}
-        self.start = QPushButton("Continue", default=True)
-        self.start.setObjectName("primary")
-        self.start.setToolTip("Learn the string, keep the instrument, or use the sound as a body")
-        self.close_button = QPushButton("Cancel")
+        tip = "Both play on, in a loop; the switch is at the same moment"
+        self.heard = {key: push_button(text, tip, checkable=True, autoDefault=True) for key, text in HEARD}
+        for key, button in self.heard.items():
+            button.clicked.connect(partial(self._hear, key))
+        tip = "Learn the string, keep the instrument, or use the sound as a body"
+        self.start = push_button("Continue", tip, kind="primary", pressed=self._continue, autoDefault=True)
+        self.start.setDefault(True)
+        self.close_button = push_button("Cancel", pressed=self.reject, autoDefault=True)
         self._pages = QStackedWidget()
         self._lay_out()
-        self._connect()
         self._examine()
 
     def _lay_out(self) -> None:
-        question, form = QWidget(), QFormLayout()
-        rows: dict[str, QWidget | QLayout] = {
+        form: Rows = {
             "Name": self.name,
             "Instrument": row_of(self.kind),
             "Length": row_of(self.length_m),
             "Diameter": row_of(self.gauge_mm),
         }
-        for name, part in rows.items():
-            form.addRow(form_label(name), part)
+        question, result = QWidget(), QWidget()
         heading = label(text="String or body?")
-        column = filled(QVBoxLayout(question), heading, self.string, form, self.body, None)
-        column.setContentsMargins(0, 0, 0, 0)
-        result, sounds = QWidget(), QHBoxLayout()
-        for button in self.heard.values():
-            button.setCheckable(True)
-            button.setToolTip("Both play on, in a loop; the switch is at the same moment")
-            sounds.addWidget(button, 1)
-        filled(QVBoxLayout(result), sounds, self.report).setContentsMargins(0, 0, 0, 0)
+        parts = heading, self.string, filled_form(QFormLayout(), form), self.body, None
+        filled(QVBoxLayout(question), *parts, margins=NO_MARGINS)
+        sounds = filled(QHBoxLayout(), *self.heard.values())
+        for place in range(sounds.count()):
+            sounds.setStretch(place, 1)
+        filled(QVBoxLayout(result), sounds, self.report, margins=NO_MARGINS)
         for page in (question, result):
             self._pages.addWidget(page)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
-        filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons).setSpacing(12)
+        filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons, spacing=12)
         self.bar.hide()
-
-    def _connect(self) -> None:
-        self.start.clicked.connect(self._continue)
-        self.close_button.clicked.connect(self.reject)
-        for choice in (self.string, self.body):
-            choice.toggled.connect(self._show_choice)
-        for key, button in self.heard.items():
-            button.clicked.connect(partial(self._hear, key))
 
     # String or body
 

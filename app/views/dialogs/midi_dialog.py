@@ -126,7 +126,6 @@ class MidiDialog(QDialog):
             box.setCurrentIndex(max(0, box.findData(values[field])))
 
     def set_patch_turnable(self, turnable: bool) -> None:
-        """Enable the controls of the patch if there is one to play."""
         for box in self._of_patch.values():
             box.setEnabled(turnable)
 
@@ -152,5 +151,4 @@ class MidiDialog(QDialog):
 
 
 def _bend(semitones: float) -> tuple[str, float]:
-    """The entry of a bend range."""
     return f"± {semitones:g} semitone{'' if semitones == 1 else 's'}", semitones

@@ -114,7 +114,6 @@ class Neck(Playable):
         return below[-1] if below else 0
 
     def fret_x(self, fret: float) -> float:
-        """The x of a fret, in pixels."""
         return theme.px(_NAMES_WIDTH) + fret_share(fret, self.frets) * (self.width() - theme.px(_NAMES_WIDTH) - 6)
 
     def cell(self, string: int, fret: int) -> QRectF:
@@ -241,7 +240,6 @@ class Neck(Playable):
         self._show_fingers()
 
     def lift(self) -> None:
-        """Take all fingers away."""
         self._fingers = {}
         self._show_fingers()
 
@@ -366,7 +364,6 @@ class Neck(Playable):
 
     @property
     def _dot(self) -> float:
-        """The size of a dot in pixels."""
         return min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
 
     def _paint_finger(self, painter: QPainter, string: int) -> None:
@@ -376,7 +373,6 @@ class Neck(Playable):
         painter.drawEllipse(middle, *(2 * [self._dot / 2]))
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
-        """Paint a dot where a string is stopped, and what swings of it."""
         size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)

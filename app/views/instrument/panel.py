@@ -160,7 +160,6 @@ class InstrumentPanel(QFrame):
 
     @property
     def surface(self) -> str:
-        """The shown surface, "keys" or "neck"."""
         return self._choice.key
 
     def show_surface(self, surface: str) -> None:
@@ -184,7 +183,6 @@ class InstrumentPanel(QFrame):
 
     @property
     def unfolded(self) -> bool:
-        """Return True if the string's knobs are shown."""
         return self._fold.isChecked()
 
     def set_unfolded(self, unfolded: bool) -> None:
@@ -228,7 +226,6 @@ class InstrumentPanel(QFrame):
         self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
-        """Set the lowest and the highest key that have a string."""
         for surface in self._surfaces:
             surface.set_range(low, high)
 
@@ -256,7 +253,6 @@ class InstrumentPanel(QFrame):
         self.neck.show_notes(notes)
 
     def show_source(self, source: str) -> None:
-        """Show the source that is heard, in whose colour keys are lit."""
         for surface in self._surfaces:
             surface.show_source(source)
 
@@ -270,7 +266,6 @@ class InstrumentPanel(QFrame):
             self._hint.setVisible(self.isEnabled() and not self._hinted)
 
     def release_all(self) -> None:
-        """Release all keys that are down."""
         for surface in self._surfaces:
             surface.release_all()
 

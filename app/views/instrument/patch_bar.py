@@ -285,11 +285,9 @@ class PatchBar(QFrame):
             QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
-        """Show the velocity with which the computer's keys strike."""
         self.velocity.setText(f"velocity {velocity}")
 
     def show_pitches(self, pitches: bool) -> None:
-        """Show octave and velocity if the computer's keys play pitches."""
         for widget in (self._lower, self.octave, self._higher, self.velocity):
             widget.setVisible(pitches)
 
@@ -326,7 +324,6 @@ class PatchBar(QFrame):
         button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
-        """Show the thing that is missing; "" for nothing."""
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
 
@@ -341,5 +338,4 @@ def _scale_name(scale: str) -> str:
 
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
-    """The name of a macro, and its targets in words."""
     return macro.name, [OF_PATCHES[target.field].name for target in macro.targets]

@@ -60,7 +60,6 @@ class PianoKeys(Playable):
     # Where keys are
 
     def _white_keys_before(self, key: int) -> int:
-        """The number of white keys left of a key."""
         return 7 * ((key - self._first) // 12) + _WHITE_BEFORE[key % 12]
 
     @property
@@ -163,10 +162,8 @@ def _own(key: int) -> str:
 
 
 def _silent_colour(key: int) -> QColor:
-    """The colour of a key without a string."""
     return theme.blended(_own(key), theme.LINE, 0.3)
 
 
 def _ink(filling: QColor) -> str:
-    """The colour of text on it."""
     return max(theme.TEXT, theme.BACKGROUND, key=lambda ink: theme.contrast(ink, filling.name()))

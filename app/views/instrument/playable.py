@@ -108,7 +108,6 @@ class Playable(QWidget):
         return Spot(self._cursor.key + _MOVES[arrow])
 
     def place_words(self, spot: Spot) -> str:
-        """The words of what is there."""
         return note_name(spot.key)
 
     def typed(self, all_strings: bool) -> list[Spot]:
@@ -173,7 +172,6 @@ class Playable(QWidget):
         return frozenset(spot.key for spot in self._held)
 
     def release_all(self) -> None:
-        """Release all keys that are down."""
         self._release_typed()
         self._release_mouse()
         for spot in sorted(self._held):
@@ -222,7 +220,6 @@ class Playable(QWidget):
         return self._levels.get(key, 0) / LEVEL_STEPS
 
     def is_down(self, key: int) -> bool:
-        """Return True if a key is pressed here, or stays down by itself."""
         return any(spot.key == key for spot in self.down)
 
     @property
@@ -296,7 +293,6 @@ class Playable(QWidget):
         self._show_velocity(self._at, self._played)
 
     def _move_to(self, spot: Spot, velocity: int) -> None:
-        """Play what the mouse has met next."""
         before, self._down = self._down, spot
         assert before is not None
         for left in [other for other in self._strummed if other.string == spot.string]:
@@ -325,7 +321,6 @@ class Playable(QWidget):
             self._release_mouse()
 
     def _release_mouse(self) -> None:
-        """Release what the mouse has pressed."""
         down, self._down = self._down, None
         left, self._strummed = [*self._strummed, *([] if down is None else [down])], []
         for spot in left:
