@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
-from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPen, QPixmap, QPolygonF, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.controls.parts import tool_button
+from app.views.painting import set_ink, write
 from app.views.plots.legend import paint_sources
 from engine.pluck import DEFAULT_LISTEN
 
@@ -156,8 +157,7 @@ class StageView(QWidget):
             elif remark := self._warning or self._heard_remark:
                 paint_remark(painter, self.width(), remark)
             if self.hasFocus():
-                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-                painter.setBrush(Qt.BrushStyle.NoBrush)
+                set_ink(painter, theme.translucent(theme.TEXT, 150), 1.5)
                 painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
@@ -169,8 +169,7 @@ def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
     gradient = QLinearGradient(0, 0, 0, height)
     gradient.setColorAt(0, QColor(theme.present.ground_top))
     gradient.setColorAt(1, QColor(theme.present.ground_bottom))
-    painter.setPen(QPen(QColor(theme.LINE), 1))
-    painter.setBrush(gradient)
+    set_ink(painter, theme.LINE, fill=gradient)
     painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
 
 
@@ -185,26 +184,21 @@ def paint_legend(
     room = right - MARGIN_X
     x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
     if warning:
-        painter.setPen(QColor(colour))
-        painter.setFont(theme.small_font(11))
         place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
-        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
-        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+        align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        write(painter, place, warning, colour, theme.small_font(11), align, place.width())
 
 
 def paint_remark(painter: QPainter, width: float, text: str) -> None:
     """Paint a line in the upper left corner, why nothing is heard."""
-    painter.setPen(QColor(theme.FAINT))
-    painter.setFont(theme.small_font(11))
     room = width - 2 * MARGIN_X
-    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
-    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
+    place = QRectF(MARGIN_X, LEGEND_Y - 10, room, 20)
+    write(painter, place, text, theme.FAINT, theme.small_font(11), Qt.AlignmentFlag.AlignVCenter, room)
 
 
 def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> None:
     """Paint the foot of a listening point, below the picture."""
-    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.GOOD))
+    set_ink(painter, theme.TEXT if grabbed else None, 1.5, theme.GOOD)
     painter.drawPolygon(
         QPolygonF([QPointF(x, bottom + 2), QPointF(x - FOOT, bottom + 15), QPointF(x + FOOT, bottom + 15)])
     )
@@ -212,10 +206,9 @@ def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> Non
 
 def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: float, bottom: float) -> None:
     """Words below the feet at these x; two that are near each other make room for one another."""
-    painter.setPen(QColor(theme.GOOD))
-    painter.setFont(theme.small_font(11))
-    for place, text in label_places(painter.fontMetrics(), marks, width, bottom):
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)
+    font = theme.small_font(11)
+    for place, text in label_places(QFontMetrics(font), marks, width, bottom):
+        write(painter, place, text, theme.GOOD, font)
 
 
 def label_places(

@@ -24,6 +24,7 @@ from app.views import theme
 from app.views.controls.number_box import refusal, say_above
 from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.controls.plain import plain_tip
+from app.views.painting import set_ink, write
 
 SWEEP_DEGREES = 270
 WIDTH, NARROW_WIDTH = 62, 52
@@ -294,19 +295,15 @@ class Knob(QWidget):
         painter.drawArc(ring, round(start * 16), -round(SWEEP_DEGREES * share * 16))
         angle = math.radians(start - SWEEP_DEGREES * share)
         direction = QPointF(math.cos(angle), -math.sin(angle))
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.LINE if self.hasFocus() else theme.RAISED))
+        set_ink(painter, fill=theme.LINE if self.hasFocus() else theme.RAISED)
         painter.drawEllipse(middle, radius - 5, radius - 5)
         painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
-        painter.setFont(theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10, grows=False))
-        painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
-        name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, int(width))
-        painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)
-        painter.setPen(ink)
-        painter.setFont(theme.small_font(10 if self._low else 12, grows=False))
+        small = theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10, grows=False)
+        above = QRectF(0, 0 if self._low else 3, width, 14)
+        write(painter, above, self._name.upper(), theme.TEXT if self.hasFocus() else theme.FAINT, small, room=width)
         foot = QRectF(0, height - (17 if self._low else 23), width, 18)
-        painter.drawText(foot, Qt.AlignmentFlag.AlignCenter, self._figure or self.text)
+        write(painter, foot, self._figure or self.text, ink, theme.small_font(10 if self._low else 12, grows=False))
 
 
 def _fineness(event: QInputEvent) -> float:

@@ -309,13 +309,17 @@ class PatchBar(QFrame):
         on, waits = seconds is not None, seconds is None and self._unsaved > 0
         button.setChecked(on)
         if seconds is not None:
-            text = f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}"
-            name, tip = "End recording", "End the recording and save it"
+            words = (
+                f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}",
+                "End recording",
+                "End the recording and save it",
+            )
         elif waits:
-            text, name = "●  Unsaved  ▾", "Recording that is not saved"
             tip = "What was played is not saved yet: save it, or discard it to record again"
+            words = "●  Unsaved  ▾", "Recording that is not saved", tip
         else:
-            text, name, tip = "●  Record", "Record what is played", "Record what is played"
+            words = "●  Record", "Record what is played", "Record what is played"
+        text, name, tip = words
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from PySide6.QtCore import QMargins, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtCore import QMargins, QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.patches.patch import Patch
@@ -16,6 +16,7 @@ from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import NO_MARGINS, filled, vertical_rule
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, SHAPE_TIP, shape_box
+from app.views.painting import write
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT = 13
@@ -66,12 +67,12 @@ class Facts(QWidget):
         x = 2
         for name, value in self._facts.items():
             for words, ink, bold, gap in ((name, theme.FAINT, False, 5), (value, theme.TEXT, True, 20)):
-                painter.setFont(theme.small_font(11, bold))
-                wide = painter.fontMetrics().horizontalAdvance(words)
+                font = theme.small_font(11, bold)
+                wide = QFontMetrics(font).horizontalAdvance(words)
                 if x + wide > self.width() and x > 2:
                     return
-                painter.setPen(QColor(ink))
-                painter.drawText(x, 0, self.width() - x, self.height(), Qt.AlignmentFlag.AlignVCenter, words)
+                place = QRectF(x, 0, self.width() - x, self.height())
+                write(painter, place, words, ink, font, Qt.AlignmentFlag.AlignVCenter)
                 x += wide + gap
 
 
