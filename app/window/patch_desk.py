@@ -516,14 +516,14 @@ class PatchDesk(QObject):
         if isinstance(patch.strings, Drums):
             key = self._instruments.drum_key
             drum = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
-            knobs.show_facts(facts_of_drum(drum))
+            knobs.facts.show_facts(facts_of_drum(drum))
             knobs.show_figures({})
             return None
         try:
             key_string = Strings(patch).of_key(*self._instruments.shown_key(patch))
         except ValueError as error:
             facts = {"string": str(error)}
-        knobs.show_facts(facts if key_string is None else facts_of(key_string))
+        knobs.facts.show_facts(facts if key_string is None else facts_of(key_string))
         knobs.show_figures({} if key_string is None else figures_of(key_string.parameters, patch))
         return key_string
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QHBoxLayout, QLabel, QLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QHBoxLayout, QLayout, QLineEdit, QWidget
 
 from app.views import theme
 from app.views.controls.parts import NO_MARGINS, filled, tool_button
@@ -24,18 +24,14 @@ FILTERS = {
 }
 
 
-def form_label(text: str) -> QLabel:
-    """A form's label; all are of one width, so that the forms of a dialog are aligned."""
-    title = Label(text, minimumHeight=28)
-    title.setFixedWidth(theme.px(LABEL_WIDTH))
-    title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return title
-
-
 def filled_form(form: QFormLayout, rows: Rows) -> QFormLayout:
+    """The form with rows, by their labels; all are of one width, so that the forms of a dialog are aligned."""
     form.setContentsMargins(NO_MARGINS)
     for name, row in rows.items():
-        form.addRow(form_label(name), row)
+        title = Label(name, minimumHeight=28)
+        title.setFixedWidth(theme.px(LABEL_WIDTH))
+        title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        form.addRow(title, row)
     return form
 
 

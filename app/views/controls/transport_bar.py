@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QMargins, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QMargins, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLayout, QSizePolicy, QSpacerItem, QVBoxLayout, QWidget
 
 from app.session.choices import Choices
@@ -36,11 +36,11 @@ class TransportBar(QFrame):
         self.setObjectName("panel")
         self.knobs = {field: Knob(OF_CHOICES[field]) for field in KNOBS}
         for field, knob in self.knobs.items():
-            knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
+            knob.value_asked.connect(partial(self.change_asked.emit, field))
         self.meter = Meter()
         self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)", checkable=True)
         self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
+        self._loop.toggled.connect(partial(self.change_asked.emit, "loop"))
         self._fitted = (False, False, 1.0)  # compact, tight, scale of text
         self._tight, self._verb = False, ""
         self._groups: list[QHBoxLayout] = []
@@ -57,10 +57,14 @@ class TransportBar(QFrame):
             "time": (self._group(knobs["seconds"], knobs["speed"]),),
         }
         areas = *self.areas["slots"], *self.areas["pluck"], listener, *self.areas["time"]
-        filled(row, self._build_transport(), *areas)
+        self._play = push_button("", kind="play", pressed=self._ask_play, checkable=True)
+        self._show_verb("Pluck")
+        filled(row, filled(QVBoxLayout(), self._play, self._loop), *areas)
         self._space = QSpacerItem(0, 0, QSizePolicy.Policy.Expanding)
         row.addItem(self._space)
-        filled(row, vertical_rule(), knobs["volume_db"], self._build_output())
+        tip = "Save what you hear as a WAV file (Ctrl+E)"
+        self.export = push_button("Export …", tip, "Export", pressed=self.export_asked)
+        filled(row, vertical_rule(), knobs["volume_db"], filled(QVBoxLayout(), self.meter, self.export))
 
     def add_group(self, group: QWidget) -> None:
         """Put controls of others behind its own, before the volume."""
@@ -91,17 +95,14 @@ class TransportBar(QFrame):
         for field, knob in self.knobs.items():
             knob.set_value(getattr(choices, field))
         self.knobs["width"].set_barred(NO_WIDTH if choices.shape == "triangular" else "")
-        with QSignalBlocker(self._shape):
-            self._shape.setCurrentIndex(SHAPES.index(choices.shape))
+        self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
         for field in ("listen", "listen_right"):
             self.knobs[field].set_barred(AT_BRIDGE if choices.pickup == "bridge" else "")
-        self.knobs["listen_right"].setEnabled(
-            choices.stereo and choices.pickup != "bridge"
-        )  # not hidden, which would move the controls beside it
-        with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
-            self._stereo.setChecked(choices.stereo)
-            self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
+        # not hidden, which would move the controls beside it
+        self.knobs["listen_right"].setEnabled(choices.stereo and choices.pickup != "bridge")
+        self._stereo.setChecked(choices.stereo)
+        self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
         self._show_verb("Pluck" if choices.drums is None else "Strike")
@@ -127,15 +128,10 @@ class TransportBar(QFrame):
         self._playing = None
         self.play_asked.emit()
 
-    def _build_transport(self) -> QVBoxLayout:
-        self._play = push_button("", kind="play", pressed=self._ask_play, checkable=True)
-        self._show_verb("Pluck")
-        return filled(QVBoxLayout(), self._play, self._loop)
-
     def _build_pickup(self) -> QVBoxLayout:
         tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}"
         self._stereo = tool_button("Stereo", tip=tip, checkable=True)
-        self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
+        self._stereo.clicked.connect(partial(self.change_asked.emit, "stereo"))
         self._pickup = pickup_box(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
@@ -154,11 +150,6 @@ class TransportBar(QFrame):
         column.addWidget(self._shape)
         column.addStretch(2)
         return column
-
-    def _build_output(self) -> QVBoxLayout:
-        tip = "Save what you hear as a WAV file (Ctrl+E)"
-        self.export = push_button("Export …", tip, "Export", pressed=self.export_asked)
-        return filled(QVBoxLayout(), self.meter, self.export)
 
     def _group(self, *parts: QWidget | QLayout) -> QWidget:
         """A rule and parts beside each other, which are shown and hidden together."""

@@ -242,7 +242,9 @@ class NotePage(ExportPage):
         alone = note.can_be_alone and not self.through.isChecked()
         self.through.setVisible(note.can_be_alone)
         self.through_words.setText(_through_words(note, alone, source))
-        self.what.setText(_note_words(self._subject, alone))
+        struck = None if alone else note.struck
+        key_words = struck and f"Note: {struck.words}, held, with the present settings"
+        self.what.setText(key_words or self._subject.words)
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
         model_rate = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else model_rate)
@@ -478,12 +480,6 @@ def _this_system() -> str:
         return this_target()
     except PluginError:
         return next(iter(SYSTEM_NAMES))
-
-
-def _note_words(subject: HeardNote, alone: bool) -> str:
-    """The subject of an export: a key as the instrument plays it, or a pluck."""
-    struck = None if alone else subject.note.struck
-    return subject.words if struck is None else f"Note: {struck.words}, held, with the present settings"
 
 
 def _through_words(note: ExportedPluck, alone: bool, source: Chosen) -> str:

@@ -140,13 +140,10 @@ class Neck(Playable):
     def key_rect(self, key: int) -> QRectF:
         if not self.in_rows:
             return self._column(key).adjusted(-4, 0, 4, 0)
-        cell = self._cell_of(key).adjusted(-10, -5, 0, 5)
+        string = self.string_of(key)
+        cell = self.cell(string, min(key - self._strings[string][1], self.frets)).adjusted(-10, -5, 0, 5)
         cell.setRight(self.width())  # the string is lit from there on
         return cell
-
-    def _cell_of(self, key: int) -> QRectF:
-        string = self.string_of(key)
-        return self.cell(string, min(key - self._strings[string][1], self.frets))
 
     def _column(self, key: int) -> QRectF:
         width = self.width() / (self._high - self._low + 1)
@@ -331,8 +328,10 @@ class Neck(Playable):
 
     def _paint_stops(self, painter: QPainter) -> None:
         """Fingers and what is down; above them, strings that sound, where they are stopped now."""
-        for string in self.fingers:
-            self._paint_finger(painter, string)
+        set_ink(painter, theme.TEXT, 1.5, theme.RAISED)
+        for string, stop in self.fingers.items():
+            middle = QPointF(self._stop_x(stop, self._dot), self.cell(string, 0).center().y())
+            painter.drawEllipse(middle, *(2 * [self._dot / 2]))
         for spot in self.down:
             if not self.level(spot.key) > 0:
                 string = self._row_of(spot)
@@ -361,11 +360,6 @@ class Neck(Playable):
     @property
     def _dot(self) -> float:
         return min(LARGEST_DOT, self._bottom / len(self._strings) - 2)
-
-    def _paint_finger(self, painter: QPainter, string: int) -> None:
-        middle = QPointF(self._stop_x(self.fingers[string], self._dot), self.cell(string, 0).center().y())
-        set_ink(painter, theme.TEXT, 1.5, theme.RAISED)
-        painter.drawEllipse(middle, *(2 * [self._dot / 2]))
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
         size = self._dot

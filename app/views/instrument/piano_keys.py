@@ -107,20 +107,18 @@ class PianoKeys(Playable):
         marked = self.marked
         covering = {black for key in marked for black in (key - 1, key + 1) if is_black(black) and not is_black(key)}
         for key in sorted(marked | covering, key=is_black):
-            if self.key_rect(key).intersects(dirty):
-                self._paint_key(painter, key, self._fill_colour(key))
-                if key in self.held:
-                    self._paint_pin(painter, key)
+            rect, filling = self.key_rect(key), self._fill_colour(key)
+            if not rect.intersects(dirty):
+                continue
+            self._paint_key(painter, key, filling)
+            if key in self.held:  # by itself: it has a dot
+                set_ink(painter, fill=_ink(filling))
+                dot = QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38))
+                painter.drawEllipse(dot, 2.5, 2.5)
         if self.shows_cursor:
             key = self.chosen.key
             set_ink(painter, _ink(self._fill_colour(key)), 1.5)
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
-
-    def _paint_pin(self, painter: QPainter, key: int) -> None:
-        """Paint a dot on a key that stays down by itself."""
-        rect = self.key_rect(key)
-        set_ink(painter, fill=_ink(self._fill_colour(key)))
-        painter.drawEllipse(QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38)), 2.5, 2.5)
 
     def _fill_colour(self, key: int) -> QColor:
         if not self.sounds(key):

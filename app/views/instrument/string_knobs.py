@@ -145,10 +145,6 @@ class StringKnobs(QWidget):
         self.shape.setEnabled(not barred)
         self.shape.setToolTip(barred or SHAPE_TIP)
 
-    def show_facts(self, facts: Mapping[str, str]) -> None:
-        """Show the resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
-        self.facts.show_facts(facts)
-
     def show_figures(self, figures: Mapping[str, str]) -> None:
         """Show the figures that knobs amount to in that string, by field ("knobs.tension": "72.3 N").
 

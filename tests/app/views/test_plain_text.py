@@ -100,7 +100,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
         qtbot.addWidget(view)
     panel.bar.show_patch(patch, own=True, changed=True)
     panel.bar.show_note(EVIL)
-    panel.knobs.show_facts({EVIL: EVIL})
+    panel.knobs.facts.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
     browser.show_rows([patch_row(entry)], (), entry.name, EVIL)
     for view in views:
