@@ -119,7 +119,12 @@ def _luminance(colour: QColor) -> float:
 def _style_sheet() -> str:
     tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
     values = {**present.colours, "tick": tick.as_posix()}
-    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", SHEET.read_text("utf-8"))
+    lines = [
+        line.replace("@source", source)
+        for line in SHEET.read_text("utf-8").splitlines()
+        for source in (SOURCE_COLOURS if "@source" in line else [""])
+    ]
+    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", "\n".join(lines))
     return re.sub(r"@(\w+)", lambda match: values[match[1]], sheet)
 
 
