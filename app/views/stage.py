@@ -121,12 +121,6 @@ class StageView(QWidget):
             button.setGeometry(right, 6, size.width(), theme.px(22))
             right -= 6
 
-    @property
-    def _heard_remark(self) -> str:
-        """The source that sounds instead of the model, in words, for a picture without a legend."""
-        others = (source.title for source in self._sources if source.heard and source.source != "model")
-        return next((f"You hear: {title}" for title in others), "")
-
     def _paint_ground(self, painter: QPainter) -> None:
         """Paint the ground behind the motion, on the backdrop."""
 
@@ -154,8 +148,10 @@ class StageView(QWidget):
             if not self._plain:
                 colour = theme.WARNING if self._grave else theme.FAINT
                 paint_legend(painter, self._sources, self._warning, colour, self._toggles[0].x() - 14)
-            elif remark := self._warning or self._heard_remark:
-                paint_remark(painter, self.width(), remark)
+            else:
+                others = (source.title for source in self._sources if source.heard and source.source != "model")
+                heard = next((f"You hear: {title}" for title in others), "")  # there is no legend
+                paint_remark(painter, self.width(), self._warning or heard)
             if self.hasFocus():
                 set_ink(painter, theme.translucent(theme.TEXT, 150), 1.5)
                 painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)

@@ -59,7 +59,9 @@ class FilePicker(QWidget):
 
     def __init__(self, folder: str, tip: str, suffix: str = ".wav") -> None:
         super().__init__()
-        self._folder, self.suffix = folder or music_folder(), suffix
+        music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
+        self._folder = folder or (music if music and Path(music).is_dir() else str(Path.home()))
+        self.suffix = suffix
         self._named_by_user = False
         self.edit = QLineEdit()
         self.edit.setAccessibleName("File")
@@ -106,9 +108,3 @@ class FilePicker(QWidget):
     def _name_edited(self) -> None:
         self._named_by_user = True
         self.changed.emit()
-
-
-def music_folder() -> str:
-    """The user's folder for music, else the home folder."""
-    music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
-    return music if music and Path(music).is_dir() else str(Path.home())

@@ -104,7 +104,6 @@ class Knob(QWidget):
     ) -> None:
         super().__init__(parent)
         self.parameter, self.default = parameter, parameter.default  # to which a double-click resets
-        self._name = parameter.label
         self._value = parameter.default
         self._dragged_at: QPointF | None = None
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long

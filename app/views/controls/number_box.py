@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtCore import QPoint
+from PySide6.QtCore import QPoint, QRect
 from PySide6.QtGui import QKeyEvent, QValidator
 from PySide6.QtWidgets import QDoubleSpinBox, QToolTip, QWidget
 
@@ -20,9 +20,9 @@ TIP_ABOVE = 44  # pixels over a widget, out of the way of the hand
 _NOTE_BEGUN = re.compile(r"([A-Ga-g][#♯b♭]?-?\d?|\d{0,3})", re.ASCII)
 
 
-def say_above(widget: QWidget, words: str) -> None:
-    """Show words above a widget for a while, as plain text."""
-    QToolTip.showText(widget.mapToGlobal(QPoint(0, -TIP_ABOVE)), plain_tip(words), widget)
+def say_above(widget: QWidget, words: str, shown_ms: int = -1) -> None:
+    """Show words above a widget as plain text, for a while, or for a time in ms."""
+    QToolTip.showText(widget.mapToGlobal(QPoint(0, -TIP_ABOVE)), plain_tip(words), widget, QRect(), shown_ms)
 
 
 def refusal(text: str, example: str) -> str:

@@ -62,7 +62,8 @@ class SetupPage(QWidget):
         self._needed.setMinimumWidth(320)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
         form = filled_form(QFormLayout(), rows)
-        _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons)
+        parts = label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
         self._show_trials(choices.trials)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -131,7 +132,8 @@ class TrialPage(QWidget):
             sounds.setStretch(place, 1)
             answers.setStretch(place, 1)
         last = filled(QHBoxLayout(), None, self.stop)
-        _stack(self, self._number, self._bar, None, sounds, self._hint, answers, None, keys, last)
+        parts = self._number, self._bar, None, sounds, self._hint, answers, None, keys, last
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
         self._acts: dict[int, Callable[[], object]] = {
             **{getattr(Qt.Key, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
             **dict.fromkeys((Qt.Key.Key_1, Qt.Key.Key_Left), self._answers["A"].click),  # nothing while disabled
@@ -185,7 +187,8 @@ class ResultPage(QWidget):
         self.again = push_button("New test", "Back to the first page")
         self.close_button = push_button("Close", "Close the listening test")
         last = filled(QHBoxLayout(), None, self.save, self.again, self.close_button)
-        _stack(self, None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved, last)
+        parts = None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved, last
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
 
     def show_record(self, record: AbxRecord) -> None:
         answered = len(record.trials)
@@ -210,7 +213,3 @@ def _centred(style: str = "") -> QLabel:
     text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
     text_label.setStyleSheet(style)
     return text_label
-
-
-def _stack(page: QWidget, *parts: QWidget | QLayout | None) -> None:
-    filled(QVBoxLayout(page), *parts, spacing=14, margins=NO_MARGINS)

@@ -24,7 +24,7 @@ from app.audio.note_file import NoteFileError
 from app.audio.sound import Sound
 from app.patches.library import PatchError
 from app.playing.pair import Pair
-from app.shared.worker import Job
+from app.shared.worker import Job, Work
 from app.views.background import Background
 from app.views.controls.form import Rows, filled_form, row_of
 from app.views.controls.number_box import NumberBox
@@ -192,13 +192,10 @@ class LearnDialog(GrowingDialog):
             (learned,) = learn_files([self._file], progress=job.progress, **choices)
             return learned, both_sounds(learned, rate_hz)
 
-        self._pages.setEnabled(False)
-        self.start.setEnabled(False)
         self.bar.setValue(0)
         self.bar.show()
         self._began_s = time.monotonic()
-        self._then = self._show_learned
-        self._background.start(work)
+        self._begin(work, self._show_learned)
 
     def _show_progress(self, share: float, *_: object) -> None:
         self.bar.setValue(round(1000 * share))
@@ -219,7 +216,6 @@ class LearnDialog(GrowingDialog):
         self.start.setText("Keep and play" if has_string else "Keep all the same")
         self.start.setDefault(has_string)
         self.start.setAutoDefault(has_string)
-        self.start.setEnabled(True)
         self.heard["learned"].setFocus()
 
     def _hear(self, name: str) -> None:
@@ -247,9 +243,12 @@ class LearnDialog(GrowingDialog):
             assert learned is not None
             return keep(name, [learned], kind)
 
+        self._begin(work, self._show_kept)
+
+    def _begin(self, work: Work, then: Callable[[Any], None]) -> None:
         self._pages.setEnabled(False)
         self.start.setEnabled(False)
-        self._then = self._show_kept
+        self._then = then
         self._background.start(work)
 
     def _show_kept(self, kept: object) -> None:
@@ -266,15 +265,14 @@ class LearnDialog(GrowingDialog):
             self._show_choice()
             return
         self._show_ready(message)
-        self.start.setEnabled(True)
 
     def _show_cancelled(self) -> None:
         self._show_ready("Cancelled. Learn continues there.")
-        self.start.setEnabled(True)
 
     def _show_ready(self, words: str) -> None:
         self.bar.hide()
         self._pages.setEnabled(True)
+        self.start.setEnabled(True)
         self.state.setText(words)
 
     def may_close(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QMenu,
     QSizePolicy,
     QToolButton,
-    QToolTip,
     QVBoxLayout,
     QWidget,
 )
@@ -28,6 +27,7 @@ from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.choosers import FilterButton, NameButton
 from app.views.controls.knob import NARROW_WIDTH, Knob
+from app.views.controls.number_box import say_above
 from app.views.controls.overflow import Overflow
 from app.views.controls.parts import NO_MARGINS, combo_box, faint, filled, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
@@ -38,7 +38,6 @@ ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
 SAID_MS = 2_500  # a text that says why the octave stops or moves
-SAID_ABOVE = 44  # pixels
 COMPARE_TIP = (
     "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
 )
@@ -281,8 +280,7 @@ class PatchBar(QFrame):
     def say_octave(self, text: str) -> None:
         """Show above the octave, for SAID_MS, why it is what it is."""
         if self.octave.isVisible():
-            place = self.octave.mapToGlobal(QPoint(0, -SAID_ABOVE))
-            QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
+            say_above(self.octave, text, SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
         self.velocity.setText(f"velocity {velocity}")
