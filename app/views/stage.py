@@ -55,12 +55,9 @@ class StageView(QWidget):
         self._toggles: list[QToolButton] = []
 
     def _add_toggle(self, text: str, tip: str, toggled: SignalInstance) -> None:
-        button = tool_button(text, text, tip)
-        button.setObjectName("chip")
+        button = tool_button(text, text, tip, "chip", toggled, checkable=True)
         button.setParent(self)
-        button.setCheckable(True)
         button.setCursor(Qt.CursorShape.ArrowCursor)
-        button.clicked.connect(toggled)
         self._toggles.append(button)
 
     # State

@@ -98,21 +98,18 @@ class AppMenu(QMenu):
         for title, entries in MENUS.items():
             menu = self.addMenu(title)
             for entry in entries:
-                self._add(menu, entry)
+                plucks = entry.key == "Return"
+                action = menu.addAction(f"{entry.text}\t{entry.key_name}" if plucks else entry.text)
+                self.action[entry.name] = action
+                if not plucks:
+                    action.setShortcut(QKeySequence(entry.key))
+                    action.setAutoRepeat(False)
             if title == LOOK_MENU:
                 menu.addSeparator()
                 self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
                 self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         if window is not None:
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
-
-    def _add(self, menu: QMenu, entry: MenuEntry) -> None:
-        plucks = entry.key == "Return"
-        action = menu.addAction(f"{entry.text}\t{entry.key_name}" if plucks else entry.text)
-        self.action[entry.name] = action
-        if not plucks:
-            action.setShortcut(QKeySequence(entry.key))
-            action.setAutoRepeat(False)
 
     def show_look(self, look: Look) -> None:
         for (field, value), action in self._looks.items():

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from PySide6.QtCore import QEvent, QModelIndex, QObject, QSignalBlocker, Qt, QTimer, Signal, SignalInstance
+from PySide6.QtCore import QEvent, QModelIndex, QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -211,18 +211,18 @@ class Browser(QFrame):
 
     def clear_filter(self) -> None:
         """List all again; the order is no filter. Emits `listed_changed` once."""
-        parts = (self.search, *self.filters.values(), self.starred)
-        blockers = [QSignalBlocker(part) for part in parts]
+        self._filling = True
         self.search.clear()
         for box in self.filters.values():
             box.setCurrentIndex(0)
         self.starred.setChecked(False)
-        del blockers
+        self._filling = False
         self._filter_changed()
 
     def _filter_changed(self) -> None:
-        self.selected = ""  # the best hit is selected
-        self._fill()
+        if not self._filling:
+            self.selected = ""  # the best hit is selected
+            self._fill()
 
     def show_card(self, name: str) -> None:
         """Show the card of a row; "" of none."""
@@ -335,7 +335,9 @@ class Browser(QFrame):
         names = self.listed
         if names:
             self.list.setFocus()  # where Space plays
-            row = names.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
+            page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
+            steps = dict(zip(MOVES, (-1, 1, -page, page), strict=True))
+            row = names.index(self.selected) + (steps[key] if self.selected == self.loaded else 0)
             self.load(names[min(max(row, 0), len(names) - 1)])
             if self._at_rest:
                 self._rest.start()
@@ -391,11 +393,6 @@ class Browser(QFrame):
         if index.column() != STAR and isinstance(self.list.line(index), BrowserRow):
             self.dismiss()
 
-    def step(self, key: Qt.Key) -> int:
-        """Rows that one of MOVES goes."""
-        page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
-        return {KEYS.Key_Up: -1, KEYS.Key_Down: 1, KEYS.Key_PageUp: -page, KEYS.Key_PageDown: page}[key]
-
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.parent() or isinstance(watched, NoticeBar):
             if event.type() in _PLACES and self.isVisible():
@@ -424,13 +421,12 @@ class Browser(QFrame):
 
 
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
-    with QSignalBlocker(box):
-        previous = box.currentData()
-        while box.count() > 1:
-            box.removeItem(1)
-        for value, words in kinds:
-            box.addItem(words, value)
-        box.setCurrentIndex(max(0, box.findData(previous)))
+    previous = box.currentData()
+    while box.count() > 1:
+        box.removeItem(1)
+    for value, words in kinds:
+        box.addItem(words, value)
+    box.setCurrentIndex(max(0, box.findData(previous)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

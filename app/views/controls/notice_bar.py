@@ -143,9 +143,8 @@ class NoticeBar(QFrame):
 class Bell(QToolButton):
     """The button that opens the list, with the number of notices that have not been seen there."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.unseen = 0
+    def __init__(self) -> None:
+        super().__init__()
         self.set_unseen(0)
 
     def set_unseen(self, unseen: int) -> None:
