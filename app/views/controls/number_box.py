@@ -109,7 +109,7 @@ class CountBox(NumberBox):
 
 
 class NoteBox(CountBox):
-    """A field for a key, shown as a note (E2, F♯3), typed also as F#3, Gb3 or a MIDI number, which is its value."""
+    """A field for a key by its MIDI number, shown as a note (E2, F♯3). F#3, Gb3 or the number can be typed."""
 
     def __init__(self, name: str, tip: str) -> None:
         super().__init__(name, 99, 0, tip, least=0, width=64)

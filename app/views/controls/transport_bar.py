@@ -131,7 +131,7 @@ class TransportBar(QFrame):
     def _build_pickup(self) -> QVBoxLayout:
         tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}"
         self._stereo = tool_button("Stereo", tip=tip, checkable=True)
-        self._stereo.clicked.connect(partial(self.change_asked.emit, "stereo"))
+        self._stereo.clicked.connect(lambda on: self.change_asked.emit("stereo", on))
         self._pickup = pickup_box(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "

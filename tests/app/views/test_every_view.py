@@ -78,7 +78,7 @@ from app.views.plots import figures_table, kept_plot, legend, plots, pointed_plo
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
-BASES = {"ExportPage", "GrowingDialog", "Playable", "StageView"}
+BASES = {"ChoicesForm", "ExportPage", "GrowingDialog", "Playable", "StageView"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
