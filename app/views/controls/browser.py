@@ -16,7 +16,6 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
-    QComboBox,
     QFrame,
     QHBoxLayout,
     QHeaderView,
@@ -27,7 +26,7 @@ from PySide6.QtWidgets import (
 
 from app.views.controls.browser_rows import STAR, TITLE, BrowserColumn, BrowserRow, RowList, listed_rows
 from app.views.controls.notice_bar import NoticeBar
-from app.views.controls.parts import combo_box, faint, filled, push_button, scrolled, tool_button, words_label
+from app.views.controls.parts import combo_box, faint, filled, push_button, refill, scrolled, tool_button, words_label
 from app.views.controls.plain import Label
 
 KEYS = Qt.Key
@@ -179,7 +178,9 @@ class Browser(QFrame):
         self._folder = folder
         self._filling = True
         for number, box in enumerate(self.filters.values()):
-            _refill(box, sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0])))
+            kinds = sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0]))
+            entries = [(box.itemText(0), ""), *((words, value) for value, words in kinds)]  # the first: no filter
+            refill(box, entries, box.currentData())
         self._rows, self._favourites = rows, favourites
         if loaded != self.loaded:
             self.loaded = self.selected = loaded
@@ -418,15 +419,6 @@ class Browser(QFrame):
         if event.key() == KEYS.Key_Space and watched is self.search:
             return not control and self.search.selectedText() == self.search.text()  # nothing is being written
         return event.key() in (*CLOSES, KEYS.Key_Space, *MOVES) and not control
-
-
-def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
-    previous = box.currentData()
-    while box.count() > 1:
-        box.removeItem(1)
-    for value, words in kinds:
-        box.addItem(words, value)
-    box.setCurrentIndex(max(0, box.findData(previous)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

@@ -97,12 +97,19 @@ def combo_box(
     box = QComboBox()
     box.setAccessibleName(name)
     box.setToolTip(tip)
-    for text, data in entries:
-        box.addItem(text, data)
-    box.setCurrentIndex(max(0, box.findData(chosen)))
+    refill(box, entries, chosen)
     if picked is not None:
         box.activated.connect(lambda row: picked(box.itemData(row)))
     return box
+
+
+def refill(box: QComboBox, entries: Iterable[tuple[str, object]], chosen: object) -> None:
+    """List other entries in a combo box, as of `combo_box`."""
+    listed = list(entries)
+    box.clear()
+    for text, data in listed:
+        box.addItem(text, data)
+    box.setCurrentIndex(next((row for row, (_, data) in enumerate(listed) if data == chosen), 0))
 
 
 def show_kind(widget: QWidget, kind: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
@@ -93,8 +93,7 @@ class SlotButtons(QWidget):
             tip = f"Hear {slot.upper()}: {title} (key B: switch between A and B)" + (gain_line if gain else "")
             button.setToolTip(plain_tip(tip))
             show_kind(button, theme.source_kind(source))
-            with QSignalBlocker(button):
-                button.setChecked(self._choices.heard == slot)
+            button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
         for entry in self._entries:

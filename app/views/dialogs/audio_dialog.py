@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.views.controls.parts import combo_box, filled, label, push_button
+from app.views.controls.parts import combo_box, filled, label, push_button, refill
 from app.views.controls.plain import Label
 
 RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
@@ -98,15 +98,10 @@ class AudioDialog(QDialog):
         """Show the connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
         selected = (chosen.name, chosen.host_api) if chosen else None
-        with QSignalBlocker(self._device):
-            self._device.clear()
-            self._device.addItem("System default", None)
-            for key in keys:
-                self._device.addItem(f"{key[0]}   ({key[1]})", key)
-            if selected and selected not in keys:
-                self._device.addItem(f"{selected[0]}   ({selected[1]}), not connected", selected)
-            rows = [self._device.itemData(row) for row in range(self._device.count())]
-            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == selected), 0))
+        entries = [("System default", None), *((f"{name}   ({api})", (name, api)) for name, api in keys)]
+        if selected and selected not in keys:
+            entries.append((f"{selected[0]}   ({selected[1]}), not connected", selected))
+        refill(self._device, entries, selected)
 
     def show_sound(self, sound: SoundChoice) -> None:
         self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))

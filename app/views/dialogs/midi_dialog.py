@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from PySide6.QtCore import QMargins, QSignalBlocker, Signal
+from PySide6.QtCore import QMargins, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.shared.parameters import OF_PATCHES
-from app.views.controls.parts import combo_box, faint, filled, label, push_button, scrolled, show_kind
+from app.views.controls.parts import combo_box, faint, filled, label, push_button, refill, scrolled, show_kind
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
@@ -108,12 +108,8 @@ class MidiDialog(QDialog):
 
     def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
         """Show the inputs that are connected, and the one that is open; `problem`: why there are none."""
-        with QSignalBlocker(self._inputs):
-            self._inputs.clear()
-            self._inputs.addItem("None" if names else "No MIDI input found", "")
-            for name in names:
-                self._inputs.addItem(name, name)
-            self._inputs.setCurrentIndex(max(0, self._inputs.findData(open_name)))
+        none = "None" if names else "No MIDI input found"
+        refill(self._inputs, [(none, ""), *((name, name) for name in names)], open_name)
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -29,7 +29,16 @@ from app.views.controls.choosers import FilterButton, NameButton
 from app.views.controls.knob import NARROW_WIDTH, Knob
 from app.views.controls.number_box import say_above
 from app.views.controls.overflow import Overflow
-from app.views.controls.parts import NO_MARGINS, combo_box, faint, filled, tool_button, vertical_rule, words_label
+from app.views.controls.parts import (
+    NO_MARGINS,
+    combo_box,
+    faint,
+    filled,
+    refill,
+    tool_button,
+    vertical_rule,
+    words_label,
+)
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
 from engine.plain_text import one_line
 
@@ -191,12 +200,9 @@ class PatchBar(QFrame):
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
         """Set the name and the title of each; "No body", of the name "", is always listed."""
-        chosen_body = self.body.currentData()
-        with QSignalBlocker(self.body):
-            self.body.clear()
-            for name, title in (("", "No body"), *(body for body in bodies if body[0])):
-                self.body.addItem(title, name)
-            self._show_body(chosen_body or "")
+        chosen = self.body.currentData() or ""
+        refill(self.body, [("No body", ""), *((title, name) for name, title in bodies if name)], chosen)
+        self._show_body(chosen)
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
         """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
@@ -215,8 +221,7 @@ class PatchBar(QFrame):
             knob.set_value(patch.value(field))
         self.knobs["amp.tone_db"].setEnabled(patch.amp.drive_db > 0)
         self.knobs["body.mix"].setEnabled(bool(patch.body.name))
-        with QSignalBlocker(self.body):
-            self._show_body(patch.body.name)
+        self._show_body(patch.body.name)
 
     def show_comparing(self, comparing: bool) -> None:
         """Show if keys play the patch as it was saved."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from PySide6.QtCore import QMargins, QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QMargins, QRectF, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
@@ -139,8 +139,7 @@ class StringKnobs(QWidget):
             knob.set_value(value)
             if saved is not None:
                 knob.default = saved.value(field)
-        with QSignalBlocker(self.shape):
-            self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
+        self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
         barred = _why_barred(patch, "pluck.shape")
         self.shape.setEnabled(not barred)
         self.shape.setToolTip(barred or SHAPE_TIP)
