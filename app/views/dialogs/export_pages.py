@@ -105,18 +105,18 @@ class WavForm(ChoicesForm):
         self.rate = combo_box("Sample rate", rates, export.rate_hz, tip)
         self.note = faint()
         formats = [(name, bits) for bits, name in BITS_NAMES.items()]
-        bits = combo_box("Format", formats, export.bits, "16 bits are dithered; floating point never clips")
+        self.bits = combo_box("Format", formats, export.bits, "16 bits are dithered; floating point never clips")
         tip = (
             "One gain for model and truth. Off: as loud as at a volume of 0 dB; "
             "of a string alone, 10 mm are full scale"
         )
-        normalise = check_box("Normalise to −1 dBFS", export.normalise, tip)
+        self.normalise = check_box("Normalise to −1 dBFS", export.normalise, tip)
         rows: Rows = {
             "Sample rate": row_of(self.rate, self.note),
-            "Format": row_of(bits),
-            "Level": row_of(normalise),
+            "Format": row_of(self.bits),
+            "Level": row_of(self.normalise),
         }
-        self._lay_out(rows, {"rate_hz": self.rate, "bits": bits, "normalise": normalise})
+        self._lay_out(rows, {"rate_hz": self.rate, "bits": self.bits, "normalise": self.normalise})
 
 
 class ExportPage(ChoicesForm):
