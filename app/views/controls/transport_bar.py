@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QMargins, Qt, Signal
+from PySide6.QtCore import QMargins, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLayout, QSizePolicy, QSpacerItem, QVBoxLayout, QWidget
 
 from app.session.choices import Choices
@@ -101,7 +101,8 @@ class TransportBar(QFrame):
             self.knobs[field].set_barred(AT_BRIDGE if choices.pickup == "bridge" else "")
         # not hidden, which would move the controls beside it
         self.knobs["listen_right"].setEnabled(choices.stereo and choices.pickup != "bridge")
-        self._stereo.setChecked(choices.stereo)
+        with QSignalBlocker(self._stereo):
+            self._stereo.setChecked(choices.stereo)
         self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
@@ -131,7 +132,7 @@ class TransportBar(QFrame):
     def _build_pickup(self) -> QVBoxLayout:
         tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}"
         self._stereo = tool_button("Stereo", tip=tip, checkable=True)
-        self._stereo.clicked.connect(lambda on: self.change_asked.emit("stereo", on))
+        self._stereo.toggled.connect(partial(self.change_asked.emit, "stereo"))
         self._pickup = pickup_box(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
