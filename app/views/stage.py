@@ -13,7 +13,6 @@ from PySide6.QtGui import (
     QLinearGradient,
     QMouseEvent,
     QPainter,
-    QPen,
     QPixmap,
     QPolygonF,
     QResizeEvent,
@@ -23,6 +22,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.controls.parts import tool_button
+from app.views.painting import set_ink, write
 from app.views.plots.legend import paint_sources
 from engine.pluck import DEFAULT_LISTEN
 
@@ -69,12 +69,9 @@ class StageView(QWidget):
         self._toggles: list[QToolButton] = []
 
     def _add_toggle(self, text: str, tip: str, toggled: SignalInstance) -> None:
-        button = tool_button(text, text, tip)
-        button.setObjectName("chip")
+        button = tool_button(text, text, tip, "chip", toggled, checkable=True)
         button.setParent(self)
-        button.setCheckable(True)
         button.setCursor(Qt.CursorShape.ArrowCursor)
-        button.clicked.connect(toggled)
         self._toggles.append(button)
 
     # State
@@ -155,7 +152,6 @@ class StageView(QWidget):
         raise NotImplementedError
 
     def _mark_under(self, at: QPointF) -> str | None:
-        """The side whose mark is there."""
         if at.y() < self.height() - MARGIN_BOTTOM - 6:
             return None
         near = {side: abs(at.x() - self._mark_x(point)) for side, point in self._listening.items()}
@@ -185,12 +181,6 @@ class StageView(QWidget):
             button.setGeometry(right, 6, size.width(), theme.px(22))
             right -= 6
 
-    @property
-    def _heard_remark(self) -> str:
-        """The source that sounds instead of the model, in words, for a picture without a legend."""
-        others = (source.title for source in self._sources if source.heard and source.source != "model")
-        return next((f"You hear: {title}" for title in others), "")
-
     def _paint_ground(self, painter: QPainter) -> None:
         """Paint the ground behind the motion, on the backdrop."""
 
@@ -218,11 +208,12 @@ class StageView(QWidget):
             if not self._plain:
                 colour = theme.WARNING if self._grave else theme.FAINT
                 paint_legend(painter, self._sources, self._warning, colour, self._toggles[0].x() - 14)
-            elif remark := self._warning or self._heard_remark:
-                paint_remark(painter, self.width(), remark)
+            else:
+                others = (source.title for source in self._sources if source.heard and source.source != "model")
+                heard = next((f"You hear: {title}" for title in others), "")  # there is no legend
+                paint_remark(painter, self.width(), self._warning or heard)
             if self.hasFocus():
-                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-                painter.setBrush(Qt.BrushStyle.NoBrush)
+                set_ink(painter, theme.translucent(theme.TEXT, 150), 1.5)
                 painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
@@ -234,8 +225,7 @@ def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
     gradient = QLinearGradient(0, 0, 0, height)
     gradient.setColorAt(0, QColor(theme.present.ground_top))
     gradient.setColorAt(1, QColor(theme.present.ground_bottom))
-    painter.setPen(QPen(QColor(theme.LINE), 1))
-    painter.setBrush(gradient)
+    set_ink(painter, theme.LINE, fill=gradient)
     painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
 
 
@@ -250,26 +240,21 @@ def paint_legend(
     room = right - MARGIN_X
     x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
     if warning:
-        painter.setPen(QColor(colour))
-        painter.setFont(theme.small_font(11))
         place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
-        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
-        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+        align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        write(painter, place, warning, colour, theme.small_font(11), align, place.width())
 
 
 def paint_remark(painter: QPainter, width: float, text: str) -> None:
     """Paint a line in the upper left corner, why nothing is heard."""
-    painter.setPen(QColor(theme.FAINT))
-    painter.setFont(theme.small_font(11))
     room = width - 2 * MARGIN_X
-    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
-    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
+    place = QRectF(MARGIN_X, LEGEND_Y - 10, room, 20)
+    write(painter, place, text, theme.FAINT, theme.small_font(11), Qt.AlignmentFlag.AlignVCenter, room)
 
 
 def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> None:
     """Paint the foot of a listening point, below the picture."""
-    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.GOOD))
+    set_ink(painter, theme.TEXT if grabbed else None, 1.5, theme.GOOD)
     painter.drawPolygon(
         QPolygonF([QPointF(x, bottom + 2), QPointF(x - FOOT, bottom + 15), QPointF(x + FOOT, bottom + 15)])
     )
@@ -277,10 +262,9 @@ def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> Non
 
 def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: float, bottom: float) -> None:
     """Words below the feet at these x; two that are near each other make room for one another."""
-    painter.setPen(QColor(theme.GOOD))
-    painter.setFont(theme.small_font(11))
-    for place, text in label_places(painter.fontMetrics(), marks, width, bottom):
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)
+    font = theme.small_font(11)
+    for place, text in label_places(QFontMetrics(font), marks, width, bottom):
+        write(painter, place, text, theme.GOOD, font)
 
 
 def label_places(

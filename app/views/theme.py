@@ -7,7 +7,7 @@ the pens that they were made with: `app.views.plots.plots.recolour` exchanges th
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -19,68 +19,44 @@ from PySide6.QtWidgets import QApplication, QWidget
 ThemeChoice = Literal["system", "dark", "light"]
 
 
+ROLES = {  # role -> its colour in the dark and in the light theme
+    "background": ("#0d0f13", "#eceef2"),
+    "panel": ("#14171d", "#fafbfc"),
+    "raised": ("#1d2129", "#ffffff"),
+    "line": ("#2b313c", "#c6ccd6"),
+    "text": ("#d8dde6", "#1b2029"),
+    "faint": ("#8a93a3", "#596272"),
+    "disabled": ("#555d6b", "#9aa2b0"),
+    "model": ("#ffb03a", "#a05a00"),  # amber in every view
+    "truth": ("#4cc3e8", "#00698f"),  # blue in every view
+    "difference": ("#e58fd0", "#a3327f"),  # model − truth
+    "other": ("#b5a3ff", "#5b45b8"),  # another preset's model
+    "warning": ("#ff6b5e", "#b3261e"),
+    "good": ("#58c98b", "#1a7044"),
+    "ground_top": ("#171b22", "#fdfdfe"),  # of the gradient behind the string
+    "ground_bottom": ("#101317", "#f3f5f8"),
+    "shade": ("#46000000", "#1a4a5568"),  # over plucks outside the training range, with its alpha
+}
+
+
 @dataclass(frozen=True)
 class Theme:
-    """The colours of a theme, one for each role, and the scale of text."""
+    """The dark or the light theme; `scale`: of text, and of what holds it. Each role is an attribute."""
 
-    background: str
-    panel: str
-    raised: str
-    line: str
-    text: str
-    faint: str
-    disabled: str
-    model: str  # amber in every view
-    truth: str  # blue in every view
-    difference: str  # model − truth
-    other: str  # another preset's model
-    warning: str
-    good: str
-    ground_top: str  # of the gradient behind the string
-    ground_bottom: str
-    shade: str  # over plucks outside the training range
-    shade_alpha: int  # 0 … 255
-    scale: float = 1.0  # of text, and of what holds it
+    dark: bool
+    scale: float = 1.0
+
+    @property
+    def colours(self) -> dict[str, str]:
+        return {role: dark if self.dark else light for role, (dark, light) in ROLES.items()}
+
+    def __getattr__(self, role: str) -> str:
+        if role not in ROLES:
+            raise AttributeError(role)
+        return ROLES[role][0 if self.dark else 1]
 
 
-DARK = Theme(
-    background="#0d0f13",
-    panel="#14171d",
-    raised="#1d2129",
-    line="#2b313c",
-    text="#d8dde6",
-    faint="#8a93a3",
-    disabled="#555d6b",
-    model="#ffb03a",
-    truth="#4cc3e8",
-    difference="#e58fd0",
-    other="#b5a3ff",
-    warning="#ff6b5e",
-    good="#58c98b",
-    ground_top="#171b22",
-    ground_bottom="#101317",
-    shade="#000000",
-    shade_alpha=70,
-)
-LIGHT = Theme(
-    background="#eceef2",
-    panel="#fafbfc",
-    raised="#ffffff",
-    line="#c6ccd6",
-    text="#1b2029",
-    faint="#596272",
-    disabled="#9aa2b0",
-    model="#a05a00",
-    truth="#00698f",
-    difference="#a3327f",
-    other="#5b45b8",
-    warning="#b3261e",
-    good="#1a7044",
-    ground_top="#fdfdfe",
-    ground_bottom="#f3f5f8",
-    shade="#4a5568",
-    shade_alpha=26,
-)
+DARK, LIGHT = Theme(dark=True), Theme(dark=False)
 
 FONT_PX = 12
 SHEET = Path(__file__).with_name("sheet.qss")
@@ -98,14 +74,11 @@ SOURCE_COLOURS = {kind: getattr(DARK, kind) for kind in ("model", "truth", "diff
 
 def __getattr__(name: str) -> str:
     """The present theme's colour of a role, as `theme.TEXT`."""
-    if name.lower() not in Theme.__annotations__:
-        raise AttributeError(name)
     return str(getattr(present, name.lower()))
 
 
 def is_dark() -> bool:
-    """Return True if the present theme is the dark one, at any size of text."""
-    return present.background == DARK.background
+    return present.dark
 
 
 def source_kind(source: str) -> str:
@@ -145,9 +118,14 @@ def _luminance(colour: QColor) -> float:
 
 def _style_sheet() -> str:
     tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
-    values = {**asdict(present), "tick": tick.as_posix()}
-    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", SHEET.read_text("utf-8"))
-    return re.sub(r"@(\w+)", lambda match: str(values[match[1]]), sheet)
+    values = {**present.colours, "tick": tick.as_posix()}
+    lines = [
+        line.replace("@source", source)
+        for line in SHEET.read_text("utf-8").splitlines()
+        for source in (SOURCE_COLOURS if "@source" in line else [""])
+    ]
+    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", "\n".join(lines))
+    return re.sub(r"@(\w+)", lambda match: values[match[1]], sheet)
 
 
 def _palette() -> QPalette:
@@ -215,7 +193,6 @@ class _Fixed(QObject):
 
 
 def fix_size(widget: QWidget, width: int | None = None, height: int | None = None) -> None:
-    """Fix a widget's size in pixels that grow with the text."""
     _Fixed(widget, width, height)
 
 

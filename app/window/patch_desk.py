@@ -385,10 +385,10 @@ class PatchDesk(BrowserDesk):
             self._keep_octave_in_range("octave" in names)
         if names & {"octave", "velocity", "patch", "single"}:
             choices, pitches = self._session.choices, self._session.choices.plays_patch
-            self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
+            self._panel.bar.show_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
-            self._panel.show_letters(letters_of(choices.octave) if pitches else {})
+            self._panel.keys.show_letters(letters_of(choices.octave) if pitches else {})
         if names & {"patch", "single"}:
             self._judge_again()
         if names & {"patch", "single", *Monitor.model_fields}:
@@ -494,7 +494,7 @@ class PatchDesk(BrowserDesk):
             else:
                 if key_string is not None:
                     facts, figures = facts_of(key_string), figures_of(key_string.parameters, patch)
-        self._panel.knobs.show_facts(facts)
+        self._panel.knobs.facts.show_facts(facts)
         self._panel.knobs.show_figures(figures)
 
     def tick(self) -> None:

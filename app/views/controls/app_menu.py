@@ -39,10 +39,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
         MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
         MenuEntry(
-            "sampler",
-            "Export for samplers …",
-            "Ctrl+Shift+E",
-            "export the instrument for samplers (SFZ, SoundFont)",
+            "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"
         ),
         MenuEntry("plugin", "Export plug-in …"),
         MenuEntry("quit", "Quit", "Ctrl+Q", "quit"),
@@ -101,19 +98,18 @@ class AppMenu(QMenu):
         for title, entries in MENUS.items():
             menu = self.addMenu(title)
             for entry in entries:
-                self._add(menu, entry)
+                plucks = entry.key == "Return"
+                action = menu.addAction(f"{entry.text}\t{entry.key_name}" if plucks else entry.text)
+                self.action[entry.name] = action
+                if not plucks:
+                    action.setShortcut(QKeySequence(entry.key))
+                    action.setAutoRepeat(False)
             if title == LOOK_MENU:
                 menu.addSeparator()
                 self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
                 self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         if window is not None:
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
-
-    def _add(self, menu: QMenu, entry: MenuEntry) -> None:
-        action = self.action[entry.name] = menu.addAction(_words(entry))
-        if entry.key != "Return":
-            action.setShortcut(QKeySequence(entry.key))
-            action.setAutoRepeat(False)
 
     def show_look(self, look: Look) -> None:
         for (field, value), action in self._looks.items():
@@ -129,19 +125,12 @@ class AppMenu(QMenu):
         menu = above.addMenu(title)
         group = QActionGroup(menu)
         for text, value in values.items():
-            action = menu.addAction(text)
-            action.setCheckable(True)
+            action = self._looks[field, value] = QAction(text, group, checkable=True)
             action.triggered.connect(lambda _=False, value=value: self.look_asked.emit(field, value))
-            group.addAction(action)
-            self._looks[field, value] = action
-
-
-def _words(entry: MenuEntry) -> str:
-    return f"{entry.text}\t{entry.key_name}" if entry.key == "Return" else entry.text
+            menu.addAction(action)
 
 
 def menu_button(menu: QMenu) -> QToolButton:
-    """The button in the header that opens the menu."""
     button = tool_button("☰", "Menu", "Open, record, export, instruments, settings, theme, text size and help (F10)")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)

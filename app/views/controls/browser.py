@@ -9,27 +9,24 @@ Enter, Escape     close
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 
-from PySide6.QtCore import QEvent, QModelIndex, QObject, QSignalBlocker, Qt, QTimer, Signal, SignalInstance
+from PySide6.QtCore import QEvent, QModelIndex, QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
-    QComboBox,
     QFrame,
-    QGridLayout,
     QHBoxLayout,
     QHeaderView,
     QLineEdit,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
 from app.views.controls.browser_rows import STAR, TITLE, BrowserColumn, BrowserRow, RowList, listed_rows
 from app.views.controls.notice_bar import NoticeBar
-from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button, words_label
+from app.views.controls.parts import combo_box, faint, filled, push_button, refill, scrolled, tool_button, words_label
 from app.views.controls.plain import Label
 
 KEYS = Qt.Key
@@ -105,17 +102,17 @@ class Browser(QFrame):
         self.search.setClearButtonEnabled(True)
         self.search.setMinimumWidth(NARROWEST_SEARCH)
         self.search.textChanged.connect(self._filter_changed)
-        self.filters = {name: combo_box(name, [(anything, "")]) for name, anything in filters}
-        self.order = combo_box("Order", [(order, number) for number, order in enumerate(orders)])
-        if len(orders) < 2:
-            self.order.hide()
+        self.filters = {
+            name: combo_box(name, [(anything, "")], tip=f"Show only {what} of this {name.lower()}")
+            for name, anything in filters
+        }
+        tip = "Sort the list; favourites first under each heading"
+        self.order = combo_box("Order", [(order, number) for number, order in enumerate(orders)], tip=tip)
+        self.order.setVisible(len(orders) > 1)
         for box in (*self.filters.values(), self.order):
             box.setMinimumContentsLength(SHORTEST_CHOICE)
-            box.setToolTip(f"Show only {what} of this {box.accessibleName().lower()}")
             box.currentIndexChanged.connect(self._filter_changed)
-        self.order.setToolTip("Sort the list; favourites first under each heading")
-        self.starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
-        self.starred.setCheckable(True)
+        self.starred = tool_button("★  Favourites", "Favourites only", "Show only favourites", checkable=True)
         self.starred.toggled.connect(self._filter_changed)
         self.list = self._build_list(columns)
         self.card = Label(textFormat=Qt.TextFormat.RichText, wordWrap=True)
@@ -123,11 +120,13 @@ class Browser(QFrame):
         self.card.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.card.setContentsMargins(14, 4, 10, 10)
         self.state = words_label()  # the path of a folder may be longer than the window is wide
-        self.play_button = _button(f"▶  {plays}", f"{plays} (Space)", self.play)
-        self.star = _button("☆  Favourite", "Add to the favourites, or remove (Ctrl+D)", self.ask_favourite)
+        self.play_button = push_button(f"▶  {plays}", f"{plays} (Space)", plays, pressed=self.play)
+        tip = "Add to the favourites, or remove (Ctrl+D)"
+        self.star = push_button("☆  Favourite", tip, "Favourite", pressed=self.ask_favourite)
         tip = "Give your own another name"
-        self.rename = _button("Rename …", tip, lambda: self._emit_selected(self.rename_asked))
-        self.delete = _button(DELETE, "Delete your own; needs a second click", self._ask_delete)
+        self.rename = push_button("Rename …", tip, pressed=lambda: self._emit_selected(self.rename_asked))
+        tip = "Delete your own; needs a second click"
+        self.delete = push_button(DELETE, tip, DELETE, pressed=self._ask_delete)
         self._lay_out(folder_tip, f"↑ ↓ load{' and play' if at_rest else ''}")
         for widget in self.findChildren(QWidget):
             if widget.focusPolicy() != Qt.FocusPolicy.NoFocus and widget.window() is self.window():  # no pop-up
@@ -156,10 +155,8 @@ class Browser(QFrame):
         return rows
 
     def _lay_out(self, folder_tip: str, arrows: str) -> None:
-        close = tool_button("✕", "Close the browser", "Close (Escape)")
-        close.clicked.connect(self.dismiss)
-        folder = tool_button("Open folder", tip=folder_tip)
-        folder.clicked.connect(self.folder_asked)
+        close = tool_button("✕", "Close the browser", "Close (Escape)", pressed=self.dismiss)
+        folder = tool_button("Open folder", tip=folder_tip, pressed=self.folder_asked)
         head = filled(QHBoxLayout(), self.search, *self.filters.values(), self.order, self.starred, close)
         foot = filled(QHBoxLayout(), self.state, folder)
         buttons = filled(QHBoxLayout(), self.play_button, self.star, self.rename, self.delete, None)
@@ -167,17 +164,12 @@ class Browser(QFrame):
         for layout in (head, foot, aside):
             layout.setStretch(0, 1)
         hint = f"Type to search   ·   {arrows}   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
-        grid = QGridLayout(self)
-        grid.setContentsMargins(14, 14, 14, 12)
-        grid.setSpacing(10)
-        grid.addLayout(head, 0, 0, 1, 2)
-        grid.addWidget(self.list, 1, 0)
-        grid.addLayout(aside, 1, 1)
-        grid.addLayout(foot, 2, 0, 1, 2)
-        grid.addWidget(faint(hint), 3, 0, 1, 2)
-        grid.setColumnStretch(0, 6)
-        grid.setColumnStretch(1, 4)
-        grid.setRowStretch(1, 1)
+        middle = filled(QHBoxLayout(), self.list, aside)
+        middle.setStretch(0, 6)
+        middle.setStretch(1, 4)
+        column = filled(QVBoxLayout(self), head, middle, foot, faint(hint), spacing=10)
+        column.setContentsMargins(14, 14, 14, 12)
+        column.setStretch(1, 1)
 
     # What is shown
 
@@ -186,14 +178,15 @@ class Browser(QFrame):
         self._folder = folder
         self._filling = True
         for number, box in enumerate(self.filters.values()):
-            _refill(box, sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0])))
+            kinds = sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0]))
+            entries = [(box.itemText(0), ""), *((words, value) for value, words in kinds)]  # the first: no filter
+            refill(box, entries, box.currentData())
         self._rows, self._favourites = rows, favourites
         if loaded != self.loaded:
             self.loaded = self.selected = loaded
         self._fill()
 
     def _fill(self) -> None:
-        """List what passes the filter."""
         kinds = [box.currentData() for box in self.filters.values()]
         order = max(0, self.order.currentIndex())
         self._filling = True
@@ -219,18 +212,18 @@ class Browser(QFrame):
 
     def clear_filter(self) -> None:
         """List all again; the order is no filter. Emits `listed_changed` once."""
-        parts = (self.search, *self.filters.values(), self.starred)
-        blockers = [QSignalBlocker(part) for part in parts]
+        self._filling = True
         self.search.clear()
         for box in self.filters.values():
             box.setCurrentIndex(0)
         self.starred.setChecked(False)
-        del blockers
+        self._filling = False
         self._filter_changed()
 
     def _filter_changed(self) -> None:
-        self.selected = ""  # the best hit is selected
-        self._fill()
+        if not self._filling:
+            self.selected = ""  # the best hit is selected
+            self._fill()
 
     def show_card(self, name: str) -> None:
         """Show the card of a row; "" of none."""
@@ -303,7 +296,6 @@ class Browser(QFrame):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words that are searched for, in lower case."""
         return tuple(self.search.text().casefold().replace(",", " ").split())
 
     @property
@@ -344,9 +336,12 @@ class Browser(QFrame):
         names = self.listed
         if names:
             self.list.setFocus()  # where Space plays
-            row = names.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
+            page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
+            steps = dict(zip(MOVES, (-1, 1, -page, page), strict=True))
+            row = names.index(self.selected) + (steps[key] if self.selected == self.loaded else 0)
             self.load(names[min(max(row, 0), len(names) - 1)])
-            self._start_rest()
+            if self._at_rest:
+                self._rest.start()
 
     def press(self, key: Qt.Key) -> None:
         """Handle a key of MOVES, Space, D or one of CLOSES."""
@@ -362,11 +357,9 @@ class Browser(QFrame):
             self.dismiss()
 
     def ask_favourite(self) -> None:
-        """Ask for the selected row to become a favourite, or none."""
         self._emit_selected(self.favourite_asked)
 
     def play(self) -> None:
-        """Load the selected row, and have it played."""
         self._rest.stop()
         self.load(self.selected)
         self._emit_selected(self.played)
@@ -382,10 +375,6 @@ class Browser(QFrame):
             self.delete.setText(DELETE)
             self._emit_selected(self.delete_asked)
 
-    def _start_rest(self) -> None:
-        if self._at_rest:
-            self._rest.start()
-
     def _current_changed(self, index: QModelIndex) -> None:
         if not self._filling and index.isValid() and isinstance(line := self.list.line(index), BrowserRow):
             self.load(line.name)
@@ -398,20 +387,12 @@ class Browser(QFrame):
             self.favourite_asked.emit(line.name)
         else:
             self.load(line.name)  # the best hit may be selected and not loaded
-            self._start_rest()
+            if self._at_rest:
+                self._rest.start()
 
     def _double_click_row(self, index: QModelIndex) -> None:
         if index.column() != STAR and isinstance(self.list.line(index), BrowserRow):
             self.dismiss()
-
-    def page(self) -> int:
-        """The number of rows that Page up or Page down moves."""
-        return max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
-
-    def step(self, key: Qt.Key) -> int:
-        """Rows that one of MOVES goes."""
-        page = self.page()
-        return {KEYS.Key_Up: -1, KEYS.Key_Down: 1, KEYS.Key_PageUp: -page, KEYS.Key_PageDown: page}[key]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.parent() or isinstance(watched, NoticeBar):
@@ -438,25 +419,6 @@ class Browser(QFrame):
         if event.key() == KEYS.Key_Space and watched is self.search:
             return not control and self.search.selectedText() == self.search.text()  # nothing is being written
         return event.key() in (*CLOSES, KEYS.Key_Space, *MOVES) and not control
-
-
-def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
-    button = QPushButton(text)
-    button.setAccessibleName(text.lstrip("▶☆ "))
-    button.setToolTip(tip)
-    button.clicked.connect(lambda: act())
-    return button
-
-
-def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
-    """Refill a box with the kinds to filter by, after the entry for no filter; what is chosen stays."""
-    with QSignalBlocker(box):
-        previous = box.currentData()
-        while box.count() > 1:
-            box.removeItem(1)
-        for value, words in kinds:
-            box.addItem(words, value)
-        box.setCurrentIndex(max(0, box.findData(previous)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

@@ -1,22 +1,21 @@
-"""A line of text with shorter wordings for little room, cut with an ellipsis where none of them fits."""
+"""Lines of text with shorter wordings for little room, cut with an ellipsis where none of them fits."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QStyle, QStyleOption, QWidget
+from PySide6.QtWidgets import QSizePolicy, QStyle, QStyleOption, QWidget
+
+from app.views.controls.plain import Label, plain_tip
 
 
-class ElidedLabel(QLabel):
+class ElidedLabel(Label):
     """A label whose least width is 0: its text never moves other widgets.
 
     `text()` is whole, `shown` what is painted.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setTextFormat(Qt.TextFormat.PlainText)
-        self._shorter: tuple[str, ...] = ()
+    _shorter: tuple[str, ...] = ()
 
     def say(self, text: str, *shorter: str) -> None:
         """Show a text; `shorter`: other wordings, the longest first, for where there is no room for it."""
@@ -43,3 +42,27 @@ class ElidedLabel(QLabel):
         self.style().drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
         painter.setPen(option.palette.windowText().color())
         painter.drawText(self.contentsRect(), self.alignment() | Qt.AlignmentFlag.AlignVCenter, self.shown)
+
+
+class Readout(ElidedLabel):
+    """A faint line that says what the mouse points at, else the text of `rest`. It never asks for more room."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, objectName="faint")
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._resting: tuple[str, ...] = ("",)
+        self._reported: tuple[str, ...] = ("",)
+
+    def rest(self, text: str, *shorter: str) -> None:
+        self._resting = (text, *shorter)
+        self.report(*self._reported)
+
+    def report(self, text: str, *shorter: str) -> None:
+        """Show the thing that the mouse points at; "" for nothing. `shorter` as in `ElidedLabel.say`."""
+        self._reported = (text, *shorter)
+        wordings = self._reported if text else self._resting
+        if wordings[0] != self.text():
+            self.say(*wordings)
+            # where there is too little room for it
+            self.setToolTip(plain_tip(wordings[0]))

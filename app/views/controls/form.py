@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths, Qt, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFileDialog,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QHBoxLayout, QLayout, QLineEdit, QWidget
 
 from app.views import theme
-from app.views.controls.number_box import CountBox, NumberBox, prepared
-from app.views.controls.parts import filled, tool_button
+from app.views.controls.parts import NO_MARGINS, filled, tool_button
 from app.views.controls.plain import Label
 
+Rows = Mapping[str, QWidget | QLayout]
 LABEL_WIDTH = 104
 FILTERS = {
     ".wav": "WAV (*.wav)",
@@ -30,20 +24,20 @@ FILTERS = {
 }
 
 
-def form_label(text: str) -> QLabel:
-    """A form's label; all are of one width, so that the forms of a dialog are aligned."""
-    title = Label(text)
-    title.setFixedWidth(theme.px(LABEL_WIDTH))
-    title.setMinimumHeight(28)
-    title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return title
+def filled_form(form: QFormLayout, rows: Rows) -> QFormLayout:
+    """The form with rows, by their labels; all are of one width, so that the forms of a dialog are aligned."""
+    form.setContentsMargins(NO_MARGINS)
+    for name, row in rows.items():
+        title = Label(name, minimumHeight=28)
+        title.setFixedWidth(theme.px(LABEL_WIDTH))
+        title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        form.addRow(title, row)
+    return form
 
 
 def row_of(*widgets: QWidget) -> QHBoxLayout:
     """Side by side, with empty space at the end."""
-    row = filled(QHBoxLayout(), *widgets, None)
-    row.setContentsMargins(0, 0, 0, 0)
-    return row
+    return filled(QHBoxLayout(), *widgets, None, margins=NO_MARGINS)
 
 
 def check_box(text: str, on: bool, tip: str) -> QCheckBox:
@@ -52,29 +46,6 @@ def check_box(text: str, on: bool, tip: str) -> QCheckBox:
     box.setMinimumHeight(28)
     box.setToolTip(tip)
     return box
-
-
-def spin_box(
-    name: str,
-    limits: tuple[float, float],
-    value: float,
-    tip: str,
-    suffix: str = "",
-    decimals: int = 0,
-    step: float = 1,
-    prefix: str = "",
-) -> NumberBox:
-    low, high = limits
-    spin = NumberBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, prefix=prefix, decimals=decimals)
-    prepared(spin, name, tip, 84)
-    spin.setValue(value)
-    return spin
-
-
-def count_box(name: str, most: int, value: int, tip: str) -> CountBox:
-    spin = CountBox(minimum=1, maximum=most, value=value)
-    prepared(spin, name, tip, 56)
-    return spin
 
 
 class FilePicker(QWidget):
@@ -88,15 +59,15 @@ class FilePicker(QWidget):
 
     def __init__(self, folder: str, tip: str, suffix: str = ".wav") -> None:
         super().__init__()
-        self._folder, self.suffix = folder or music_folder(), suffix
+        music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
+        self._folder = folder or (music if music and Path(music).is_dir() else str(Path.home()))
+        self.suffix = suffix
         self._named_by_user = False
         self.edit = QLineEdit()
         self.edit.setAccessibleName("File")
         self.edit.setToolTip(tip)
         self.edit.textEdited.connect(self._name_edited)
-        browse = tool_button("Browse …", tip="Choose the file")
-        browse.clicked.connect(self.browse)
-        row = row_of(browse)
+        row = row_of(tool_button("Browse …", tip="Choose the file", pressed=self.browse))
         row.insertWidget(0, self.edit, 100)
         self.setLayout(row)
 
@@ -137,9 +108,3 @@ class FilePicker(QWidget):
     def _name_edited(self) -> None:
         self._named_by_user = True
         self.changed.emit()
-
-
-def music_folder() -> str:
-    """The user's folder for music, else the home folder."""
-    music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
-    return music if music and Path(music).is_dir() else str(Path.home())

@@ -5,7 +5,17 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QInputEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.shared.parameters import Parameter
@@ -14,6 +24,7 @@ from app.views import theme
 from app.views.controls.number_box import refusal, say_above
 from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.controls.plain import plain_tip
+from app.views.painting import set_ink, write
 
 SWEEP_DEGREES = 270
 WIDTH, NARROW_WIDTH = 62, 52
@@ -21,6 +32,16 @@ HEIGHT, LOW_HEIGHT = 82, 60
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
+
+_STEPS = {
+    Qt.Key.Key_Up: 1,
+    Qt.Key.Key_Right: 1,
+    Qt.Key.Key_Down: -1,
+    Qt.Key.Key_Left: -1,
+    Qt.Key.Key_PageUp: COARSE,
+    Qt.Key.Key_PageDown: -COARSE,
+}
+_PLACES = (Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Delete)  # the least, the most, the default
 
 
 class _Editor(QLineEdit):
@@ -66,23 +87,28 @@ class _Editor(QLineEdit):
 
 
 class Knob(QWidget):
-    """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`."""
+    """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`.
+
+    Args:
+        width: in pixels, by the longest name or value.
+        low: smaller, for rows of many knobs.
+    """
 
     value_asked = Signal(float)
     figure_asked = Signal(float)  # a number that was typed where a figure is shown
     drag_started = Signal()
     drag_ended = Signal()
 
-    def __init__(self, parameter: Parameter, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, parameter: Parameter, parent: QWidget | None = None, width: int = WIDTH, low: bool = False
+    ) -> None:
         super().__init__(parent)
         self.parameter, self.default = parameter, parameter.default  # to which a double-click resets
-        self._name = parameter.label
         self._value = parameter.default
         self._dragged_at: QPointF | None = None
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
-        self._width = WIDTH
-        self._low = False
+        self._width, self._low = width, low
         self._figure = self._why_barred = self._tip = ""
         self._stays = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -106,7 +132,6 @@ class Knob(QWidget):
 
     @property
     def text(self) -> str:
-        """The value in its unit."""
         return self.parameter.shown(self._value)
 
     def show_figure(self, figure: str) -> None:
@@ -149,21 +174,7 @@ class Knob(QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Set the width for a window with little room, or the usual one."""
-        width = NARROW_WIDTH if narrow else WIDTH
-        if width != self._width:
-            self._width = width
-            self.updateGeometry()
-            self.update()
-
-    def set_width(self, pixels: int) -> None:
-        """Set the width in pixels, for long names and values."""
-        self._width = pixels
-        self.updateGeometry()
-        self.update()
-
-    def set_low(self, low: bool) -> None:
-        """Make the knob smaller, for rows of many knobs, or of its usual size."""
-        self._low = low
+        self._width = NARROW_WIDTH if narrow else WIDTH
         self.updateGeometry()
         self.update()
 
@@ -176,8 +187,7 @@ class Knob(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is None:
             return
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-        self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
+        self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * _fineness(event)
         self._dragged_at = event.position()
         self.value_asked.emit(self.parameter.value(self._dragged_share))
         say_above(self, self.accessibleDescription())
@@ -192,9 +202,8 @@ class Knob(QWidget):
         self.value_asked.emit(self.default)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
         notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
-        self.value_asked.emit(self.parameter.stepped(self._value, notches * fine))
+        self.value_asked.emit(self.parameter.stepped(self._value, notches * _fineness(event)))
         event.accept()
 
     def event(self, event: QEvent) -> bool:
@@ -202,23 +211,12 @@ class Knob(QWidget):
         return keeps_keys(event, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-        steps = {
-            Qt.Key.Key_Up: 1,
-            Qt.Key.Key_Right: 1,
-            Qt.Key.Key_Down: -1,
-            Qt.Key.Key_Left: -1,
-            Qt.Key.Key_PageUp: COARSE,
-            Qt.Key.Key_PageDown: -COARSE,
-        }.get(Qt.Key(event.key()))
+        steps = _STEPS.get(Qt.Key(event.key()))
+        places = dict(zip(_PLACES, (*self.parameter.limits, self.default), strict=True))
         if steps is not None:
-            self.value_asked.emit(self.parameter.stepped(self._value, steps * fine))
-        elif event.key() == Qt.Key.Key_Home:
-            self.value_asked.emit(self.parameter.limits[0])
-        elif event.key() == Qt.Key.Key_End:
-            self.value_asked.emit(self.parameter.limits[1])
-        elif event.key() == Qt.Key.Key_Delete:
-            self.value_asked.emit(self.default)
+            self.value_asked.emit(self.parameter.stepped(self._value, steps * _fineness(event)))
+        elif event.key() in places:
+            self.value_asked.emit(places[Qt.Key(event.key())])
         elif event.text() and event.text() in SIGNS:
             self._type(event.text())
         else:
@@ -296,16 +294,16 @@ class Knob(QWidget):
         painter.drawArc(ring, round(start * 16), -round(SWEEP_DEGREES * share * 16))
         angle = math.radians(start - SWEEP_DEGREES * share)
         direction = QPointF(math.cos(angle), -math.sin(angle))
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.LINE if self.hasFocus() else theme.RAISED))
+        set_ink(painter, fill=theme.LINE if self.hasFocus() else theme.RAISED)
         painter.drawEllipse(middle, radius - 5, radius - 5)
         painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
-        painter.setFont(theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10, grows=False))
-        painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
-        name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, int(width))
-        painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)
-        painter.setPen(ink)
-        painter.setFont(theme.small_font(10 if self._low else 12, grows=False))
+        small = theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10, grows=False)
+        above = QRectF(0, 0 if self._low else 3, width, 14)
+        write(painter, above, self._name.upper(), theme.TEXT if self.hasFocus() else theme.FAINT, small, room=width)
         foot = QRectF(0, height - (17 if self._low else 23), width, 18)
-        painter.drawText(foot, Qt.AlignmentFlag.AlignCenter, self._figure or self.text)
+        write(painter, foot, self._figure or self.text, ink, theme.small_font(10 if self._low else 12, grows=False))
+
+
+def _fineness(event: QInputEvent) -> float:
+    return FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0

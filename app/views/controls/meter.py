@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.views import theme
+from app.views.painting import set_ink, write
 
 LOWEST_DB = -60.0
 LIMIT_HOLD_TICKS = 30  # calls of `show_level`: half a second at 60 Hz
@@ -47,7 +48,6 @@ class Meter(QWidget):
 
     @property
     def _bar(self) -> QRectF:
-        """The bar at 0 dBFS."""
         return QRectF(12, 8, self.width() / theme.present.scale - 68, 9)
 
     @property
@@ -60,24 +60,19 @@ class Meter(QWidget):
         scale = theme.present.scale  # all of it grows with the text
         painter.scale(scale, scale)
         bar = self._bar
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.LINE))
+        set_ink(painter, fill=theme.LINE)
         painter.drawRoundedRect(bar, 3, 3)
         gradient = QLinearGradient(bar.left(), 0, bar.right(), 0)
-        gradient.setColorAt(0, QColor(theme.GOOD))
-        gradient.setColorAt(0.8, QColor(theme.MODEL))
-        gradient.setColorAt(1, QColor(theme.WARNING))
-        painter.setBrush(gradient)
+        for place, colour in ((0, theme.GOOD), (0.8, theme.MODEL), (1, theme.WARNING)):
+            gradient.setColorAt(place, QColor(colour))
+        set_ink(painter, fill=gradient)
         share = 1 - self._peak_db / LOWEST_DB
         painter.drawRoundedRect(QRectF(bar.left(), bar.top(), bar.width() * share, bar.height()), 3, 3)
-        painter.setFont(theme.small_font(9, grows=False))
-        painter.setPen(QColor(theme.FAINT))
+        font = theme.small_font(9, grows=False)
         for db in (-60, -40, -20, 0) if bar.width() > 80 else (-60, 0):
             x = bar.left() + bar.width() * (1 - db / LOWEST_DB)
-            painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
+            write(painter, QRectF(x - 14, 20, 28, 12), f"{db}", theme.FAINT, font)
         light = QRectF(self.width() / scale - 44, 5, 44, 16)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.TEXT if self._hold else theme.LINE))
+        set_ink(painter, fill=theme.TEXT if self._hold else theme.LINE)
         painter.drawRoundedRect(light, 3, 3)
-        painter.setPen(QColor(theme.BACKGROUND if self._hold else theme.FAINT))
-        painter.drawText(light, Qt.AlignmentFlag.AlignCenter, "LIMIT")
+        write(painter, light, "LIMIT", theme.BACKGROUND if self._hold else theme.FAINT, font)

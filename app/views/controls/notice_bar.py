@@ -1,21 +1,37 @@
-"""The latest notice, over the window: what went wrong, and what to do. Earlier ones are in a list."""
+"""The latest notice, over the window: what went wrong, and what to do; and the list of all, with their details."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
-from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
+from PySide6.QtCore import QEvent, QMargins, QPoint, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QDialog, QFrame, QHBoxLayout, QListWidget, QToolButton, QVBoxLayout, QWidget
 
 from app.shared.log import log_file
-from app.views.controls.notice_list import Notice, NoticeList
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import filled, label, push_button, read_only_text, show_kind, tool_button
 from app.views.controls.plain import Label
 from engine.plain_text import one_line
 
 MOST_KEPT = 50
 INFORMED_MS = 8000  # a notice that is no error hides by itself
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A notice of a fault or a fact worth knowing: a message, how often it was shown, and when last."""
+
+    message: str
+    details: str = ""
+    error: bool = True  # False: information
+    times: int = 1
+    last_reported: str = ""  # hours:minutes:seconds
+
+    @property
+    def line(self) -> str:
+        return self.message + (f"  (×{self.times})" if self.times > 1 else "")
 
 
 class NoticeBar(QFrame):
@@ -39,20 +55,13 @@ class NoticeBar(QFrame):
         self.faulted.connect(self._report_fault, Qt.ConnectionType.QueuedConnection)
         self.bell = Bell()  # placed by the window
         self.bell.clicked.connect(self.show_all)
-        self._label = Label()
-        self._label.setWordWrap(True)
-        self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._details = tool_button("Details", "Notice details", "Show the error details, which can be copied (F8)")
-        self._details.clicked.connect(self.show_all)
-        dismiss = tool_button("Dismiss", "Dismiss the notice", "Dismiss (kept in the list)")
-        dismiss.clicked.connect(self._dismiss)
-        for button in (self._details, dismiss):
-            button.setObjectName("small")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 3, 4, 3)
-        row.addWidget(self._label, 1)
-        row.addWidget(self._details)
-        row.addWidget(dismiss)
+        self._label = label(selectable=True)
+        tip = "Show the error details, which can be copied (F8)"
+        self._details = tool_button("Details", "Notice details", tip, "small", self.show_all)
+        tip = "Dismiss (kept in the list)"
+        dismiss = tool_button("Dismiss", "Dismiss the notice", tip, "small", self._dismiss)
+        row = filled(QHBoxLayout(self), self._label, self._details, dismiss, margins=QMargins(10, 3, 4, 3))
+        row.setStretch(0, 1)
         self.hide()
 
     @property
@@ -103,7 +112,6 @@ class NoticeBar(QFrame):
         return super().event(event)
 
     def _dismiss(self) -> None:
-        """Hide the notice, which has been read."""
         self.hide()
         self.bell.set_unseen(max(0, self.bell.unseen - 1))
 
@@ -117,8 +125,7 @@ class NoticeBar(QFrame):
         times = 1 if earlier is None else earlier.times + 1
         now = f"{datetime.now():%H:%M:%S}"
         self._notices = [*self._notices, replace(notice, times=times, last_reported=now)][-MOST_KEPT:]
-        self._label.setObjectName("warning" if notice.error else "")
-        self._label.style().polish(self._label)
+        show_kind(self._label, "warning" if notice.error else "")
         self._label.setText(self._notices[-1].line)
         self._details.setVisible(notice.details not in notice.message)
         self._fit()
@@ -136,9 +143,8 @@ class NoticeBar(QFrame):
 class Bell(QToolButton):
     """The button that opens the list, with the number of notices that have not been seen there."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.unseen = 0
+    def __init__(self) -> None:
+        super().__init__()
         self.set_unseen(0)
 
     def set_unseen(self, unseen: int) -> None:
@@ -147,3 +153,46 @@ class Bell(QToolButton):
         self.setText(f"⚑ {min(unseen, 99)}" if unseen else "⚑")
         self.setAccessibleName(f"Notices, {state}")
         self.setToolTip(f"Notices: errors and messages since the start, {state} (F8)")
+
+
+class NoticeList(QDialog):
+    """A list that does not block the window, and shows new notices while it is open."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Notices")
+        self.resize(640, 420)
+        self._notices: list[Notice] = []
+        self._list = QListWidget()
+        self._list.setAccessibleName("Notices since the start")
+        self._list.setWordWrap(True)
+        self._list.currentRowChanged.connect(self._show_details)
+        self._details = read_only_text("Details")
+        tip = "Copy all notices with their details, for a bug report"
+        copy = push_button("Copy all", tip, pressed=lambda: QGuiApplication.clipboard().setText(self.report()))
+        close = push_button("Close", pressed=self.accept, default=True, autoDefault=True)
+        buttons = filled(QHBoxLayout(), copy, None, close)
+        column = filled(QVBoxLayout(self), self._list, Label("Details"), self._details, buttons)
+        column.setStretch(0, 3)
+        column.setStretch(2, 2)
+
+    def set_notices(self, notices: Sequence[Notice]) -> None:
+        self._notices = list(reversed(notices))
+        self._list.clear()
+        for notice in self._notices:
+            self._list.addItem(f"{notice.last_reported}   {'error' if notice.error else 'note'}   {notice.line}")
+        if self._notices:
+            self._list.setCurrentRow(0)
+        else:
+            self._details.setPlainText("No notices since the start.")
+
+    def report(self) -> str:
+        return "\n\n".join(
+            f"{notice.last_reported} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
+            for notice in self._notices
+        )
+
+    def _show_details(self, row: int) -> None:
+        if 0 <= row < len(self._notices):
+            notice = self._notices[row]
+            self._details.setPlainText(f"{notice.message}\n\n{notice.details}".strip())

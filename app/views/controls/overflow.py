@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMenu, QToolButton, QWidget
 
 from app.views.controls.plain import plain_tip
@@ -44,12 +45,11 @@ class Overflow(QToolButton):
         menu.clear()
         for part in self.parts:
             if isinstance(part, QAbstractButton):
-                action = menu.addAction(part.text())
-                action.setCheckable(part.isCheckable())
-                action.setChecked(part.isChecked())
+                action = QAction(part.text(), menu, checkable=part.isCheckable(), checked=part.isChecked())
                 action.setEnabled(part.isEnabled())
                 action.setToolTip(plain_tip(part.toolTip()))
-                action.triggered.connect(lambda _=False, part=part: part.click())
+                action.triggered.connect(part.click)
+                menu.addAction(action)
         menu.addSeparator()
         for part in self.parts:
             if isinstance(part, QLabel):

@@ -96,7 +96,6 @@ class PlayingKeys(QObject):
         return notes
 
     def _let_go(self, *numbers: int) -> None:
-        """Release keys."""
         for number in numbers:
             self._leaving.pop(number, None)
             if (press := self._down.pop(number, None)) is not None:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from app.views.controls.choosers import FilterButton, NameButton
 from app.views.controls.elided_label import ElidedLabel
-from app.views.controls.filter_button import FilterButton
-from app.views.controls.name_button import NameButton
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import NO_MARGINS, filled, tool_button
 
 if TYPE_CHECKING:
     from app.presets.library import PresetEntry
@@ -28,29 +27,17 @@ class PresetBar(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        previous = tool_button("◀", "Previous preset", "Previous preset in the browser's list (Page up)")
-        following = tool_button("▶", "Next preset", "Next preset in the browser's list (Page down)")
-        for button in (previous, following):
-            button.setObjectName("narrow")
-        previous.clicked.connect(lambda: self.step_asked.emit(-1))
-        following.clicked.connect(lambda: self.step_asked.emit(1))
-        self.name = NameButton("Reading presets …")
-        self.name.setMinimumWidth(100)
-        self.name.setMaximumWidth(560)
-        self.name.setToolTip("Browse the presets (Ctrl+P)")
-        self.name.clicked.connect(self.browse_asked)
-        self.filtered = FilterButton("presets")
-        self.filtered.clicked.connect(self.all_asked)
-        self.card = ElidedLabel()
-        self.card.setObjectName("faint")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        row.addWidget(previous)
-        row.addWidget(self.name, 1000)  # takes the room first, up to its maximum width
-        row.addWidget(following)
-        row.addWidget(self.filtered)
-        row.addStretch(1)
+        tip = "Previous preset in the browser's list (Page up)"
+        previous = tool_button("◀", "Previous preset", tip, "narrow", lambda: self.step_asked.emit(-1))
+        tip = "Next preset in the browser's list (Page down)"
+        following = tool_button("▶", "Next preset", tip, "narrow", lambda: self.step_asked.emit(1))
+        tip = "Browse the presets (Ctrl+P)"
+        self.name = NameButton("Reading presets …", tip, self.browse_asked, narrowest=100, widest=560)
+        self.filtered = FilterButton("presets", self.all_asked)
+        self.card = ElidedLabel(objectName="faint")
+        row = filled(QHBoxLayout(self), previous, self.name, following, self.filtered, None, spacing=6)
+        row.setContentsMargins(NO_MARGINS)
+        row.setStretchFactor(self.name, 1000)  # takes the room first, up to its maximum width
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
         """Show the chosen preset; None: there is no preset."""

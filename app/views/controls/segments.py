@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
 
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import NO_MARGINS, filled, tool_button
 
 SMALL = "padding: 2px 8px; border-radius: 4px;"
 
@@ -29,13 +29,9 @@ class Segments(QWidget):
         self.setAccessibleName(name)
         self._group = QButtonGroup(self)
         self._keys: list[str] = []
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(2)
+        row = filled(QHBoxLayout(self), spacing=2, margins=NO_MARGINS)
         for place, (key, text, tip) in enumerate(choices):
-            button = tool_button(text, f"{name}: {text}", tip)
-            button.setObjectName(key)
-            button.setCheckable(True)
+            button = tool_button(text, f"{name}: {text}", tip, key, checkable=True)
             button.setStyleSheet(SMALL)
             button.setChecked(not switches and not self._keys)
             if switches:  # in a group, Tab and the arrow keys would reach the first alone
@@ -50,7 +46,6 @@ class Segments(QWidget):
 
     @property
     def key(self) -> str:
-        """The choice that is checked."""
         return self._keys[self._group.checkedId()]
 
     def show_key(self, key: str) -> None:

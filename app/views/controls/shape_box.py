@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from PySide6.QtWidgets import QComboBox
 
 from app.shared.vocabulary import PICKUP_TITLES
@@ -23,18 +26,16 @@ _TIGHT = "QComboBox {{ padding: 5px 0 5px 6px; }} QComboBox::drop-down {{ border
 _ARROW, _PICKUP_ARROW = 17, 9  # pixels
 
 
-def shape_box() -> QComboBox:
+def shape_box(picked: Callable[[Any], object]) -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
-    box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
-    box.setToolTip(SHAPE_TIP)
+    box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES], tip=SHAPE_TIP, picked=picked)
     return _tight(box, _WIDTH, _ARROW)
 
 
-def pickup_box() -> QComboBox:
+def pickup_box(tip: str, picked: Callable[[Any], object]) -> QComboBox:
     """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
-    return _tight(
-        combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]), _PICKUP_WIDTH, _PICKUP_ARROW
-    )
+    box = combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()], tip=tip, picked=picked)
+    return _tight(box, _PICKUP_WIDTH, _PICKUP_ARROW)
 
 
 def _tight(box: QComboBox, width: int, arrow: int) -> QComboBox:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.session.choices import Choices
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from app.views import theme
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import push_button, show_kind, tool_button
 from app.views.controls.plain import plain_tip
 
 if TYPE_CHECKING:
@@ -50,10 +50,9 @@ class SlotButtons(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         group = QButtonGroup(self)
         for row, slot in enumerate(SLOTS):
-            button = QPushButton()
-            button.setCheckable(True)
-            button.setFixedWidth(theme.px(self._width))
+            button = push_button("", checkable=True)
             button.clicked.connect(lambda _=False, slot=slot: self.change_asked.emit("heard", slot))
+            button.setFixedWidth(theme.px(self._width))
             group.addButton(button)
             self._buttons[slot] = button
             grid.addWidget(button, row, 0)
@@ -61,7 +60,6 @@ class SlotButtons(QWidget):
         self.show_choices(self._choices)
 
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
-        """Set the presets that a slot may hold."""
         self._entries = entries
         self._show()
 
@@ -94,16 +92,10 @@ class SlotButtons(QWidget):
             )
             tip = f"Hear {slot.upper()}: {title} (key B: switch between A and B)" + (gain_line if gain else "")
             button.setToolTip(plain_tip(tip))
-            kind = theme.source_kind(source)
-            if button.objectName() != kind:
-                button.setObjectName(kind)
-                button.style().unpolish(button)
-                button.style().polish(button)
-            with QSignalBlocker(button):
-                button.setChecked(self._choices.heard == slot)
+            show_kind(button, theme.source_kind(source))
+            button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
-        """The title of a source in full, and as a button shows it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
                 return entry.title, entry.title
@@ -130,8 +122,7 @@ class SlotButtons(QWidget):
 
     def _menu_button(self, slot: str) -> QToolButton:
         letter = slot.upper()
-        button = tool_button("▾", f"Source of {letter}", f"Source and gain of {letter}")
-        button.setObjectName("narrow")
+        button = tool_button("▾", f"Source of {letter}", f"Source and gain of {letter}", "narrow")
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(button)
         menu.setToolTipsVisible(True)
@@ -143,12 +134,12 @@ class SlotButtons(QWidget):
         menu.clear()
         group = QActionGroup(menu)
         for source, title in _SOURCES:
-            self._add(menu, group, title, slot, source, getattr(self._choices, slot) == source)
+            self._add(menu, group, title, slot, source)
         others = menu.addMenu("Another preset's model")
         others.setToolTipsVisible(True)
         for entry in self._entries:
             source = f"preset:{entry.name}"
-            action = self._add(others, group, entry.title, slot, source, getattr(self._choices, slot) == source)
+            action = self._add(others, group, entry.title, slot, source)
             tip = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
             action.setToolTip(plain_tip(f"{tip}\n{entry.path.name}"))
         menu.addSeparator()
@@ -158,11 +149,11 @@ class SlotButtons(QWidget):
         gains = menu.addMenu("Gain of the difference")
         gain_group = QActionGroup(gains)
         for gain in DIFFERENCE_GAINS_DB:
-            checked = abs(self._choices.difference_gain_db - gain) < 0.5
-            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain), checked)
+            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain))
 
-    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, checked: bool) -> QAction:
-        action = QAction(title, menu, checkable=True, checked=checked)
+    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object) -> QAction:
+        """Add an entry that asks for the value of a field, checked if it is the present one."""
+        action = QAction(title, menu, checkable=True, checked=getattr(self._choices, field) == value)
         action.triggered.connect(lambda: self.change_asked.emit(field, value))
         group.addAction(action)
         menu.addAction(action)

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 
 from app.views.controls.elided_label import ElidedLabel
-from app.views.controls.parts import faint, tool_button
+from app.views.controls.parts import NO_MARGINS, faint, filled, tool_button
 
 STEPS_PER_S = 10
 KEY_STEP_S, PAGE_STEP_S = 1, 10
@@ -24,11 +24,9 @@ class SongStrip(QWidget):
         super().__init__(parent)
         self.setAccessibleName("MIDI file")
         self._length_s = 0.0
-        self.play = tool_button("▶", "Play the MIDI file", "Play or stop the MIDI file")
-        self.play.setObjectName("narrow")
-        self.play.clicked.connect(self.play_asked)
-        self.name = ElidedLabel()
-        self.name.setMinimumWidth(NARROWEST_NAME)
+        tip = "Play or stop the MIDI file"
+        self.play = tool_button("▶", "Play the MIDI file", tip, "narrow", self.play_asked)
+        self.name = ElidedLabel(minimumWidth=NARROWEST_NAME)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Position in the MIDI file")
         self.slider.setToolTip("Position in the MIDI file; arrow keys move it by a second")
@@ -36,11 +34,9 @@ class SongStrip(QWidget):
         self.slider.setPageStep(PAGE_STEP_S * STEPS_PER_S)
         self.slider.valueChanged.connect(self._ask)
         self.time = faint()
-        self.closer = tool_button("✕", "Close the MIDI file", "Stop and close the MIDI file")
-        self.closer.setObjectName("narrow")
-        self.closer.clicked.connect(self.close_asked)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
+        tip = "Stop and close the MIDI file"
+        self.closer = tool_button("✕", "Close the MIDI file", tip, "narrow", self.close_asked)
+        row = filled(QHBoxLayout(self), margins=NO_MARGINS)
         for widget, share in ((self.play, 0), (self.name, 1), (self.slider, 3), (self.time, 0), (self.closer, 0)):
             row.addWidget(widget, share)
         self._shown_step = 0

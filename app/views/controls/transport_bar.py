@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLayout,
-    QPushButton,
-    QSizePolicy,
-    QSpacerItem,
-    QVBoxLayout,
-    QWidget,
-)
+from functools import partial
+
+from PySide6.QtCore import QMargins, QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLayout, QSizePolicy, QSpacerItem, QVBoxLayout, QWidget
 
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
 from app.views import theme
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
-from app.views.controls.parts import filled, tool_button, vertical_rule
+from app.views.controls.parts import NO_MARGINS, filled, push_button, tool_button, vertical_rule
 from app.views.controls.plain import Label
 from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
@@ -43,19 +36,16 @@ class TransportBar(QFrame):
         self.setObjectName("panel")
         self.knobs = {field: Knob(OF_CHOICES[field]) for field in KNOBS}
         for field, knob in self.knobs.items():
-            knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
+            knob.value_asked.connect(partial(self.change_asked.emit, field))
         self.meter = Meter()
-        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
-        self._loop.setCheckable(True)
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)", checkable=True)
         self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
+        self._loop.toggled.connect(partial(self.change_asked.emit, "loop"))
         self._fitted = (False, False, 1.0)  # compact, tight, scale of text
         self._tight, self._verb = False, ""
         self._groups: list[QHBoxLayout] = []
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
-        self._row = row = QHBoxLayout(self)
-        row.setContentsMargins(12, 8, 12, 8)
-        row.setSpacing(5)
+        self._row = row = filled(QHBoxLayout(self), spacing=5, margins=QMargins(12, 8, 12, 8))
         self.slots = SlotButtons()
         self.slots.change_asked.connect(self.change_asked)
         knobs = self.knobs
@@ -66,14 +56,15 @@ class TransportBar(QFrame):
             "pluck": (self._group(*pluck),),
             "time": (self._group(knobs["seconds"], knobs["speed"]),),
         }
-        row.addLayout(self._build_transport())
-        for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][0]):
-            row.addWidget(group)
+        areas = *self.areas["slots"], *self.areas["pluck"], listener, *self.areas["time"]
+        self._play = push_button("", kind="play", pressed=self._ask_play, checkable=True)
+        self._show_verb("Pluck")
+        filled(row, filled(QVBoxLayout(), self._play, self._loop), *areas)
         self._space = QSpacerItem(0, 0, QSizePolicy.Policy.Expanding)
         row.addItem(self._space)
-        row.addWidget(vertical_rule())
-        row.addWidget(knobs["volume_db"])
-        row.addLayout(self._build_output())
+        tip = "Save what you hear as a WAV file (Ctrl+E)"
+        self.export = push_button("Export …", tip, "Export", pressed=self.export_asked)
+        filled(row, vertical_rule(), knobs["volume_db"], filled(QVBoxLayout(), self.meter, self.export))
 
     def add_group(self, group: QWidget) -> None:
         """Put controls of others behind its own, before the volume."""
@@ -94,7 +85,7 @@ class TransportBar(QFrame):
         for knob in self.knobs.values():
             knob.set_narrow(compact)
         self.slots.set_narrow(compact, tight)
-        for button in (self._play, self._loop, self._stereo, self._export):
+        for button in (self._play, self._loop, self._stereo, self.export):
             button.setProperty("compact", compact)
             button.setProperty("tight", tight)
             button.style().unpolish(button)
@@ -104,17 +95,15 @@ class TransportBar(QFrame):
         for field, knob in self.knobs.items():
             knob.set_value(getattr(choices, field))
         self.knobs["width"].set_barred(NO_WIDTH if choices.shape == "triangular" else "")
-        with QSignalBlocker(self._shape):
-            self._shape.setCurrentIndex(SHAPES.index(choices.shape))
+        self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
         for field in ("listen", "listen_right"):
             self.knobs[field].set_barred(AT_BRIDGE if choices.pickup == "bridge" else "")
-        self.knobs["listen_right"].setEnabled(
-            choices.stereo and choices.pickup != "bridge"
-        )  # not hidden, which would move the controls beside it
-        with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
+        # not hidden, which would move the controls beside it
+        self.knobs["listen_right"].setEnabled(choices.stereo and choices.pickup != "bridge")
+        with QSignalBlocker(self._stereo):
             self._stereo.setChecked(choices.stereo)
-            self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
+        self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
         self._show_verb("Pluck" if choices.drums is None else "Strike")
@@ -129,69 +118,43 @@ class TransportBar(QFrame):
         self._play.setText(words[0] if self._tight else words)
 
     def _show_verb(self, verb: str) -> None:
-        """Show the action of the button on string or drum."""
         if verb != self._verb:
             self._verb = verb
             self._play.setAccessibleName(f"{verb} or stop")
             self._play.setToolTip(f"{verb} the {'string' if verb == 'Pluck' else 'drum'}, or stop (Space)")
-            self._forget_playing()
+            self._playing = None
             self.show_playing(self._play.isChecked())
 
-    def _forget_playing(self) -> None:
+    def _ask_play(self) -> None:
         self._playing = None
-
-    def _build_transport(self) -> QVBoxLayout:
-        self._play = QPushButton()
-        self._play.setObjectName("play")
-        self._play.setCheckable(True)
-        self._play.clicked.connect(self._forget_playing)
-        self._play.clicked.connect(self.play_asked)
-        self._show_verb("Pluck")
-        return filled(QVBoxLayout(), self._play, self._loop)
+        self.play_asked.emit()
 
     def _build_pickup(self) -> QVBoxLayout:
-        self._stereo = tool_button(
-            "Stereo",
-            "Stereo",
-            f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}",
-        )
-        self._stereo.setCheckable(True)
-        self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
-        self._pickup = pickup_box()
-        self._pickup.setToolTip(
+        tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}"
+        self._stereo = tool_button("Stereo", tip=tip, checkable=True)
+        self._stereo.toggled.connect(partial(self.change_asked.emit, "stereo"))
+        self._pickup = pickup_box(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
             f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
-            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}"
+            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}",
+            partial(self.change_asked.emit, "pickup"),
         )
-        self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", self._pickup.itemData(row)))
         self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         return filled(QVBoxLayout(), self._stereo, self._pickup)
 
     def _build_shape(self) -> QVBoxLayout:
-        self._shape = shape_box()
-        self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
-        label = Label("PLUCK")
-        label.setObjectName("knob")
+        self._shape = shape_box(partial(self.change_asked.emit, "shape"))
         column = QVBoxLayout()
-        column.addWidget(label, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(Label("PLUCK", objectName="knob"), alignment=Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(1)
         column.addWidget(self._shape)
         column.addStretch(2)
         return column
 
-    def _build_output(self) -> QVBoxLayout:
-        self.export = self._export = QPushButton("Export …")
-        self._export.setAccessibleName("Export")
-        self._export.setToolTip("Save what you hear as a WAV file (Ctrl+E)")
-        self._export.clicked.connect(self.export_asked)
-        return filled(QVBoxLayout(), self.meter, self._export)
-
     def _group(self, *parts: QWidget | QLayout) -> QWidget:
         """A rule and parts beside each other, which are shown and hidden together."""
         group = QWidget()
-        row = filled(QHBoxLayout(group), vertical_rule(), *parts)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(5)
+        row = filled(QHBoxLayout(group), vertical_rule(), *parts, spacing=5, margins=NO_MARGINS)
         self._groups.append(row)
         return group

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QMargins, QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import AbxRecord, default_folder, save_record
@@ -22,6 +22,7 @@ from app.analysis.abx.trials import AbxChoices, Identity, ListeningTest, Sound
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
+from app.views.controls.parts import filled
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from app.views.dialogs.question import ask
 from engine.result_file import WriteError
@@ -80,15 +81,12 @@ class AbxDialog(QDialog):
         self._folder = choices.folder
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
-        self._setup = SetupPage(material.words, labels, choices)
-        self._trial = TrialPage(labels)
+        self._setup, self._trial = SetupPage(material.words, labels, choices), TrialPage(labels)
         self._result = ResultPage()
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(22, 20, 22, 18)
-        column.addWidget(self._pages)
+        filled(QVBoxLayout(self), self._pages, margins=QMargins(22, 20, 22, 18))
         self._connect()
         self._watch = QTimer(self, interval=WATCH_MS)
         self._watch.timeout.connect(self._look_at_device)
@@ -99,11 +97,9 @@ class AbxDialog(QDialog):
 
     @property
     def testing(self) -> bool:
-        """Return True if a test is under way."""
         return self._run is not None
 
     def choices(self) -> AbxChoices:
-        """The dialog's state, to be remembered."""
         setup = self._setup
         return AbxChoices(trials=setup.trials.value(), restart=setup.restart.isChecked(), folder=self._folder)
 
@@ -114,9 +110,7 @@ class AbxDialog(QDialog):
         self._leave()
 
     def _connect(self) -> None:
-        setup = self._setup
-        trial = self._trial
-        result = self._result
+        setup, trial, result = self._setup, self._trial, self._result
         setup.start.clicked.connect(self._start)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)
@@ -130,7 +124,6 @@ class AbxDialog(QDialog):
     # Sound
 
     def _ask_for_sound(self) -> None:
-        """Start the rendering, at the present rate of the device."""
         self._rate_hz = self._output.rate_hz
         self._rendering = self._render(self._rate_hz)
 
@@ -220,13 +213,9 @@ class AbxDialog(QDialog):
             trials=run.trials,
             remark=remark,
         )
-        self._show_result(self._record)
-        self._save(Path(self._folder) if self._folder else default_folder())
-
-    def _show_result(self, record: AbxRecord) -> None:
-        self._hush()
         self._pages.setCurrentWidget(self._result)
-        self._result.show_record(record)
+        self._result.show_record(self._record)
+        self._save(Path(self._folder) if self._folder else default_folder())
 
     def _save(self, folder: Path) -> None:
         assert self._record is not None

@@ -14,15 +14,15 @@ from PySide6.QtWidgets import (
     QLayout,
     QProgressBar,
     QPushButton,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from app.analysis.abx.record import MEANING, AbxRecord, p_text
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, AbxChoices, needed_correct
-from app.views.controls.form import check_box, count_box, form_label, row_of
-from app.views.controls.parts import filled, label, push_button
+from app.views.controls.form import check_box, filled_form, row_of
+from app.views.controls.number_box import CountBox
+from app.views.controls.parts import NO_MARGINS, filled, label, push_button, show_kind
 from app.views.controls.plain import Label
 
 HEAR = "Listen to X, then answer which one it is."
@@ -43,28 +43,27 @@ class SetupPage(QWidget):
     def __init__(self, words: str, labels: Sequence[str], choices: AbxChoices) -> None:
         super().__init__()
         tip = "Fixed before the start: a test that could stop at any time would prove nothing"
-        self.trials: QSpinBox = count_box("Number of trials", MOST_TRIALS, choices.trials, tip)
-        self.trials.valueChanged.connect(self._show_trials)
+        self.trials = CountBox("Number of trials", MOST_TRIALS, choices.trials, tip)
+        self.trials.valueChanged.connect(lambda: self._show_trials(self.trials.value()))
         tip = "Otherwise the switch happens at the playhead, with a cross-fade"
         self.restart = check_box("Restart from the pluck at each switch", choices.restart, tip)
         self._needed, self._warning = label("faint"), label("warning")
-        self.start = push_button("Start the test", "Begin the first trial")
-        self.start.setObjectName("play")
+        self.start = push_button("Start the test", "Begin the first trial", kind="play")
         self.start.setDefault(True)  # at first it is disabled and cannot have the focus
         self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
-        form = QFormLayout()
-        form.addRow(form_label("Note"), label(text=words))
+        rows: dict[str, QWidget | QLayout] = {"Note": label(text=words)}
         for name, text in zip("AB", labels, strict=True):
             listen = push_button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
             listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
             self._listen.append(listen)
-            form.addRow(form_label(name), row_of(listen, Label(text)))
-        form.addRow(form_label("Trials"), row_of(self.trials, self._needed))
-        form.addRow(form_label("Switch"), self.restart)
+            rows[name] = row_of(listen, Label(text))
+        rows |= {"Trials": row_of(self.trials, self._needed), "Switch": self.restart}
         self._needed.setMinimumWidth(320)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
-        _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons)
+        form = filled_form(QFormLayout(), rows)
+        parts = label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
         self._show_trials(choices.trials)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -128,12 +127,13 @@ class TrialPage(QWidget):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         keys = _centred()
         keys.setText(KEYS)
-        sounds, answers = QHBoxLayout(), QHBoxLayout()
-        for row, buttons in ((sounds, self._sounds), (answers, self._answers)):
-            for button in buttons.values():
-                row.addWidget(button, 1)
+        sounds, answers = (filled(QHBoxLayout(), *buttons.values()) for buttons in (self._sounds, self._answers))
+        for place in range(len(self._sounds)):
+            sounds.setStretch(place, 1)
+            answers.setStretch(place, 1)
         last = filled(QHBoxLayout(), None, self.stop)
-        _stack(self, self._number, self._bar, None, sounds, self._hint, answers, None, keys, last)
+        parts = self._number, self._bar, None, sounds, self._hint, answers, None, keys, last
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
         self._acts: dict[int, Callable[[], object]] = {
             **{getattr(Qt.Key, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
             **dict.fromkeys((Qt.Key.Key_1, Qt.Key.Key_Left), self._answers["A"].click),  # nothing while disabled
@@ -142,10 +142,8 @@ class TrialPage(QWidget):
         }
 
     def _sound_button(self, name: str, text: str) -> QPushButton:
-        button = push_button(f"{name}\n{text}", f"Hear {name} ({name})")
-        button.setObjectName(text.lower() if name != "X" else "")  # its colour in the style sheet
-        button.setAccessibleName(f"Hear {name}: {text}" if name != "X" else "Hear X")
-        button.setCheckable(True)
+        kind, spoken = ("", "Hear X") if name == "X" else (text.lower(), f"Hear {name}: {text}")
+        button = push_button(f"{name}\n{text}", f"Hear {name} ({name})", spoken, kind, checkable=True)
         button.setStyleSheet(_LARGE)
         button.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
         return button
@@ -189,7 +187,8 @@ class ResultPage(QWidget):
         self.again = push_button("New test", "Back to the first page")
         self.close_button = push_button("Close", "Close the listening test")
         last = filled(QHBoxLayout(), None, self.save, self.again, self.close_button)
-        _stack(self, None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved, last)
+        parts = None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved, last
+        filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
 
     def show_record(self, record: AbxRecord) -> None:
         answered = len(record.trials)
@@ -204,8 +203,7 @@ class ResultPage(QWidget):
 
     def show_saved(self, text: str, failed: bool) -> None:
         """Show where the result was saved; or why it was not, with a button to save it elsewhere."""
-        self._saved.setObjectName("warning" if failed else "faint")
-        self._saved.style().polish(self._saved)
+        show_kind(self._saved, "warning" if failed else "faint")
         self._saved.setText(text)
         self.save.setVisible(failed)
 
@@ -215,9 +213,3 @@ def _centred(style: str = "") -> QLabel:
     text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
     text_label.setStyleSheet(style)
     return text_label
-
-
-def _stack(page: QWidget, *parts: QWidget | QLayout | None) -> None:
-    column = filled(QVBoxLayout(page), *parts)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(14)

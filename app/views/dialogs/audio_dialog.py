@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.views.controls.parts import combo_box, filled, label, push_button
+from app.views.controls.parts import combo_box, filled, label, push_button, refill
 from app.views.controls.plain import Label
 
 RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
@@ -67,23 +67,21 @@ class AudioDialog(QDialog):
         self.setMinimumWidth(520)
         self._state_label = label()
         self._problem_label = label("warning", selectable=True)
-        self._device = combo_box("Output", [("System default", None)])
+        self._problem = QFrame()
+        self._problem.setObjectName("panel")
+        QHBoxLayout(self._problem).addWidget(self._problem_label)
+        tip = "Audio output; remembered by its name"
+        self._device = combo_box("Output", [("System default", None)], tip=tip, picked=self._choose)
         self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self._device.setToolTip("Audio output; remembered by its name")
-        self._rate = combo_box("Sample rate", [(name, rate) for rate, name in RATES.items()])
-        self._rate.setToolTip("Sample rate of the device; the model's rate is converted to it")
-        self._buffer = combo_box("Buffer", [(name, buffer) for buffer, name in BUFFERS.items()])
-        self._buffer.setToolTip(
-            "Length of the audio buffer: longer is safer against dropouts, shorter has a lower latency"
-        )
-        for box in (self._device, self._rate, self._buffer):
-            box.activated.connect(self._choose)
-        self._gaps = Label("0")
-        self._gaps.setMinimumWidth(40)
-        self._load = Label("0 %")
-        self._load.setToolTip(
-            "Processor time of the sound as a share of the time it plays: near 100 % there are dropouts"
-        )
+        tip = "Sample rate of the device; the model's rate is converted to it"
+        rates = [(name, rate) for rate, name in RATES.items()]
+        self._rate = combo_box("Sample rate", rates, tip=tip, picked=self._choose)
+        tip = "Length of the audio buffer: longer is safer against dropouts, shorter has a lower latency"
+        buffers = [(name, buffer) for buffer, name in BUFFERS.items()]
+        self._buffer = combo_box("Buffer", buffers, tip=tip, picked=self._choose)
+        self._gaps = Label("0", minimumWidth=40)
+        tip = "Processor time of the sound as a share of the time it plays: near 100 % there are dropouts"
+        self._load = Label("0 %", toolTip=tip)
         self._lay_out()
 
     @property
@@ -100,15 +98,10 @@ class AudioDialog(QDialog):
         """Show the connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
         selected = (chosen.name, chosen.host_api) if chosen else None
-        with QSignalBlocker(self._device):
-            self._device.clear()
-            self._device.addItem("System default", None)
-            for key in keys:
-                self._device.addItem(f"{key[0]}   ({key[1]})", key)
-            if selected and selected not in keys:
-                self._device.addItem(f"{selected[0]}   ({selected[1]}), not connected", selected)
-            rows = [self._device.itemData(row) for row in range(self._device.count())]
-            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == selected), 0))
+        entries = [("System default", None), *((f"{name}   ({api})", (name, api)) for name, api in keys)]
+        if selected and selected not in keys:
+            entries.append((f"{selected[0]}   ({selected[1]}), not connected", selected))
+        refill(self._device, entries, selected)
 
     def show_sound(self, sound: SoundChoice) -> None:
         self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))
@@ -130,20 +123,20 @@ class AudioDialog(QDialog):
         for button in self._tones:
             button.setEnabled(output)
 
-    def _choose(self) -> None:
+    def _choose(self, _: object) -> None:
         self.choice_made.emit(self.device, self.sound)
 
     def _lay_out(self) -> None:
-        self._problem = QFrame()
-        self._problem.setObjectName("panel")
-        QHBoxLayout(self._problem).addWidget(self._problem_label)
-        rescan = _button("Rescan", "Search for newly connected outputs and open the selected one", self.rescan_asked)
-        self._tones = [
-            _button(side.capitalize(), f"A soft tone for a second: {side}") for side in ("left", "both", "right")
-        ]
-        for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
-            button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
-        reset = _button("Reset", "Count dropouts from zero", self.gaps_reset)
+        tip = "Search for newly connected outputs and open the selected one"
+        rescan = push_button("Rescan", tip, "Rescan", pressed=self.rescan_asked)
+        self._tones: list[QPushButton] = []
+        for side in ("left", "both", "right"):
+            tip = f"A soft tone for a second: {side}"
+            tone = push_button(side.capitalize(), tip, tip)
+            tone.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
+            self._tones.append(tone)
+        tip = "Count dropouts from zero"
+        reset = push_button("Reset", tip, tip, pressed=self.gaps_reset)
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         form.setSpacing(10)
@@ -155,19 +148,10 @@ class AudioDialog(QDialog):
         form.addRow("Test tone", filled(QHBoxLayout(), *self._tones, None))
         form.addRow("Dropouts", filled(QHBoxLayout(), self._gaps, reset, None))
         form.addRow("Load", self._load)
-        close = _button("Close", "Close; changes are already applied")
-        close.setDefault(True)
-        close.clicked.connect(self.accept)
+        tip = "Close; changes are already applied"
+        close = push_button("Close", tip, tip, pressed=self.accept, default=True)
         last, advice = filled(QHBoxLayout(), None, close), label("faint", ADVICE)
-        filled(QVBoxLayout(self), self._state_label, self._problem, form, advice, None, last).setSpacing(14)
-
-
-def _button(text: str, tip: str, signal: object = None) -> QPushButton:
-    button = push_button(text, tip)
-    button.setAccessibleName(tip if len(text) < 6 else text)
-    if signal is not None:
-        button.clicked.connect(signal)
-    return button
+        filled(QVBoxLayout(self), self._state_label, self._problem, form, advice, None, last, spacing=14)
 
 
 def _set(target: QLabel, text: str) -> None:

@@ -11,13 +11,13 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QTabBar, QVBoxLayout, QWidget
 
 from app.export.choices import ExportChoices
 from app.export.job import EXPECTED, ExportJob
 from app.export.sampled.choices import SampledChoices
 from app.views.background import Background
-from app.views.controls.parts import filled, label, push_button
+from app.views.controls.parts import filled, label, push_button, show_kind
 from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
@@ -87,17 +87,14 @@ class ExportDialog(GrowingDialog):
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
-        self.show_folder = push_button("Show in folder", "Open the folder of what was saved")
-        self.show_folder.clicked.connect(self._open_folder)
-        self.save = QPushButton("Export")
-        self.save.setObjectName("primary")
-        self.save.setToolTip("Render and save")
-        self.save.clicked.connect(self._start)
-        self.close_button = push_button("Close", "Close (Escape)")
-        self.close_button.clicked.connect(self._close_or_cancel)
+        tip = "Open the folder of what was saved"
+        self.show_folder = push_button("Show in folder", tip, pressed=self._open_folder)
+        tip = "Render and save"
+        self.save = push_button("Export", tip, kind="primary", pressed=self._start, autoDefault=True)
+        self.close_button = push_button("Close", "Close (Escape)", pressed=self._close_or_cancel)
         buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
         self._choosers = (self.tabs, *self.pages.values(), self.wav)
-        filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons).setSpacing(12)
+        filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons, spacing=12)
         self.bar.hide()
         self.show_folder.hide()
 
@@ -116,7 +113,7 @@ class ExportDialog(GrowingDialog):
 
     def choices(self) -> ExportChoices:
         """The choices of notes and performances, to be remembered."""
-        return ExportChoices.model_validate({**self.note.choices(), **self.wav.choices()})
+        return self.note.choices()
 
     def sampled_choices(self) -> SampledChoices:
         return self.sampler.choices()
@@ -212,7 +209,6 @@ class ExportDialog(GrowingDialog):
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
-        """End the job, with this result."""
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)
@@ -222,8 +218,7 @@ class ExportDialog(GrowingDialog):
         self._show_text(text, failed)
 
     def _show_text(self, text: str, failed: bool = False) -> None:
-        self.state.setObjectName("warning" if failed else "faint")
-        self.state.style().polish(self.state)
+        show_kind(self.state, "warning" if failed else "faint")
         self.state.setText(text)
 
     def _open_folder(self) -> None:

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any, Literal
 
 from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance
-from PySide6.QtWidgets import (
-    QAbstractButton,
-    QComboBox,
-    QDoubleSpinBox,
-    QFormLayout,
-    QLayout,
-    QSpinBox,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QWidget
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
@@ -36,12 +28,12 @@ from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
-from app.views.controls.form import FilePicker, check_box, count_box, form_label, row_of, spin_box
-from app.views.controls.note_box import NoteBox
+from app.views.controls.form import FilePicker, Rows, check_box, filled_form, row_of
+from app.views.controls.number_box import CountBox, NoteBox, NumberBox
 from app.views.controls.parts import combo_box, faint, label
 from engine.result_file import WriteError, explain
 
-Rows = dict[str, QWidget | QLayout]
+Control = QComboBox | QCheckBox | NumberBox | FilePicker
 Kind = Literal["note", "performance", "sampler", "plugin"]
 SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Model", "model"),
@@ -81,19 +73,38 @@ class HeardInstrument:
     preset: PresetEntry
 
 
-class WavForm(QWidget):
-    """Sample rate, format and level of WAV files; notes and performances share it."""
+class ChoicesForm(QWidget):
+    """A form of controls, each for a field of choices."""
 
     changed = Signal()
+
+    def _lay_out(
+        self, rows: Rows, controls: Mapping[str, Control], settle: Callable[[], object] | None = None
+    ) -> QFormLayout:
+        """Lay out the rows; `settle` is called when a control changes that is no file."""
+        self._controls = controls
+        for control in controls.values():
+            change = _change_of(control)
+            change.connect(self.changed)
+            if settle is not None and not isinstance(control, FilePicker):
+                change.connect(settle)
+        return filled_form(QFormLayout(self), rows)
+
+    def values(self) -> dict[str, Any]:
+        return {field: _value_of(control) for field, control in self._controls.items()}
+
+
+class WavForm(ChoicesForm):
+    """Sample rate, format and level of WAV files; notes and performances share it."""
 
     def __init__(self, export: ExportChoices) -> None:
         super().__init__()
         rates = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ)]
-        self.rate = combo_box("Sample rate", rates, export.rate_hz)
-        self.rate.setToolTip("A rate above the model's own adds no bandwidth")
+        tip = "A rate above the model's own adds no bandwidth"
+        self.rate = combo_box("Sample rate", rates, export.rate_hz, tip)
         self.note = faint()
-        self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
-        self.bits.setToolTip("16 bits are dithered; floating point never clips")
+        formats = [(name, bits) for bits, name in BITS_NAMES.items()]
+        self.bits = combo_box("Format", formats, export.bits, "16 bits are dithered; floating point never clips")
         tip = (
             "One gain for model and truth. Off: as loud as at a volume of 0 dB; "
             "of a string alone, 10 mm are full scale"
@@ -104,16 +115,10 @@ class WavForm(QWidget):
             "Format": row_of(self.bits),
             "Level": row_of(self.normalise),
         }
-        _lay_out(self, rows)
-        _watch((self.rate, self.bits, self.normalise), self.changed)
-
-    def choices(self) -> dict[str, Any]:
-        """Fields of `ExportChoices`."""
-        rate_hz, bits = self.rate.currentData(), self.bits.currentData()
-        return {"rate_hz": rate_hz, "bits": bits, "normalise": self.normalise.isChecked()}
+        self._lay_out(rows, {"rate_hz": self.rate, "bits": self.bits, "normalise": self.normalise})
 
 
-class ExportPage(QWidget):
+class ExportPage(ChoicesForm):
     """A page with the subject and the settings of an export; a further kind is a further subclass.
 
     Attributes:
@@ -123,7 +128,6 @@ class ExportPage(QWidget):
         file: where it is written.
     """
 
-    changed = Signal()
     title = missing = ""
     window_title = "Export"
     writes_wav = True
@@ -152,24 +156,23 @@ class NotePage(ExportPage):
         self._export, self._wav = export, wav
         self._subject: HeardNote | None = None
         self.what = label("faint")
-        self.source = combo_box("Source", SOURCE_NAMES, export.source)
-        self.source.setToolTip("What to save")
+        self.source = combo_box("Source", SOURCE_NAMES, export.source, "What to save")
         self.through = check_box("On", True, "Off: the string alone, without the instrument")
         self.through.setAccessibleName("Instrument")
         self.through_words = label()
         limits = 0.1, LONGEST_S
         ends = (("Until it has decayed", True), ("Fixed", False))
-        self.length = combo_box("Length", ends, export.until_decayed)
-        self.length.setToolTip("Where the file ends: when the sound has decayed, or after a fixed time")
+        tip = "Where the file ends: when the sound has decayed, or after a fixed time"
+        self.length = combo_box("Length", ends, export.until_decayed, tip)
         tip = "The sound ends where model and truth are this far below their peak"
-        self.decay = spin_box("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
+        self.decay = NumberBox("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
         tip = "A string that rings longer is faded out at this length"
-        self.longest = spin_box("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
-        self.seconds = spin_box("Duration", limits, export.seconds, "The end is faded out within 10 ms", " s", 1, 0.5)
-        tip, gain_db = "Gain of the difference, model − truth", export.difference_gain_db
-        self.gain = spin_box(
-            "Gain of the difference", DIFFERENCE_GAIN_RANGE_DB, gain_db, tip, " dB", step=6, prefix="+"
-        )
+        self.longest = NumberBox("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
+        tip = "The end is faded out within 10 ms"
+        self.seconds = NumberBox("Duration", limits, export.seconds, tip, " s", 1, 0.5)
+        name, tip = "Gain of the difference", "Gain of the difference, model − truth"
+        gain_db, limits_db = export.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB
+        self.gain = NumberBox(name, limits_db, gain_db, tip, " dB", step=6, prefix="+")
         self.file = FilePicker(export.folder, "With two files, the source is appended to each name")
         self.names = faint()
         through = row_of(self.through, self.through_words)
@@ -183,12 +186,19 @@ class NotePage(ExportPage):
             "File": self.file,
             "Saved as": self.names,
         }
-        self._form = _lay_out(self, rows)
-        controls = (self.source, self.through, self.length, self.decay, self.longest, self.seconds, self.gain)
-        for signal in (*_watch(controls, self.changed), wav.changed):
-            signal.connect(self._show)
+        controls: dict[str, Control] = {
+            "folder": self.file,
+            "source": self.source,
+            "alone": self.through,
+            "until_decayed": self.length,
+            "decay_db": self.decay,
+            "longest_s": self.longest,
+            "seconds": self.seconds,
+            "difference_gain_db": self.gain,
+        }
+        self._form = self._lay_out(rows, controls, self._show)
+        wav.changed.connect(self._show)
         self.file.changed.connect(self._show)
-        self.file.changed.connect(self.changed)
 
     def show_subject(self, subject: HeardNote | None) -> None:
         before, self._subject = self._subject, subject
@@ -198,18 +208,9 @@ class NotePage(ExportPage):
                 self.gain.setValue(subject.difference_gain_db)
         self._show()
 
-    def choices(self) -> dict[str, Any]:
-        """Fields of `ExportChoices`."""
-        return {
-            "folder": self.file.folder,
-            "source": self.source.currentData(),
-            "alone": not self.through.isChecked(),
-            "until_decayed": self.length.currentData(),
-            "decay_db": self.decay.value(),
-            "longest_s": self.longest.value(),
-            "seconds": self.seconds.value(),
-            "difference_gain_db": self.gain.value(),
-        }
+    def choices(self) -> ExportChoices:
+        values = {**self.values(), "alone": not self.through.isChecked()}
+        return ExportChoices.model_validate({**values, **self._wav.values()})
 
     def paths(self) -> dict[Source, Path]:
         """The files that will be written, by source. Raises ValueError: no name is given."""
@@ -222,8 +223,7 @@ class NotePage(ExportPage):
     def job(self) -> NoteExport:
         if self._subject is None:
             raise ValueError(self.missing)
-        choices = ExportChoices.model_validate({**self.choices(), **self._wav.choices()})
-        return NoteExport(self._subject.note, self.paths(), choices)
+        return NoteExport(self._subject.note, self.paths(), self.choices())
 
     def offer(self) -> tuple[str, str]:
         there = any(path.is_file() for path in self.job().paths.values())
@@ -241,7 +241,9 @@ class NotePage(ExportPage):
         alone = note.can_be_alone and not self.through.isChecked()
         self.through.setVisible(note.can_be_alone)
         self.through_words.setText(_through_words(note, alone, source))
-        self.what.setText(_note_words(self._subject, alone))
+        struck = None if alone else note.struck
+        key_words = struck and f"Note: {struck.words}, held, with the present settings"
+        self.what.setText(key_words or self._subject.words)
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
         model_rate = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else model_rate)
@@ -263,8 +265,7 @@ class PerformancePage(ExportPage):
         self._subject: HeardPerformance | None = None
         self.what = label("faint")
         self.file = FilePicker(export.folder, "The MIDI file has the same name")
-        _lay_out(self, {"Sound": self.what, "File": self.file})
-        self.file.changed.connect(self.changed)
+        self._lay_out({"Sound": self.what, "File": self.file}, {"folder": self.file})
 
     def show_subject(self, subject: HeardPerformance | None) -> None:
         self._subject = subject
@@ -283,7 +284,7 @@ class PerformancePage(ExportPage):
         played, preset = self._subject.played, self._subject.preset
         if preset is None:
             raise ValueError(f"The preset {played.patch.preset}, which plays the instrument, was not found.")
-        choices = ExportChoices.model_validate(self._wav.choices())
+        choices = ExportChoices.model_validate(self._wav.values())
         return PlayedExport(played, preset, self.file.path, choices.wav)
 
     def offer(self) -> tuple[str, str]:
@@ -303,22 +304,21 @@ class SamplerPage(ExportPage):
         self._subject: HeardInstrument | None = None
         self._chosen_keys = choices.keys
         self.what = label()
-        self.form = combo_box("Format", FORM_NAMES, choices.form)
-        self.form.setToolTip("An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits")
-        self.bits = combo_box("Bits", [("24-bit", "24"), ("16-bit, dithered", "16")], choices.bits)
-        self.bits.setToolTip("Of each sample")
-        self.rate = combo_box("Sample rate", [(f"{hz / 1000:g} kHz", hz) for hz in RATES_HZ], choices.rate_hz)
-        self.rate.setToolTip("Of the samples")
+        tip = "An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits"
+        self.form = combo_box("Format", FORM_NAMES, choices.form, tip)
+        self.bits = combo_box("Bits", [("24-bit", "24"), ("16-bit, dithered", "16")], choices.bits, "Of each sample")
+        rates = [(f"{hz / 1000:g} kHz", hz) for hz in RATES_HZ]
+        self.rate = combo_box("Sample rate", rates, choices.rate_hz, "Of the samples")
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
         self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
         tip = "One sample for so many keys; those between are transposed"
-        self.every = count_box("Keys a sample", WIDEST_STEP, choices.every, tip)
+        self.every = CountBox("Keys a sample", WIDEST_STEP, choices.every, tip)
         tip = "How many velocities are rendered of each key"
-        self.layers = count_box("Velocity layers", MOST_LAYERS, choices.layers, tip)
+        self.layers = CountBox("Velocity layers", MOST_LAYERS, choices.layers, tip)
         tip = "Silent ones end sooner; one that still rings is faded out"
-        self.seconds = spin_box("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
-        self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
-        self.source.setToolTip("What plays the instrument")
+        self.seconds = NumberBox("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
+        sources, tip = SOURCE_NAMES[:2], "What plays the instrument"
+        self.source = combo_box("Source", sources, choices.source, tip)
         tip = "A room in the samples ends with the release of each key"
         self.dry = check_box("Dry: the room is left to the sampler", choices.dry, tip)
         self.file = FilePicker(choices.folder, "Where the instrument is written")
@@ -335,11 +335,20 @@ class SamplerPage(ExportPage):
             "File": self.file,
             "": self.size_text,
         }
-        _lay_out(self, rows)
-        controls = (self.form, self.bits, self.rate, self.lowest, self.highest, self.every, self.layers)
-        for signal in _watch((*controls, self.seconds, self.source, self.dry), self.changed):
-            signal.connect(self._suggest_name)
-        self.file.changed.connect(self.changed)
+        controls: dict[str, Control] = {
+            "folder": self.file,
+            "form": self.form,
+            "bits": self.bits,
+            "rate_hz": self.rate,
+            "every": self.every,
+            "layers": self.layers,
+            "seconds": self.seconds,
+            "source": self.source,
+            "dry": self.dry,
+        }
+        self._lay_out(rows, controls, self._suggest_name)
+        for box in (self.lowest, self.highest):
+            box.valueChanged.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
         """Show another patch, or the same that was turned: chosen keys stay as far as it has them."""
@@ -366,18 +375,7 @@ class SamplerPage(ExportPage):
         return None if keys == self._subject.patch.range else keys
 
     def choices(self) -> SampledChoices:
-        return SampledChoices(
-            folder=self.file.folder,
-            form=self.form.currentData(),
-            bits=self.bits.currentData(),
-            rate_hz=self.rate.currentData(),
-            keys=self.keys(),
-            every=self.every.value(),
-            layers=self.layers.value(),
-            seconds=self.seconds.value(),
-            source=self.source.currentData(),
-            dry=self.dry.isChecked(),
-        )
+        return SampledChoices(keys=self.keys(), **self.values())
 
     def job(self) -> SampledExport:
         if self._subject is None:
@@ -433,16 +431,14 @@ class PluginPage(ExportPage):
         super().__init__()
         self._subject: HeardInstrument | None = None
         self.what = label()
-        self.form = combo_box("Format", [(name, form) for form, name in PLUGIN_NAMES.items()], "clap")
-        self.form.setToolTip("CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux")
-        self.system = combo_box("System", [(name, target) for target, name in SYSTEM_NAMES.items()], _this_system())
-        self.system.setToolTip("Of the computer that it is for")
+        tip = "CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux"
+        self.form = combo_box("Format", [(name, form) for form, name in PLUGIN_NAMES.items()], "clap", tip)
+        systems, tip = [(name, target) for target, name in SYSTEM_NAMES.items()], "Of the computer that it is for"
+        self.system = combo_box("System", systems, _this_system(), tip)
         self.file = FilePicker("", "Where the plug-in is written; hosts look for it where it is suggested")
         rows: Rows = {"Sound": self.what, "Format": row_of(self.form, self.system), "File": self.file}
-        _lay_out(self, rows)
-        for signal in _watch((self.form, self.system), self.changed):
-            signal.connect(self._suggest_name)
-        self.file.changed.connect(self.changed)
+        controls: dict[str, Control] = {"folder": self.file, "form": self.form, "system": self.system}
+        self._lay_out(rows, controls, self._suggest_name)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
         self._subject = subject
@@ -485,12 +481,6 @@ def _this_system() -> str:
         return next(iter(SYSTEM_NAMES))
 
 
-def _note_words(subject: HeardNote, alone: bool) -> str:
-    """The subject of an export: a key as the instrument plays it, or a pluck."""
-    struck = None if alone else subject.note.struck
-    return subject.words if struck is None else f"Note: {struck.words}, held, with the present settings"
-
-
 def _through_words(note: ExportedPluck, alone: bool, source: Chosen) -> str:
     """The parts of an instrument that are in the file."""
     if note.struck is None:
@@ -502,24 +492,17 @@ def _through_words(note: ExportedPluck, alone: bool, source: Chosen) -> str:
     return f"{note.struck.patch.name} with {added_words(note.struck.patch)}, as it is heard"
 
 
-def _lay_out(page: QWidget, rows: Rows) -> QFormLayout:
-    form = QFormLayout(page)
-    form.setContentsMargins(0, 0, 0, 0)
-    for name, row in rows.items():
-        form.addRow(form_label(name), row)
-    return form
+def _value_of(control: Control) -> Any:
+    if isinstance(control, FilePicker):
+        return control.folder
+    if isinstance(control, QComboBox):
+        return control.currentData()
+    return control.isChecked() if isinstance(control, QCheckBox) else control.value()
 
 
-def _watch(controls: Iterable[QWidget], changed: SignalInstance) -> list[SignalInstance]:
-    """Connect every change of a control to `changed`, and return the signals."""
-    signals: list[SignalInstance] = []
-    for control in controls:
-        if isinstance(control, QComboBox):
-            signals.append(control.currentIndexChanged)
-        elif isinstance(control, QSpinBox | QDoubleSpinBox):
-            signals.append(control.valueChanged)
-        elif isinstance(control, QAbstractButton):
-            signals.append(control.toggled)
-    for signal in signals:
-        signal.connect(changed)
-    return signals
+def _change_of(control: Control) -> SignalInstance:
+    if isinstance(control, FilePicker):
+        return control.changed
+    if isinstance(control, QComboBox):
+        return control.currentIndexChanged
+    return control.toggled if isinstance(control, QCheckBox) else control.valueChanged

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QTabWidget, QTextBrowser, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QTabWidget, QTextBrowser, QVBoxLayout, QWidget
 
-from app.views.controls.parts import filled
+from app.views.controls.parts import filled, push_button
 
 TEXT = Path(__file__).with_name("help.md")  # a part for each heading of the first level
 
@@ -36,9 +36,8 @@ class HelpDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Help")
         self.resize(680, 560)
-        self.tabs = QTabWidget()
+        self.tabs = QTabWidget(documentMode=True)
         self.tabs.setAccessibleName("Help topics")
-        self.tabs.setDocumentMode(True)
         parts = help_parts()
         rows = "\n".join(f"| **{key}** | {what} |" for key, what in keys)
         self._add("Tour", parts["Tour"])
@@ -48,8 +47,7 @@ class HelpDialog(QDialog):
         self._add("Errors", f"{parts['Errors']}\n\n`{log}`")
         title, _, rest = about.partition("\n")
         self._add(ABOUT, f"### {title}\n\n```\n{rest.strip()}\n```")
-        close = QPushButton("Close", default=True)
-        close.clicked.connect(self.accept)
+        close = push_button("Close", pressed=self.accept, default=True, autoDefault=True)
         filled(QVBoxLayout(self), self.tabs, filled(QHBoxLayout(), None, close))
 
     def open_at(self, topic: str) -> None:

@@ -12,10 +12,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
-    QLayout,
     QLineEdit,
     QProgressBar,
-    QPushButton,
     QRadioButton,
     QStackedWidget,
     QVBoxLayout,
@@ -26,10 +24,11 @@ from app.audio.note_file import NoteFileError
 from app.audio.sound import Sound
 from app.patches.library import PatchError
 from app.playing.pair import Pair
-from app.shared.worker import Job
+from app.shared.worker import Job, Work
 from app.views.background import Background
-from app.views.controls.form import form_label, row_of, spin_box
-from app.views.controls.parts import combo_box, filled, label, read_only_text
+from app.views.controls.form import Rows, filled_form, row_of
+from app.views.controls.number_box import NumberBox
+from app.views.controls.parts import NO_MARGINS, combo_box, filled, label, push_button, read_only_text
 from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
 from engine.plain_text import duration, name_text
@@ -83,61 +82,52 @@ class LearnDialog(GrowingDialog):
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
+        for choice in (self.string, self.body):
+            choice.toggled.connect(self._show_choice)
         self.name = QLineEdit(name_text(file.stem[:60]))
         self.name.setAccessibleName("Name of the instrument")
-        self.kind = combo_box("Instrument", KINDS, "guitar")
-        self.kind.setToolTip("For what a sound does not give: density and length")
+        self.kind = combo_box("Instrument", KINDS, "guitar", "For what a sound does not give: density and length")
         tip = "Type it where you know it; otherwise it is assumed"
-        self.length_m = spin_box("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
-        self.gauge_mm = spin_box("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
+        self.length_m = NumberBox("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
+        self.gauge_mm = NumberBox("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
         for box in (self.length_m, self.gauge_mm):
             box.setSpecialValueText("assumed")  # where it is 0
         self.state = label("faint", selectable=True)
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
         self.report = read_only_text("Report")
-        self.heard = {key: QPushButton(text) for key, text in HEARD}
-        self.start = QPushButton("Continue", default=True)
-        self.start.setObjectName("primary")
-        self.start.setToolTip("Learn the string, keep the instrument, or use the sound as a body")
-        self.close_button = QPushButton("Cancel")
+        tip = "Both play on, in a loop; the switch is at the same moment"
+        self.heard = {key: push_button(text, tip, checkable=True, autoDefault=True) for key, text in HEARD}
+        for key, button in self.heard.items():
+            button.clicked.connect(partial(self._hear, key))
+        tip = "Learn the string, keep the instrument, or use the sound as a body"
+        self.start = push_button("Continue", tip, kind="primary", pressed=self._continue, autoDefault=True)
+        self.start.setDefault(True)
+        self.close_button = push_button("Cancel", pressed=self.reject, autoDefault=True)
         self._pages = QStackedWidget()
         self._lay_out()
-        self._connect()
         self._examine()
 
     def _lay_out(self) -> None:
-        question, form = QWidget(), QFormLayout()
-        rows: dict[str, QWidget | QLayout] = {
+        form: Rows = {
             "Name": self.name,
             "Instrument": row_of(self.kind),
             "Length": row_of(self.length_m),
             "Diameter": row_of(self.gauge_mm),
         }
-        for name, part in rows.items():
-            form.addRow(form_label(name), part)
+        question, result = QWidget(), QWidget()
         heading = label(text="String or body?")
-        column = filled(QVBoxLayout(question), heading, self.string, form, self.body, None)
-        column.setContentsMargins(0, 0, 0, 0)
-        result, sounds = QWidget(), QHBoxLayout()
-        for button in self.heard.values():
-            button.setCheckable(True)
-            button.setToolTip("Both play on, in a loop; the switch is at the same moment")
-            sounds.addWidget(button, 1)
-        filled(QVBoxLayout(result), sounds, self.report).setContentsMargins(0, 0, 0, 0)
+        parts = heading, self.string, filled_form(QFormLayout(), form), self.body, None
+        filled(QVBoxLayout(question), *parts, margins=NO_MARGINS)
+        sounds = filled(QHBoxLayout(), *self.heard.values())
+        for place in range(sounds.count()):
+            sounds.setStretch(place, 1)
+        filled(QVBoxLayout(result), sounds, self.report, margins=NO_MARGINS)
         for page in (question, result):
             self._pages.addWidget(page)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
-        filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons).setSpacing(12)
+        filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons, spacing=12)
         self.bar.hide()
-
-    def _connect(self) -> None:
-        self.start.clicked.connect(self._continue)
-        self.close_button.clicked.connect(self.reject)
-        for choice in (self.string, self.body):
-            choice.toggled.connect(self._show_choice)
-        for key, button in self.heard.items():
-            button.clicked.connect(partial(self._hear, key))
 
     # String or body
 
@@ -202,13 +192,10 @@ class LearnDialog(GrowingDialog):
             (learned,) = learn_files([self._file], progress=job.progress, **choices)
             return learned, both_sounds(learned, rate_hz)
 
-        self._pages.setEnabled(False)
-        self.start.setEnabled(False)
         self.bar.setValue(0)
         self.bar.show()
         self._began_s = time.monotonic()
-        self._then = self._show_learned
-        self._background.start(work)
+        self._begin(work, self._show_learned)
 
     def _show_progress(self, share: float, *_: object) -> None:
         self.bar.setValue(round(1000 * share))
@@ -229,7 +216,6 @@ class LearnDialog(GrowingDialog):
         self.start.setText("Keep and play" if has_string else "Keep all the same")
         self.start.setDefault(has_string)
         self.start.setAutoDefault(has_string)
-        self.start.setEnabled(True)
         self.heard["learned"].setFocus()
 
     def _hear(self, name: str) -> None:
@@ -257,9 +243,12 @@ class LearnDialog(GrowingDialog):
             assert learned is not None
             return keep(name, [learned], kind)
 
+        self._begin(work, self._show_kept)
+
+    def _begin(self, work: Work, then: Callable[[Any], None]) -> None:
         self._pages.setEnabled(False)
         self.start.setEnabled(False)
-        self._then = self._show_kept
+        self._then = then
         self._background.start(work)
 
     def _show_kept(self, kept: object) -> None:
@@ -276,15 +265,14 @@ class LearnDialog(GrowingDialog):
             self._show_choice()
             return
         self._show_ready(message)
-        self.start.setEnabled(True)
 
     def _show_cancelled(self) -> None:
         self._show_ready("Cancelled. Learn continues there.")
-        self.start.setEnabled(True)
 
     def _show_ready(self, words: str) -> None:
         self.bar.hide()
         self._pages.setEnabled(True)
+        self.start.setEnabled(True)
         self.state.setText(words)
 
     def may_close(self) -> bool:

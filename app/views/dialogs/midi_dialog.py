@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QMargins, Signal
 from PySide6.QtWidgets import (
+    QComboBox,
     QDialog,
     QFormLayout,
     QGridLayout,
+    QHBoxLayout,
     QLabel,
     QPushButton,
     QVBoxLayout,
@@ -16,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.shared.parameters import OF_PATCHES
-from app.views.controls.parts import combo_box, faint, label, push_button, scrolled
+from app.views.controls.parts import combo_box, faint, filled, label, push_button, refill, scrolled, show_kind
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
@@ -34,6 +37,8 @@ BEND_TIP = (
     "How the pitch wheel bends: a string that is pulled tighter, as by a finger on a guitar, keeps its length;\n"
     "one that is made shorter or longer, as by a slide, keeps its tension. They sound different"
 )
+CHANNELS_TIP = "Whether the MIDI channel of a note says on which string it is played"
+WHEEL_TIP = "What the modulation wheel changes while you play"
 OF_THE_PATCH = "It belongs to the instrument and is saved with it"
 
 
@@ -55,52 +60,35 @@ class MidiDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
-        self._inputs = combo_box("MIDI input", [])
-        self._inputs.setToolTip("The MIDI keyboard, or the port of another program, whose notes are played")
-        self._inputs.activated.connect(lambda row: self.port_chosen.emit(self._inputs.itemData(row)))
-        self._notes = combo_box("MIDI notes control", NOTE_MODES)
-        self._notes.setToolTip("Velocity always sets how hard the string is plucked")
-        self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
-        self._channels = combo_box("Channels", CHANNELS)
-        self._bends = combo_box("Bend range", [(_semitones(semitones), semitones) for semitones in BENDS])
+        tip = "The MIDI keyboard, or the port of another program, whose notes are played"
+        self._inputs = combo_box("MIDI input", [], tip=tip, picked=self.port_chosen.emit)
+        tip = "Velocity always sets how hard the string is plucked"
+        self._notes = combo_box("MIDI notes control", NOTE_MODES, tip=tip, picked=self.notes_chosen.emit)
         turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
-        self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
-        self._bends_by = combo_box("Pitch bend changes", BENDS_BY)
-        for box, field, tip in (
-            (self._channels, "mode", "Whether the MIDI channel of a note says on which string it is played"),
-            (self._bends, "bend_semitones", OF_PATCHES["bend_semitones"].tip),
-            (self._bends_by, "bend_by", BEND_TIP),
-            (self._wheel, "mod_wheel", "What the modulation wheel changes while you play"),
+        self._of_patch: dict[str, QComboBox] = {}
+        for field, name, entries, tip in (
+            ("mode", "Channels", CHANNELS, CHANNELS_TIP),
+            ("bend_semitones", "Bend range", map(_bend, BENDS), OF_PATCHES["bend_semitones"].tip),
+            ("bend_by", "Pitch bend changes", BENDS_BY, BEND_TIP),
+            ("mod_wheel", "Modulation wheel", (("Nothing", "none"), *turnable), WHEEL_TIP),
         ):
-            box.setToolTip(f"{tip}.\n{OF_THE_PATCH}")
-            box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
+            picked = partial(self.patch_turned.emit, field)
+            self._of_patch[field] = combo_box(name, entries, tip=f"{tip}.\n{OF_THE_PATCH}", picked=picked)
         self._problem = label("warning", selectable=True)
         self._turned = names
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
-        for name, box in (
-            ("Input", self._inputs),
-            ("MIDI notes control", self._notes),
-            ("Channels", self._channels),
-            ("Bend range", self._bends),
-            ("Pitch bend changes", self._bends_by),
-            ("Modulation wheel", self._wheel),
-        ):
-            title = Label(name)
+        for box in (self._inputs, self._notes, *self._of_patch.values()):
+            title = Label("Input" if box is self._inputs else box.accessibleName())
             title.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
             form.addRow(title, box)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(18, 16, 18, 16)
-        column.setSpacing(12)
-        column.addLayout(form)
-        column.addWidget(self._problem)
-        column.addWidget(faint("CONTROLLERS"))
         rows = QWidget()
         rows.setLayout(self._build_rows(names))
-        column.addWidget(scrolled(rows), stretch=1)
-        close = push_button("Close", "Close the dialog; MIDI plays on (Escape)")
-        close.clicked.connect(self.reject)
-        column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
+        close = push_button("Close", "Close the dialog; MIDI plays on (Escape)", pressed=self.reject)
+        last = filled(QHBoxLayout(), None, close)
+        parts = form, self._problem, faint("CONTROLLERS"), scrolled(rows), last
+        column = filled(QVBoxLayout(self), *parts, spacing=12, margins=QMargins(18, 16, 18, 16))
+        column.setStretch(3, 1)
         self.set_learnable("")
 
     def _build_rows(self, names: Mapping[str, str]) -> QGridLayout:
@@ -109,10 +97,8 @@ class MidiDialog(QDialog):
         grid.setVerticalSpacing(6)
         for row, (field, name) in enumerate(names.items()):
             taught = Label()
-            learn, forget = push_button("Learn"), push_button("Forget", f"Unassign {name}")
-            learn.setCheckable(True)
-            learn.setAccessibleName(f"Assign a controller to {name}")
-            forget.setAccessibleName(f"Unassign {name}")
+            learn = push_button("Learn", name=f"Assign a controller to {name}", checkable=True)
+            forget = push_button("Forget", f"Unassign {name}", f"Unassign {name}")
             for button, signal in ((learn, self.learn_asked), (forget, self.forget_asked)):
                 button.clicked.connect(lambda _=False, signal=signal, field=field: signal.emit(field))
             for place, widget in enumerate((Label(name[:1].upper() + name[1:]), taught, learn, forget)):
@@ -122,30 +108,21 @@ class MidiDialog(QDialog):
 
     def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
         """Show the inputs that are connected, and the one that is open; `problem`: why there are none."""
-        with QSignalBlocker(self._inputs):
-            self._inputs.clear()
-            self._inputs.addItem("None" if names else "No MIDI input found", "")
-            for name in names:
-                self._inputs.addItem(name, name)
-            self._inputs.setCurrentIndex(max(0, self._inputs.findData(open_name)))
+        none = "None" if names else "No MIDI input found"
+        refill(self._inputs, [(none, ""), *((name, name) for name in names)], open_name)
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
 
     def show_patch(self, mode: str, bend_semitones: float, bend_by: str, mod_wheel: str) -> None:
         """Show the use that the played patch makes of channels and wheels."""
-        if self._bends.findData(bend_semitones) < 0:
-            self._bends.addItem(_semitones(bend_semitones), bend_semitones)
-        for box, value in (
-            (self._channels, mode),
-            (self._bends, bend_semitones),
-            (self._bends_by, bend_by),
-            (self._wheel, mod_wheel),
-        ):
-            box.setCurrentIndex(max(0, box.findData(value)))
+        values = {"mode": mode, "bend_semitones": bend_semitones, "bend_by": bend_by, "mod_wheel": mod_wheel}
+        if self._of_patch["bend_semitones"].findData(bend_semitones) < 0:
+            self._of_patch["bend_semitones"].addItem(*_bend(bend_semitones))
+        for field, box in self._of_patch.items():
+            box.setCurrentIndex(max(0, box.findData(values[field])))
 
     def set_patch_turnable(self, turnable: bool) -> None:
-        """Enable the controls of the patch if there is one to play."""
-        for box in (self._channels, self._bends, self._bends_by, self._wheel):
+        for box in self._of_patch.values():
             box.setEnabled(turnable)
 
     def set_learnable(self, why_not: str) -> None:
@@ -164,11 +141,10 @@ class MidiDialog(QDialog):
         for field, (taught, learn, forget) in self._rows.items():
             waits, number = field == learning, controllers.get(field)
             taught.setText("Move a control …" if waits else "–" if number is None else f"Controller {number}")
-            taught.setObjectName("" if waits or number is not None else "faint")
-            taught.style().polish(taught)
+            show_kind(taught, "" if waits or number is not None else "faint")
             learn.setChecked(waits)
             forget.setEnabled(number is not None)
 
 
-def _semitones(count: float) -> str:
-    return f"± {count:g} semitone{'' if count == 1 else 's'}"
+def _bend(semitones: float) -> tuple[str, float]:
+    return f"± {semitones:g} semitone{'' if semitones == 1 else 's'}", semitones

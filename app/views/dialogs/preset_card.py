@@ -132,12 +132,9 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
         facts.append(("Trained in", duration(info.training_seconds)))
     if _can_be_remade(entry.name):
         facts.append(("To train it", f"learned-strings train {entry.name}"))
-    facts += [("Licence", info.licence), ("File", f"{entry.name}, {_place(entry)}")]
+    place = "your own" if entry.own else "shipped with the program"
+    facts += [("Licence", info.licence), ("File", f"{entry.name}, {place}")]
     return facts
-
-
-def _place(entry: PresetEntry) -> str:
-    return "your own" if entry.own else "shipped with the program"
 
 
 def _can_be_remade(name: str) -> bool:

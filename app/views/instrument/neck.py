@@ -18,6 +18,7 @@ from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS
 from app.views.instrument.playable import LEVEL_STEPS, Playable, Spot, is_second
+from app.views.painting import set_ink, write
 
 if TYPE_CHECKING:
     from app.playing.keys import SoundingNote
@@ -66,7 +67,7 @@ class Neck(Playable):
         super().__init__("Strings", TIP, parent)
         self._strings: tuple[tuple[str, int], ...] = ()
         self._stops: dict[tuple[int, float], int] = {}  # string, fret -> level of 0 … LEVEL_STEPS
-        self._fingers: dict[int, int] = {}  # string -> fret
+        self.fingers: dict[int, int] = {}  # string, counted from the lowest -> the fret where a finger stops it
         self._set_cursor(Spot(60))
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
@@ -81,8 +82,8 @@ class Neck(Playable):
             step = round(min(max(note.level, 0.0), 1.0) * LEVEL_STEPS)
             if step > 0:
                 strings[string, fret] = max(step, strings.get((string, fret), 0))
-        for string, _ in {at for at in self._stops.keys() | strings.keys() if self._stops.get(at) != strings.get(at)}:
-            self.update(self.cell(string, 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
+        for (string, _), _ in self._stops.items() ^ strings.items():
+            self._repaint_row(string)
         self._stops = strings
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
@@ -103,6 +104,16 @@ class Neck(Playable):
     # Where keys are
 
     @property
+    def _bottom(self) -> int:
+        """The lower edge of the strings, above numbers of frets and names of octaves."""
+        return self.height() - theme.px(_FOOT)
+
+    @property
+    def _nut(self) -> int:
+        """The x of the nut, right of the names of open strings."""
+        return theme.px(_NAMES_WIDTH)
+
+    @property
     def frets(self) -> int:
         """The number of frets: to the highest key, and two octaves at most."""
         highest = self._strings[-1][1] if self._strings else self._low
@@ -114,15 +125,14 @@ class Neck(Playable):
         return below[-1] if below else 0
 
     def fret_x(self, fret: float) -> float:
-        """The x of a fret, in pixels."""
-        return theme.px(_NAMES_WIDTH) + fret_share(fret, self.frets) * (self.width() - theme.px(_NAMES_WIDTH) - 6)
+        return self._nut + fret_share(fret, self.frets) * (self.width() - self._nut - 6)
 
     def cell(self, string: int, fret: int) -> QRectF:
         """The cell where a finger stops the string: from the fret before to this one.
 
         Fret 0: the name of the open string.
         """
-        height = (self.height() - theme.px(_FOOT)) / len(self._strings)
+        height = self._bottom / len(self._strings)
         top = (len(self._strings) - 1 - string) * height
         left = 0.0 if fret <= 0 else self.fret_x(fret - 1)
         return QRectF(left, top, self.fret_x(max(fret, 0)) - left, height)
@@ -130,13 +140,10 @@ class Neck(Playable):
     def key_rect(self, key: int) -> QRectF:
         if not self.in_rows:
             return self._column(key).adjusted(-4, 0, 4, 0)
-        cell = self._cell_of(key).adjusted(-10, -5, 0, 5)
+        string = self.string_of(key)
+        cell = self.cell(string, min(key - self._strings[string][1], self.frets)).adjusted(-10, -5, 0, 5)
         cell.setRight(self.width())  # the string is lit from there on
         return cell
-
-    def _cell_of(self, key: int) -> QRectF:
-        string = self.string_of(key)
-        return self.cell(string, min(key - self._strings[string][1], self.frets))
 
     def _column(self, key: int) -> QRectF:
         width = self.width() / (self._high - self._low + 1)
@@ -149,7 +156,7 @@ class Neck(Playable):
             return self._low + int(at.x() / self.width() * (self._high - self._low + 1))
         string = self._row_at(at)
         fret = next((n for n in range(self.frets + 1) if at.x() < self.fret_x(n)), None)
-        return None if fret is None or at.y() >= self.height() - theme.px(_FOOT) else self._strings[string][1] + fret
+        return None if fret is None or at.y() >= self._bottom else self._strings[string][1] + fret
 
     def spot_at(self, at: QPointF) -> Spot | None:
         key = self.key_at(at)
@@ -159,8 +166,8 @@ class Neck(Playable):
 
     def _stopped(self, string: int, key: int) -> Spot:
         """A key on a string, counted from the lowest; if there are fingers, the key where these stop it."""
-        if self._fingers:
-            key = self._strings[string][1] + self._fingers.get(string, 0)
+        if self.fingers:
+            key = self._strings[string][1] + self.fingers.get(string, 0)
         return Spot(key, len(self._strings) - 1 - string)
 
     def _row_of(self, spot: Spot) -> int:
@@ -194,7 +201,7 @@ class Neck(Playable):
         return [spot for spot in spots if self.sounds(spot.key)]
 
     def _row_at(self, at: QPointF) -> int:
-        height = (self.height() - theme.px(_FOOT)) / len(self._strings)
+        height = self._bottom / len(self._strings)
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
@@ -213,16 +220,11 @@ class Neck(Playable):
 
     def share_at(self, key: int, at: QPointF) -> float:
         if not self.in_rows:
-            return at.y() / (self.height() - theme.px(_FOOT))
+            return at.y() / self._bottom
         rect = self.cell(self._row_at(at), 0)
         return (at.y() - rect.top()) / rect.height()
 
     # Fingers
-
-    @property
-    def fingers(self) -> dict[int, int]:
-        """The fret of each string, counted from the lowest, that a finger stops."""
-        return dict(self._fingers)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         key = self.key_at(event.position())
@@ -234,19 +236,16 @@ class Neck(Playable):
 
     def _put_finger(self, string: int, fret: int) -> None:
         """Put a finger on a string; lift it where it is already, or at the nut."""
-        if fret <= 0 or self._fingers.get(string) == fret:
-            self._fingers.pop(string, None)
+        if fret <= 0 or self.fingers.get(string) == fret:
+            self.fingers.pop(string, None)
         else:
-            self._fingers[string] = fret
-        self._show_fingers()
+            self.fingers[string] = fret
+        self.fingered.emit(bool(self.fingers))
+        self.update()
 
     def lift(self) -> None:
-        """Take all fingers away."""
-        self._fingers = {}
-        self._show_fingers()
-
-    def _show_fingers(self) -> None:
-        self.fingered.emit(bool(self._fingers))
+        self.fingers = {}
+        self.fingered.emit(False)
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -254,7 +253,7 @@ class Neck(Playable):
         if self.in_rows and shift and event.key() in ENTER_KEYS:
             if not event.isAutoRepeat():
                 self._put_finger(self._row_of(self.chosen), self._fret_of(self.chosen))
-        elif self._fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+        elif self.fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             self.lift()
         else:
             super().keyPressEvent(event)
@@ -268,15 +267,12 @@ class Neck(Playable):
                 self._paint_string(painter, number)
             return
         open_keys = {open_key for _, open_key in self._strings}
-        painter.setFont(theme.small_font(9))
         for key in range(self._low, self._high + 1):
             self._paint_column(painter, key, QColor(theme.TEXT if key in open_keys else theme.FAINT), 0.0)
             if key % 12 == 0:
-                place = QRectF(
-                    self._column(key).center().x() - 16, self.height() - theme.px(_FOOT), 32, theme.px(_FOOT) - 1
-                )
-                painter.setPen(QColor(theme.FAINT))
-                painter.drawText(place, Qt.AlignmentFlag.AlignCenter, note_name(key))
+                x, foot = self._column(key).center().x(), theme.px(_FOOT)
+                place = QRectF(x - 16, self.height() - foot, 32, foot - 1)
+                write(painter, place, note_name(key), theme.FAINT, theme.small_font(9))
 
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
         if self.in_rows:
@@ -288,12 +284,10 @@ class Neck(Playable):
                 continue
             if self.sounds(key):
                 end = self._paint_column(painter, key, lit if level > 0 else QColor(theme.FAINT), 1.0)
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
+                set_ink(painter, fill=self.colour if level > 0 else theme.FAINT)
                 painter.drawEllipse(end, *(2 * [2.5 + 2.5 * level]))
         if self.shows_cursor:
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+            set_ink(painter, theme.TEXT, 1.5)
             if self.in_rows:
                 place = self.cell(self._row_of(self.chosen), self._fret_of(self.chosen))
             else:
@@ -301,47 +295,43 @@ class Neck(Playable):
             painter.drawRoundedRect(place.adjusted(1, 1, -1, -1), 3, 3)
 
     def _paint_board(self, painter: QPainter) -> None:
-        bottom = self.height() - theme.px(_FOOT)
-        board = QRectF(theme.px(_NAMES_WIDTH), 1, self.fret_x(self.frets) - theme.px(_NAMES_WIDTH), bottom - 2)
-        painter.setPen(QPen(QColor(theme.LINE), 1))
-        painter.setBrush(QColor(theme.RAISED))
+        bottom = self._bottom
+        board = QRectF(self._nut, 1, self.fret_x(self.frets) - self._nut, bottom - 2)
+        set_ink(painter, theme.LINE, fill=theme.RAISED)
         painter.drawRoundedRect(board, 3, 3)
-        painter.setFont(theme.small_font(9))
         for fret in range(1, self.frets + 1):
             x, before = self.fret_x(fret), self.fret_x(fret - 1)
             painter.setPen(QPen(QColor(theme.LINE), 1.5))
             painter.drawLine(QPointF(x, 2), QPointF(x, bottom - 2))
             if fret not in INLAYS:
                 continue
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(theme.blended(theme.FAINT, theme.RAISED, 0.6))
+            set_ink(painter, fill=theme.blended(theme.FAINT, theme.RAISED, 0.6))
             rows = len(self._strings)
             between = max(1, rows // 3) / rows  # two strings
             for share in (between, 1 - between) if fret % 12 == 0 else (0.5,):
                 painter.drawEllipse(QPointF((x + before) / 2, share * bottom), 4.5, 4.5)
-            painter.setPen(QColor(theme.FAINT))
             number = QRectF(before - 10, bottom + 1, x - before + 20, theme.px(_FOOT) - 2)
-            painter.drawText(number, Qt.AlignmentFlag.AlignCenter, str(fret))
+            write(painter, number, str(fret), theme.FAINT, theme.small_font(9))
         painter.setPen(QPen(QColor(theme.FAINT), 4))
-        painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), 2), QPointF(theme.px(_NAMES_WIDTH), bottom - 2))
+        painter.drawLine(QPointF(self._nut, 2), QPointF(self._nut, bottom - 2))
 
     def _paint_string(self, painter: QPainter, number: int) -> None:
         name, open_key = self._strings[number]
         row = self.cell(number, 0)
-        painter.setFont(theme.small_font(11, bold=True))
-        painter.setPen(QColor(theme.TEXT if self.sounds(open_key) else theme.DISABLED))
-        room = theme.px(_NAMES_WIDTH) - 10
-        cut = painter.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, room)
-        painter.drawText(QRectF(0, row.top(), room, row.height()), Qt.AlignmentFlag.AlignCenter, cut)
+        room = self._nut - 10
+        place, ink = QRectF(0, row.top(), room, row.height()), theme.TEXT if self.sounds(open_key) else theme.DISABLED
+        write(painter, place, name, ink, theme.small_font(11, bold=True), room=room)
         thick = THICK - (THICK - THIN) * number / max(1, len(self._strings) - 1)
         painter.setPen(QPen(QColor(theme.FAINT), thick))
         y = row.center().y()
-        painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), y), QPointF(self.fret_x(self.frets), y))
+        painter.drawLine(QPointF(self._nut, y), QPointF(self.fret_x(self.frets), y))
 
     def _paint_stops(self, painter: QPainter) -> None:
         """Fingers and what is down; above them, strings that sound, where they are stopped now."""
-        for string in self._fingers:
-            self._paint_finger(painter, string)
+        set_ink(painter, theme.TEXT, 1.5, theme.RAISED)
+        for string, stop in self.fingers.items():
+            middle = QPointF(self._stop_x(stop, self._dot), self.cell(string, 0).center().y())
+            painter.drawEllipse(middle, *(2 * [self._dot / 2]))
         for spot in self.down:
             if not self.level(spot.key) > 0:
                 string = self._row_of(spot)
@@ -356,27 +346,22 @@ class Neck(Playable):
             left, right = self._stop_x(whole, size), self._stop_x(whole + 1, size)
             return left + (fret - whole) * (right - left)
         if whole <= 0:
-            return float(theme.px(_NAMES_WIDTH))
+            return self._nut
         return self.fret_x(whole) - min(size, (self.fret_x(whole) - self.fret_x(whole - 1)) / 2)
 
     def repaint_spot(self, spot: Spot) -> None:
         super().repaint_spot(spot)
         if self.in_rows:
-            self.update(self.cell(self._row_of(spot), 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
+            self._repaint_row(self._row_of(spot))
+
+    def _repaint_row(self, string: int) -> None:
+        self.update(self.cell(string, 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
 
     @property
     def _dot(self) -> float:
-        """The size of a dot in pixels."""
-        return min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
-
-    def _paint_finger(self, painter: QPainter, string: int) -> None:
-        middle = QPointF(self._stop_x(self._fingers[string], self._dot), self.cell(string, 0).center().y())
-        painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-        painter.setBrush(QColor(theme.RAISED))
-        painter.drawEllipse(middle, *(2 * [self._dot / 2]))
+        return min(LARGEST_DOT, self._bottom / len(self._strings) - 2)
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
-        """Paint a dot where a string is stopped, and what swings of it."""
         size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
@@ -385,26 +370,23 @@ class Neck(Playable):
             painter.setPen(QPen(lit, 2))
             painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
             self._paint_swing(painter, middle, level)
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(theme.translucent(self.colour.name(), 70))
+            set_ink(painter, fill=theme.translucent(self.colour.name(), 70))
             painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
-        painter.setPen(QPen(QColor(theme.RAISED), 1))
-        painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
+        set_ink(painter, theme.RAISED, fill=self.colour if level > 0 else theme.FAINT)
         painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
 
     def _paint_swing(self, painter: QPainter, stop: QPointF, level: float) -> None:
         """Paint the swing of a string, from where it is stopped to the bridge."""
-        far, reach = self.fret_x(self.frets), SWING * level * (self.height() - theme.px(_FOOT)) / len(self._strings)
+        far, reach = self.fret_x(self.frets), SWING * level * self._bottom / len(self._strings)
         swing = QPainterPath(stop)
         for side in (-1, 1):
             swing.quadTo((stop.x() + far) / 2, stop.y() + 2 * side * reach, far if side < 0 else stop.x(), stop.y())
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(theme.translucent(self.colour.name(), 90))
+        set_ink(painter, fill=theme.translucent(self.colour.name(), 90))
         painter.drawPath(swing)
 
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
         """Paint a key's string in the fan; return its end."""
-        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - theme.px(_FOOT) - 8)
+        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self._bottom - 8)
         x = self._column(key).center().x()
         thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)
         painter.setPen(QPen(ink, thick + thicker))

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import filled, tool_button
 from app.views.controls.plain import Label
 from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
@@ -95,11 +95,10 @@ class InstrumentPanel(QFrame):
         super().__init__(parent)
         self.setObjectName("panel")
         self.setAccessibleName("Instrument")
-        self.bar = PatchBar()
-        self.keys = PianoKeys()
-        self.neck = Neck()
-        self.knobs = StringKnobs()
-        for surface in (self.keys, self.neck):
+        self.bar, self.knobs = PatchBar(), StringKnobs()
+        self.keys, self.neck = PianoKeys(), Neck()
+        self._surfaces = self.keys, self.neck
+        for surface in self._surfaces:
             surface.pressed.connect(self._press)
             surface.released.connect(self.released)
         self._drums = False
@@ -110,46 +109,32 @@ class InstrumentPanel(QFrame):
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
         self._choice.clicked.connect(self._uncover_surface)
-        self._fold = tool_button("String knobs", tip=FOLD_TIP)
-        self._fold.setObjectName("small")
-        self._fold.setCheckable(True)
-        self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._fold = tool_button("String knobs", tip=FOLD_TIP, kind="small", checkable=True)
         self._fold.toggled.connect(self.set_unfolded)
-        self._lift = tool_button("Lift fingers", tip="No finger on the neck: clicks play frets again (Delete)")
-        self._lift.setObjectName("small")
-        self._lift.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._lift.clicked.connect(self.neck.lift)
+        tip = "No finger on the neck: clicks play frets again (Delete)"
+        self._lift = tool_button("Lift fingers", tip=tip, kind="small", pressed=self.neck.lift)
+        self._lift.hide()
         self.neck.fingered.connect(self._show_lift)
         self._build_plays()
-        self._low = False
+        for button in (self._fold, self._lift, self.plays):
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._low, self._hinted, self._patch_area = False, False, True
         self._stack = QStackedWidget()
-        self._hinted = False
-        self._hint = Label(HINTS["keys"], self._stack)
-        self._hint.setObjectName("hint")
+        self._hint = Label(HINTS["keys"], self._stack, objectName="hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self._patch_area = True
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._stack.addWidget(self.keys)
-        self._stack.addWidget(self.neck)
+        for surface in self._surfaces:
+            self._stack.addWidget(surface)
         self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._bar_row, self._knobs_row = Sideways(self.bar), Sideways(self.knobs)
-        side = QVBoxLayout()
-        side.setSpacing(4)
-        side.addWidget(self._choice)
-        side.addWidget(self._fold)
-        side.addWidget(self.plays)
-        side.addWidget(self.touch)
-        side.addWidget(self.techniques)
-        side.addWidget(self._lift)
-        side.addStretch(1)
-        self._lift.hide()
+        buttons = self._choice, self._fold, self.plays, self.touch, self.techniques, self._lift
         self._grid = QGridLayout(self)
         self._grid.setHorizontalSpacing(8)
         self._grid.setColumnStretch(1, 1)
         self._grid.addWidget(self._bar_row, 0, 0, 1, 2)
-        self._grid.addLayout(side, 2, 0)
+        self._grid.addLayout(filled(QVBoxLayout(), *buttons, None, spacing=4), 2, 0)
         self._grid.addWidget(self._stack, 2, 1)
         self._share_room()
         self._stack.installEventFilter(self)
@@ -159,28 +144,22 @@ class InstrumentPanel(QFrame):
 
     def _build_plays(self) -> None:
         """Build the menu of the two things that the computer's keys play, under the present one."""
-        self.plays = tool_button("")
-        self.plays.setObjectName("chip")
-        self.plays.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.plays.setMinimumWidth(PLAYS_WIDTH)
+        self.plays = tool_button("", kind="chip", minimumWidth=PLAYS_WIDTH)
         self.plays.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self.plays)
         menu.setToolTipsVisible(True)
         group = QActionGroup(menu)
         self._plays: dict[str, QAction] = {}
         for key, (words, tip) in KEYS_PLAY.items():
-            action = self._plays[key] = menu.addAction(words)
-            action.setToolTip(tip)
-            action.setCheckable(True)
+            action = self._plays[key] = QAction(words, group, toolTip=tip, checkable=True)
             action.triggered.connect(lambda _=False, key=key: self.keys_play_asked.emit(key))
-            group.addAction(action)
+            menu.addAction(action)
         self.plays.setMenu(menu)
 
     # What is shown
 
     @property
     def surface(self) -> str:
-        """The shown surface, "keys" or "neck"."""
         return self._choice.key
 
     def show_surface(self, surface: str) -> None:
@@ -204,7 +183,6 @@ class InstrumentPanel(QFrame):
 
     @property
     def unfolded(self) -> bool:
-        """Return True if the string's knobs are shown."""
         return self._fold.isChecked()
 
     def set_unfolded(self, unfolded: bool) -> None:
@@ -237,14 +215,9 @@ class InstrumentPanel(QFrame):
 
     def _share_room(self) -> None:
         self._grid.removeWidget(self._knobs_row)
-        if self._low:
-            self._grid.addWidget(self._knobs_row, 2, 1)
-            self._grid.setContentsMargins(12, 4, 12, 6)
-            self._grid.setVerticalSpacing(6)
-        else:
-            self._grid.addWidget(self._knobs_row, 1, 0, 1, 2)
-            self._grid.setContentsMargins(12, 8, 12, 10)
-            self._grid.setVerticalSpacing(8)
+        self._grid.addWidget(self._knobs_row, *((2, 1, 1, 1) if self._low else (1, 0, 1, 2)))
+        self._grid.setContentsMargins(*((12, 4, 12, 6) if self._low else (12, 8, 12, 10)))
+        self._grid.setVerticalSpacing(6 if self._low else 8)
         self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
         unfolded = self.unfolded and self._patch_area
         self._knobs_row.setVisible(unfolded)
@@ -253,13 +226,8 @@ class InstrumentPanel(QFrame):
         self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
-        """Set the lowest and the highest key that have a string."""
-        self.keys.set_range(low, high)
-        self.neck.set_range(low, high)
-
-    def set_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """Set the octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
-        self.bar.show_octave(octave, lowest, highest)
+        for surface in self._surfaces:
+            surface.set_range(low, high)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
         """Show what the computer's keys play, of KEYS_PLAY. `possible`: there is a patch for pitches."""
@@ -269,13 +237,9 @@ class InstrumentPanel(QFrame):
         self.plays.setAccessibleName(words)
         self.plays.setEnabled(possible)
         self.plays.setToolTip(
-            f"{tip}; click to change it" if possible else f"{tip}. Choose an instrument to play pitches"
+            tip + ("; click to change it" if possible else ". Choose an instrument to play pitches")
         )
         self.bar.show_pitches(plays == "pitch")
-
-    def show_letters(self, letters: Mapping[int, str]) -> None:
-        """Show the characters printed on the computer's keys, by the MIDI key that each plays."""
-        self.keys.show_letters(letters)
 
     def show_sounding(self, levels: Mapping[int, float], notes: Iterable[SoundingNote] = ()) -> None:
         """Show the loudness of each key, 0 … 1, and the notes with their strings.
@@ -284,14 +248,13 @@ class InstrumentPanel(QFrame):
         """
         if levels:
             self.hide_hint()
-        self.keys.show_sounding(levels)
-        self.neck.show_sounding(levels)
+        for surface in self._surfaces:
+            surface.show_sounding(levels)
         self.neck.show_notes(notes)
 
     def show_source(self, source: str) -> None:
-        """Show the source that is heard, in whose colour keys are lit."""
-        self.keys.show_source(source)
-        self.neck.show_source(source)
+        for surface in self._surfaces:
+            surface.show_source(source)
 
     def hide_hint(self) -> None:
         self._hint.hide()
@@ -303,9 +266,8 @@ class InstrumentPanel(QFrame):
             self._hint.setVisible(self.isEnabled() and not self._hinted)
 
     def release_all(self) -> None:
-        """Release all keys that are down."""
-        self.keys.release_all()
-        self.neck.release_all()
+        for surface in self._surfaces:
+            surface.release_all()
 
     def _show_lift(self) -> None:
         self._lift.setVisible(bool(self.neck.fingers) and self._stack.currentWidget() is self.neck)

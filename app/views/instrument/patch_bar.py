@@ -7,8 +7,9 @@ Scala scale, octave and velocity of the computer's keys, the number of voices, a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
-from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -17,7 +18,6 @@ from PySide6.QtWidgets import (
     QMenu,
     QSizePolicy,
     QToolButton,
-    QToolTip,
     QVBoxLayout,
     QWidget,
 )
@@ -25,11 +25,20 @@ from PySide6.QtWidgets import (
 from app.patches.patch import Macro, Patch
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
-from app.views.controls.filter_button import FilterButton
-from app.views.controls.knob import Knob
-from app.views.controls.name_button import NameButton
+from app.views.controls.choosers import FilterButton, NameButton
+from app.views.controls.knob import NARROW_WIDTH, Knob
+from app.views.controls.number_box import say_above
 from app.views.controls.overflow import Overflow
-from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
+from app.views.controls.parts import (
+    NO_MARGINS,
+    combo_box,
+    faint,
+    filled,
+    refill,
+    tool_button,
+    vertical_rule,
+    words_label,
+)
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
 from engine.plain_text import one_line
 
@@ -38,7 +47,6 @@ ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
 SAID_MS = 2_500  # a text that says why the octave stops or moves
-SAID_ABOVE = 44  # pixels
 COMPARE_TIP = (
     "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
 )
@@ -76,126 +84,75 @@ class PatchBar(QFrame):
         self._shows_macros = True
         self._recorded_s: float | None = None
         self._unsaved = 0
-        self.knobs = {field: Knob(OF_PATCHES[field]) for field in MIXES}
+        self.knobs = {field: Knob(OF_PATCHES[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
-            knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
-        self.macros = [Knob(macro) for macro in MACROS.values()]
+            knob.value_asked.connect(partial(self.changed.emit, field))
+        self.macros = [Knob(macro, width=NARROW_WIDTH, low=True) for macro in MACROS.values()]
         for number, knob in enumerate(self.macros):
-            knob.value_asked.connect(lambda value, number=number: self.macro_turned.emit(number, value))
+            knob.value_asked.connect(partial(self.macro_turned.emit, number))
             knob.hide()
         for knob in (*self.macros, *self.knobs.values()):
-            knob.set_low(True)
-            knob.set_narrow(True)
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(8)
-        row.addLayout(self._build_words(), 1)
         self._before_macros = vertical_rule()
         self._before_macros.hide()
-        row.addWidget(self._before_macros)
-        knob_row = QHBoxLayout()
-        knob_row.setSpacing(0)
-        for knob in self.macros:
-            knob_row.addWidget(knob)
-        row.addLayout(knob_row)
-        row.addWidget(vertical_rule())
-        row.addLayout(self._build_sound())
+        macros = filled(QHBoxLayout(), *self.macros, spacing=0)
+        row = filled(QHBoxLayout(self), spacing=8, margins=NO_MARGINS)
+        filled(row, self._build_words(), self._before_macros, macros, vertical_rule(), self._build_sound())
+        row.setStretch(0, 1)
 
     def _build_words(self) -> QVBoxLayout:
-        previous = tool_button("◀", "Previous instrument", "Previous instrument in the browser's list")
-        following = tool_button("▶", "Next instrument", "Next instrument in the browser's list")
-        for button in (previous, following):
-            button.setObjectName("narrow")
-        previous.clicked.connect(self.previous_asked)
-        following.clicked.connect(self.next_asked)
-        self.name = NameButton("No instrument")
-        self.name.setToolTip("Browse the instruments")
-        self.name.setMinimumWidth(NARROW_NAME)
-        self.name.setMaximumWidth(320)
-        self.name.clicked.connect(self.browse_asked)
-        self.category = Label()
-        self.category.setObjectName("badge")
-        self.category.setToolTip("The instrument's category")
-        self.category.hide()
-        self.save = tool_button(
-            "Save", "Save the instrument", "Save the instrument; a factory one under a name of your own"
+        tip = "Previous instrument in the browser's list"
+        previous = tool_button("◀", "Previous instrument", tip, "narrow", self.previous_asked)
+        tip = "Next instrument in the browser's list"
+        following = tool_button("▶", "Next instrument", tip, "narrow", self.next_asked)
+        tip = "Browse the instruments"
+        self.name = NameButton("No instrument", tip, self.browse_asked, narrowest=NARROW_NAME, widest=320)
+        self.category = Label(objectName="badge", toolTip="The instrument's category", visible=False)
+        tip = "Save the instrument; a factory one under a name of your own"
+        self.save = tool_button("Save", "Save the instrument", tip, "small", self.save_asked)
+        tip = "Give your instrument another name"
+        self.rename = tool_button("Rename …", "Rename the instrument", tip, "small", self.rename_asked)
+        tip = "Go back to the instrument as it was saved (undo brings your changes back)"
+        self.revert = tool_button("Revert", "Revert the instrument", tip, "small", self.revert_asked)
+        self.compare = tool_button(
+            "Compare", "Hear the saved instrument", COMPARE_TIP, "small", self.compare_asked, checkable=True
         )
-        self.rename = tool_button("Rename …", "Rename the instrument", "Give your instrument another name")
-        self.revert = tool_button(
-            "Revert",
-            "Revert the instrument",
-            "Go back to the instrument as it was saved (undo brings your changes back)",
-        )
-        for button, signal in (
-            (self.save, self.save_asked),
-            (self.rename, self.rename_asked),
-            (self.revert, self.revert_asked),
-        ):
-            button.setObjectName("small")
-            button.setEnabled(False)
-            button.clicked.connect(signal)
-        self.compare = tool_button("Compare", "Hear the saved instrument", COMPARE_TIP)
-        self.compare.setObjectName("small")
-        self.compare.setCheckable(True)
-        self.compare.setEnabled(False)
-        self.compare.clicked.connect(self.compare_asked)
-        above = QHBoxLayout()
-        above.setSpacing(6)
-        for widget in (previous, self.name, following, self.category):
-            above.addWidget(widget, 1000 if widget is self.name else 0)
-        above.addStretch(1)
         self.more = Overflow("the instrument")
-        for button in (self.save, self.rename, self.revert, self.compare, self.more):
-            above.addWidget(button)
-        column = QVBoxLayout()
-        column.setSpacing(4)
-        column.addLayout(above)
-        column.addLayout(self._build_state())
-        return column
+        buttons = self.save, self.rename, self.revert, self.compare
+        for button in buttons:
+            button.setEnabled(False)
+        above = filled(QHBoxLayout(), spacing=6)
+        filled(above, previous, self.name, following, self.category, None, *buttons, self.more)
+        above.setStretchFactor(self.name, 1000)
+        return filled(QVBoxLayout(), above, self._build_state(), spacing=4)
 
     def _build_state(self) -> QHBoxLayout:
-        self.filtered = FilterButton("instruments")
-        self.filtered.clicked.connect(self.all_asked)
+        self.filtered = FilterButton("instruments", self.all_asked)
         self.note = words_label()
-        self.scala = tool_button("Scala  ✕", "Remove the Scala tuning of the instrument")
-        self.scala.setObjectName("solo")
-        self.scala.clicked.connect(self.scala_remove_asked)
-        self.scala.hide()
-        self._lower = lower = tool_button("−", "Octave down", "The computer's keys play an octave lower (Z)")
-        self._higher = higher = tool_button("+", "Octave up", "The computer's keys play an octave higher (X)")
-        lower.clicked.connect(lambda: self.octave_asked.emit(-1))
-        higher.clicked.connect(lambda: self.octave_asked.emit(1))
-        self.octave = faint()
-        self.octave.setToolTip("The lowest C on the computer's keys; C4 is middle C (Z, X)")
-        self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.velocity = SteadyLabel("velocity 127")
-        self.velocity.setObjectName("faint")
-        self.velocity.setToolTip("How hard the computer's keys strike, 1 … 127 (1 … 9; C softer, V harder)")
-        self.velocity.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.voices = SteadyLabel("0 voices")
-        self.voices.setObjectName("faint")
-        self.voices.setToolTip("Number of strings that ring")
-        self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.record = QToolButton()
-        self.record.setCheckable(True)
-        self.record.setObjectName("record")
-        self.record.clicked.connect(self.record_asked)
-        self._unsaved_menu = QMenu(self.record)
-        for words, signal in (
-            ("Save the recording …", self.recording_save_asked),
-            ("Discard the recording", self.recording_discard_asked),
+        tip = "Remove the Scala tuning of the instrument"
+        self.scala = tool_button("Scala  ✕", tip, kind="solo", pressed=self.scala_remove_asked, visible=False)
+        tip = "The computer's keys play an octave lower (Z)"
+        self._lower = tool_button("−", "Octave down", tip, "chip", lambda: self.octave_asked.emit(-1))
+        tip = "The computer's keys play an octave higher (X)"
+        self._higher = tool_button("+", "Octave up", tip, "chip", lambda: self.octave_asked.emit(1))
+        self.octave, self.velocity, self.voices = faint(), SteadyLabel("velocity 127"), SteadyLabel("0 voices")
+        for words, tip in (
+            (self.octave, "The lowest C on the computer's keys; C4 is middle C (Z, X)"),
+            (self.velocity, "How hard the computer's keys strike, 1 … 127 (1 … 9; C softer, V harder)"),
+            (self.voices, "Number of strings that ring"),
         ):
-            self._unsaved_menu.addAction(words).triggered.connect(lambda _=False, signal=signal: signal.emit())
-        for button in (lower, higher):
-            button.setObjectName("chip")
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self.filtered)
-        row.addWidget(self.note, 1)
-        for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
-            row.addWidget(widget)
+            words.setObjectName("faint")
+            words.setToolTip(tip)
+            words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.record = tool_button("", kind="record", pressed=self.record_asked, checkable=True)
+        self._unsaved_menu = QMenu(self.record)
+        self._unsaved_menu.addAction("Save the recording …").triggered.connect(self.recording_save_asked)
+        self._unsaved_menu.addAction("Discard the recording").triggered.connect(self.recording_discard_asked)
+        keys = self._lower, self.octave, self._higher, self.velocity
+        row = filled(QHBoxLayout(), self.filtered, self.note, self.scala, *keys, self.voices, self.record, spacing=8)
+        row.setStretchFactor(self.note, 1)
         self.show_octave(3, 3, 3)
         self.show_velocity(90)
         self.show_recording(None)
@@ -203,25 +160,14 @@ class PatchBar(QFrame):
         return row
 
     def _build_sound(self) -> QHBoxLayout:
-        self.body = combo_box("Body", [("No body", "")])
-        self.body.setToolTip("The body of the instrument, which colours the sound of the strings")
+        tip = "The body of the instrument, which colours the sound of the strings"
+        self.body = combo_box("Body", [("No body", "")], tip=tip, picked=self.body_chosen.emit)
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.body.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.body.setMinimumContentsLength(BODY_LETTERS)
-        self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
-        head = Label("BODY TYPE")
-        head.setObjectName("knob")
-        column = QVBoxLayout()
-        column.setSpacing(3)
-        column.addWidget(head, alignment=Qt.AlignmentFlag.AlignHCenter)
-        column.addWidget(self.body)
-        column.addStretch(1)
-        row = QHBoxLayout()
-        row.setSpacing(0)
-        row.addLayout(column)
-        for knob in self.knobs.values():
-            row.addWidget(knob)
-        return row
+        column = filled(QVBoxLayout(), spacing=3)
+        column.addWidget(Label("BODY TYPE", objectName="knob"), alignment=Qt.AlignmentFlag.AlignHCenter)
+        return filled(QHBoxLayout(), filled(column, self.body, None), *self.knobs.values(), spacing=0)
 
     # What is shown
 
@@ -254,12 +200,9 @@ class PatchBar(QFrame):
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
         """Set the name and the title of each; "No body", of the name "", is always listed."""
-        chosen_body = self.body.currentData()
-        with QSignalBlocker(self.body):
-            self.body.clear()
-            for name, title in (("", "No body"), *(body for body in bodies if body[0])):
-                self.body.addItem(title, name)
-            self._show_body(chosen_body or "")
+        chosen = self.body.currentData() or ""
+        refill(self.body, [("No body", ""), *((title, name) for name, title in bodies if name)], chosen)
+        self._show_body(chosen)
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
         """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
@@ -269,21 +212,16 @@ class PatchBar(QFrame):
         tip = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
         self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))
         self.category.setText(patch.category)
-        self.save.setEnabled(changed)
-        self.revert.setEnabled(changed)
-        self.compare.setEnabled(changed)
+        for button in (self.save, self.revert, self.compare):
+            button.setEnabled(changed)
         self.rename.setEnabled(own)
         self._show_macros(patch.macros)
         self._show_scala(patch.tuning)
-        self.knobs["amp.drive_db"].set_value(patch.amp.drive_db)
-        self.knobs["amp.tone_db"].set_value(patch.amp.tone_db)
+        for field, knob in self.knobs.items():
+            knob.set_value(patch.value(field))
         self.knobs["amp.tone_db"].setEnabled(patch.amp.drive_db > 0)
-        self.knobs["body.mix"].set_value(patch.body.mix)
         self.knobs["body.mix"].setEnabled(bool(patch.body.name))
-        self.knobs["room.mix"].set_value(patch.room.mix)
-        self.knobs["level_db"].set_value(patch.level_db)
-        with QSignalBlocker(self.body):
-            self._show_body(patch.body.name)
+        self._show_body(patch.body.name)
 
     def show_comparing(self, comparing: bool) -> None:
         """Show if keys play the patch as it was saved."""
@@ -347,15 +285,12 @@ class PatchBar(QFrame):
     def say_octave(self, text: str) -> None:
         """Show above the octave, for SAID_MS, why it is what it is."""
         if self.octave.isVisible():
-            place = self.octave.mapToGlobal(QPoint(0, -SAID_ABOVE))
-            QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
+            say_above(self.octave, text, SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
-        """Show the velocity with which the computer's keys strike."""
         self.velocity.setText(f"velocity {velocity}")
 
     def show_pitches(self, pitches: bool) -> None:
-        """Show octave and velocity if the computer's keys play pitches."""
         for widget in (self._lower, self.octave, self._higher, self.velocity):
             widget.setVisible(pitches)
 
@@ -377,15 +312,17 @@ class PatchBar(QFrame):
         on, waits = seconds is not None, seconds is None and self._unsaved > 0
         button.setChecked(on)
         if seconds is not None:
-            text = f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}"
-            name, tip = "End recording", "End the recording and save it"
+            words = (
+                f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}",
+                "End recording",
+                "End the recording and save it",
+            )
         elif waits:
-            text, name = "●  Unsaved  ▾", "Recording that is not saved"
             tip = "What was played is not saved yet: save it, or discard it to record again"
+            words = "●  Unsaved  ▾", "Recording that is not saved", tip
         else:
-            text = "●  Record"
-            name = "Record what is played"
-            tip = "Record what is played"
+            words = "●  Record", "Record what is played", "Record what is played"
+        text, name, tip = words
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)
@@ -394,7 +331,6 @@ class PatchBar(QFrame):
         button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
-        """Show the thing that is missing; "" for nothing."""
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
 
@@ -409,5 +345,4 @@ def _scale_name(scale: str) -> str:
 
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
-    """The name of a macro, and its targets in words."""
     return macro.name, [OF_PATCHES[target.field].name for target in macro.targets]

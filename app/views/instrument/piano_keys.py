@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
 from app.views.instrument.playable import Playable, Spot
+from app.views.painting import set_ink, write
 
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6
@@ -60,7 +61,6 @@ class PianoKeys(Playable):
     # Where keys are
 
     def _white_keys_before(self, key: int) -> int:
-        """The number of white keys left of a key."""
         return 7 * ((key - self._first) // 12) + _WHITE_BEFORE[key % 12]
 
     @property
@@ -107,22 +107,18 @@ class PianoKeys(Playable):
         marked = self.marked
         covering = {black for key in marked for black in (key - 1, key + 1) if is_black(black) and not is_black(key)}
         for key in sorted(marked | covering, key=is_black):
-            if self.key_rect(key).intersects(dirty):
-                self._paint_key(painter, key, self._fill_colour(key))
-                if key in self.held:
-                    self._paint_pin(painter, key)
+            rect, filling = self.key_rect(key), self._fill_colour(key)
+            if not rect.intersects(dirty):
+                continue
+            self._paint_key(painter, key, filling)
+            if key in self.held:  # by itself: it has a dot
+                set_ink(painter, fill=_ink(filling))
+                dot = QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38))
+                painter.drawEllipse(dot, 2.5, 2.5)
         if self.shows_cursor:
             key = self.chosen.key
-            painter.setPen(QPen(QColor(_ink(self._fill_colour(key))), 1.5))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
+            set_ink(painter, _ink(self._fill_colour(key)), 1.5)
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
-
-    def _paint_pin(self, painter: QPainter, key: int) -> None:
-        """Paint a dot on a key that stays down by itself."""
-        rect = self.key_rect(key)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(_ink(self._fill_colour(key))))
-        painter.drawEllipse(QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38)), 2.5, 2.5)
 
     def _fill_colour(self, key: int) -> QColor:
         if not self.sounds(key):
@@ -134,26 +130,18 @@ class PianoKeys(Playable):
 
     def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
         rect = self.key_rect(key)
-        painter.setBrush(filling)
         if is_black(key):
-            painter.setPen(QPen(QColor(theme.LINE), 1))
+            set_ink(painter, theme.LINE, fill=filling)
             painter.drawRoundedRect(rect.adjusted(0, -4, 0, 0), 2.5, 2.5)
         else:
-            painter.setPen(Qt.PenStyle.NoPen)
+            set_ink(painter, fill=filling)
             painter.drawRoundedRect(rect.adjusted(0.5, -4, -0.5, -1), 3, 3)
         letter = self._letters.get(key, "") if self.sounds(key) else ""
-        if letter or key % 12 == 0:
-            painter.setPen(QColor(_ink(filling)))
-        if key % 12 == 0:
-            self._paint_word(painter, rect, note_name(key), 16, theme.px(9))
-        if letter:
-            self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
-
-    def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
-        """Paint a word on a key, `above` pixels above its lower edge."""
-        painter.setFont(theme.small_font(size, bold=above > 16, grows=False))
-        place = QRectF(key.left() - 4, key.bottom() - theme.px(above), key.width() + 8, theme.px(13))
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
+        words = (note_name(key) if key % 12 == 0 else "", 16, theme.px(9))
+        for word, above, size in (words, (letter, 18 if is_black(key) else 30, self._letter_size)):
+            if word:  # so many pixels above the key's lower edge
+                place = QRectF(rect.left() - 4, rect.bottom() - theme.px(above), rect.width() + 8, theme.px(13))
+                write(painter, place, word, _ink(filling), theme.small_font(size, bold=above > 16, grows=False))
 
 
 def _own(key: int) -> str:
@@ -163,10 +151,8 @@ def _own(key: int) -> str:
 
 
 def _silent_colour(key: int) -> QColor:
-    """The colour of a key without a string."""
     return theme.blended(_own(key), theme.LINE, 0.3)
 
 
 def _ink(filling: QColor) -> str:
-    """The colour of text on it."""
     return max(theme.TEXT, theme.BACKGROUND, key=lambda ink: theme.contrast(ink, filling.name()))

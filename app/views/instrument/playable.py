@@ -16,7 +16,6 @@ from PySide6.QtGui import (
     QMouseEvent,
     QPainter,
     QPaintEvent,
-    QPen,
     QPixmap,
     QResizeEvent,
 )
@@ -25,6 +24,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_keys
+from app.views.painting import set_ink, write
 
 LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixels
 SOFTEST, HARDEST = 40, 127  # velocities of a click at the top and at the bottom of a place
@@ -74,9 +74,10 @@ class Playable(QWidget):
         self.legato = False  # a key that is pressed while another is held takes its note over
         self._typed: list[Spot] = []  # by Enter
         self._held: set[Spot] = set()
-        self._cursor = Spot(60)
+        self.chosen = Spot(60)  # which Enter plays
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
-        self._figure, self._figure_at = "", QRectF()  # the velocity at the mouse
+        # the velocity of a click at the mouse, or of the one that sounds; "" where no key is
+        self.figure, self._figure_at = "", QRectF()
         self.setMouseTracking(True)
         self._rest = QPixmap()
         theme.changes.theme_changed.connect(self.rest_changed)
@@ -105,15 +106,14 @@ class Playable(QWidget):
 
     def stepped(self, arrow: Qt.Key) -> Spot:
         """The spot that an arrow of the keyboard moves the cursor to."""
-        return Spot(self._cursor.key + _MOVES[arrow])
+        return Spot(self.chosen.key + _MOVES[arrow])
 
     def place_words(self, spot: Spot) -> str:
-        """The words of what is there."""
         return note_name(spot.key)
 
     def typed(self, all_strings: bool) -> list[Spot]:
         """The spots that Enter plays; `all_strings`: with Ctrl."""
-        return [self._cursor]
+        return [self.chosen]
 
     @abstractmethod
     def key_rect(self, key: int) -> QRectF:
@@ -138,7 +138,7 @@ class Playable(QWidget):
         if (low, high) != (self._low, self._high):
             self.release_all()
             self._low, self._high = low, high
-            self._set_cursor(Spot(self._cursor.key))
+            self._set_cursor(Spot(self.chosen.key))
             self.lay_out()
             self.rest_changed()
 
@@ -154,11 +154,8 @@ class Playable(QWidget):
         """Show the loudness of each key, 0 … 1; keys that are left out are silent."""
         steps = {key: round(min(max(level, 0.0), 1.0) * LEVEL_STEPS) for key, level in levels.items()}
         steps = {key: step for key, step in steps.items() if step > 0}
-        if steps == self._levels:
-            return
-        for key in self._levels.keys() | steps.keys():
-            if self._levels.get(key) != steps.get(key):
-                self._repaint(key)
+        for key, _ in self._levels.items() ^ steps.items():
+            self._repaint(key)
         self._levels = steps
 
     def show_source(self, source: str) -> None:
@@ -173,7 +170,6 @@ class Playable(QWidget):
         return frozenset(spot.key for spot in self._held)
 
     def release_all(self) -> None:
-        """Release all keys that are down."""
         self._release_typed()
         self._release_mouse()
         for spot in sorted(self._held):
@@ -189,7 +185,7 @@ class Playable(QWidget):
     @property
     def marked(self) -> frozenset[int]:
         """Keys that do not look as at rest."""
-        cursor = {self._cursor.key} if self.shows_cursor else set()
+        cursor = {self.chosen.key} if self.shows_cursor else set()
         return frozenset(self._levels.keys() | cursor | {spot.key for spot in self.down})
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -205,13 +201,10 @@ class Playable(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.drawPixmap(QPointF(), self._rest)
         self.paint_marks(painter, QRectF(event.rect()))
-        if self._figure:
-            painter.setPen(QPen(QColor(theme.LINE), 1))
-            painter.setBrush(QColor(theme.PANEL))
+        if self.figure:
+            set_ink(painter, theme.LINE, fill=theme.PANEL)
             painter.drawRoundedRect(self._figure_at.adjusted(1, 1, -1, -1), 3, 3)
-            painter.setPen(QColor(theme.TEXT))
-            painter.setFont(theme.small_font(10))
-            painter.drawText(self._figure_at, Qt.AlignmentFlag.AlignCenter, self._figure)
+            write(painter, self._figure_at, self.figure, theme.TEXT, theme.small_font(10))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -222,7 +215,6 @@ class Playable(QWidget):
         return self._levels.get(key, 0) / LEVEL_STEPS
 
     def is_down(self, key: int) -> bool:
-        """Return True if a key is pressed here, or stays down by itself."""
         return any(spot.key == key for spot in self.down)
 
     @property
@@ -241,20 +233,15 @@ class Playable(QWidget):
         """The velocity of a click there: greater further down."""
         return round(SOFTEST + min(max(self.share_at(key, at), 0.0), 1.0) * (HARDEST - SOFTEST))
 
-    @property
-    def figure(self) -> str:
-        """The velocity of a click at the mouse, or of the one that sounds; "" where no key is."""
-        return self._figure
-
     def _show_velocity(self, at: QPointF, velocity: int | None) -> None:
         """Show the velocity beside the mouse, where it covers neither the mouse nor what is clicked."""
-        before, self._figure = self._figure_at, "" if velocity is None else f"velocity {velocity}"
+        before, self.figure = self._figure_at, "" if velocity is None else f"velocity {velocity}"
         metrics = QFontMetricsF(theme.small_font(10))
         width, height = metrics.horizontalAdvance("velocity 127") + 12, metrics.height() + 4
         beside = at.x() + FIGURE_BESIDE
         left = beside if beside + width <= self.width() else at.x() - FIGURE_BESIDE - width
         top = min(max(at.y() - height / 2, 0.0), self.height() - height)
-        self._figure_at = QRectF(left, top, width, height) if self._figure else QRectF()
+        self._figure_at = QRectF(left, top, width, height) if self.figure else QRectF()
         for place in (before, self._figure_at):
             self.update(place.toAlignedRect())
 
@@ -296,7 +283,6 @@ class Playable(QWidget):
         self._show_velocity(self._at, self._played)
 
     def _move_to(self, spot: Spot, velocity: int) -> None:
-        """Play what the mouse has met next."""
         before, self._down = self._down, spot
         assert before is not None
         for left in [other for other in self._strummed if other.string == spot.string]:
@@ -325,7 +311,6 @@ class Playable(QWidget):
             self._release_mouse()
 
     def _release_mouse(self) -> None:
-        """Release what the mouse has pressed."""
         down, self._down = self._down, None
         left, self._strummed = [*self._strummed, *([] if down is None else [down])], []
         for spot in left:
@@ -374,18 +359,13 @@ class Playable(QWidget):
         super().hideEvent(event)
 
     @property
-    def chosen(self) -> Spot:
-        """The spot that Enter plays."""
-        return self._cursor
-
-    @property
     def shows_cursor(self) -> bool:
         """Return True if the cursor is drawn: after the keyboard reached or moved it, not the mouse."""
         return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, spot: Spot) -> None:
         spot = spot._replace(key=min(max(spot.key, self._low), self._high))
-        before, self._cursor = self._cursor, spot
+        before, self.chosen = self.chosen, spot
         self.setAccessibleDescription(
             f"{self.place_words(spot)}; arrows choose a key, Enter plays it at velocity {TYPED}. "
             "Clicks are softer at the top of a key, harder at its bottom"

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtCore import QMargins, QRectF, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.patches.patch import Patch
 from app.shared.parameters import DECAY, OF_PATCHES, PITCH, PLUCK, STRING, TECHNIQUE, in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
-from app.views.controls.parts import faint, filled, vertical_rule
+from app.views.controls.parts import NO_MARGINS, filled, vertical_rule
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, SHAPE_TIP, shape_box
+from app.views.painting import write
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT = 13
@@ -65,12 +67,12 @@ class Facts(QWidget):
         x = 2
         for name, value in self._facts.items():
             for words, ink, bold, gap in ((name, theme.FAINT, False, 5), (value, theme.TEXT, True, 20)):
-                painter.setFont(theme.small_font(11, bold))
-                wide = painter.fontMetrics().horizontalAdvance(words)
+                font = theme.small_font(11, bold)
+                wide = QFontMetrics(font).horizontalAdvance(words)
                 if x + wide > self.width() and x > 2:
                     return
-                painter.setPen(QColor(ink))
-                painter.drawText(x, 0, self.width() - x, self.height(), Qt.AlignmentFlag.AlignVCenter, words)
+                place = QRectF(x, 0, self.width() - x, self.height())
+                write(painter, place, words, ink, font, Qt.AlignmentFlag.AlignVCenter)
                 x += wide + gap
 
 
@@ -89,62 +91,42 @@ class StringKnobs(QWidget):
         super().__init__(parent)
         self.setAccessibleName("Knobs of the string")
         self.knobs: dict[str, Knob] = {}
-        self.shape = shape_box()
-        self.shape.activated.connect(lambda row: self.changed.emit("pluck.shape", SHAPES[row]))
+        self.shape = shape_box(lambda shape: self.changed.emit("pluck.shape", shape))
         self.facts = Facts()
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(5)
+        row = filled(QHBoxLayout(), spacing=5)
         for number, group in enumerate(GROUPS):
-            if number:
-                row.addWidget(vertical_rule())
-            row.addLayout(self._group(group))
+            filled(row, *([vertical_rule()] if number else []), self._group(group))
         row.addStretch(1)
         self.technique = QWidget()
-        filled(QHBoxLayout(self.technique), vertical_rule(), self._group(TECHNIQUE)).setContentsMargins(0, 0, 0, 0)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(SPACING)
-        column.addLayout(row)
-        column.addWidget(self.facts)
+        filled(QHBoxLayout(self.technique), vertical_rule(), self._group(TECHNIQUE), margins=NO_MARGINS)
+        filled(QVBoxLayout(self), row, self.facts, spacing=SPACING, margins=NO_MARGINS)
         # or a low window would squeeze it
         theme.fix_size(self, height=HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)
 
     def _group(self, group: str) -> QVBoxLayout:
-        head = faint(group)
-        head.setObjectName("group")
+        head = Label(group, objectName="group")
         theme.fix_size(head, height=HEAD_HEIGHT)
-        row = QHBoxLayout()
-        row.setSpacing(0)
+        row = filled(QHBoxLayout(), spacing=0)
         if group == PLUCK:
             row.addLayout(self._shape_column())
         for parameter in in_group(group):
-            knob = Knob(parameter)
-            knob.set_low(True)
-            knob.set_width(WIDTHS.get(parameter.id, NARROW_WIDTH))
-            knob.figure_asked.connect(lambda value, field=parameter.id: self.figure_asked.emit(field, value))
-            knob.value_asked.connect(lambda value, field=parameter.id: self._ask(field, value))
+            knob = Knob(parameter, width=WIDTHS.get(parameter.id, NARROW_WIDTH), low=True)
+            knob.figure_asked.connect(partial(self.figure_asked.emit, parameter.id))
+            knob.value_asked.connect(partial(self._ask, parameter.id))
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
             self.knobs[parameter.id] = knob
             row.addWidget(knob)
-        column = QVBoxLayout()
-        column.setSpacing(0)
+        column = filled(QVBoxLayout(), spacing=0)
         column.addWidget(head, alignment=Qt.AlignmentFlag.AlignHCenter)
-        column.addLayout(row)
-        return column
+        return filled(column, row)
 
     def _shape_column(self) -> QVBoxLayout:
-        name = Label("SHAPE")
-        name.setObjectName("knob")
+        name = Label("SHAPE", objectName="knob")
         theme.fix_size(name, height=14)  # as a knob's name
-        column = QVBoxLayout()
-        column.setContentsMargins(0, 0, 4, 0)
-        column.setSpacing(4)
+        column = filled(QVBoxLayout(), spacing=4, margins=QMargins(0, 0, 4, 0))
         column.addWidget(name, alignment=Qt.AlignmentFlag.AlignHCenter)
-        column.addWidget(self.shape)
-        column.addStretch(1)
-        return column
+        return filled(column, self.shape, None)
 
     def _ask(self, field: str, value: float) -> None:
         self.changed.emit(field, round(value) if OF_PATCHES[field].whole else value)
@@ -157,15 +139,10 @@ class StringKnobs(QWidget):
             knob.set_value(value)
             if saved is not None:
                 knob.default = saved.value(field)
-        with QSignalBlocker(self.shape):
-            self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
+        self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
         barred = _why_barred(patch, "pluck.shape")
         self.shape.setEnabled(not barred)
         self.shape.setToolTip(barred or SHAPE_TIP)
-
-    def show_facts(self, facts: Mapping[str, str]) -> None:
-        """Show the resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
-        self.facts.show_facts(facts)
 
     def show_figures(self, figures: Mapping[str, str]) -> None:
         """Show the figures that knobs amount to in that string, by field ("knobs.tension": "72.3 N").
@@ -178,11 +155,8 @@ class StringKnobs(QWidget):
 
 def _why_barred(patch: Patch, field: str) -> str:
     """The reason why a field means nothing in this patch; "" where it means something."""
-    if (
-        patch.strings.kind == "drums"
-        and field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
-        and field not in DRUM_KNOBS
-    ):
+    of_strings = field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
+    if patch.strings.kind == "drums" and of_strings and field not in DRUM_KNOBS:
         return NO_STRING
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH

@@ -6,7 +6,6 @@ the new one replaces each old one, which leaves its alpha. So no view needs to f
 
 from __future__ import annotations
 
-from dataclasses import astuple
 from typing import Any
 
 import pyqtgraph as pg
@@ -42,8 +41,8 @@ class _Swap:
     """Colours of one theme for those of another; any other colour stays."""
 
     def __init__(self, old: theme.Theme, new: theme.Theme) -> None:
-        pairs = zip(astuple(old), astuple(new), strict=True)
-        self._colours = {QColor(a).rgb(): QColor(b) for a, b in pairs if isinstance(a, str)}
+        pairs = zip(old.colours.values(), new.colours.values(), strict=True)
+        self._colours = {QColor(a).rgb(): QColor(b) for a, b in pairs}
 
     def colour(self, colour: QColor) -> QColor:
         opaque = QColor(colour)

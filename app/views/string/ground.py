@@ -74,7 +74,7 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
 
 def _shade(painter: QPainter, area: QRectF) -> None:
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.translucent(theme.present.shade, theme.present.shade_alpha))
+    painter.setBrush(QColor(theme.SHADE))
     painter.drawRect(area)
     painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
     painter.drawRect(area)

@@ -19,8 +19,8 @@ from app.rendering import BlowTake, Take
 from app.session.choices import Session
 from app.session.shown import ShownSource, shown_sources
 from app.views import theme
+from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view
-from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, fit_foot, frequency_ticks, keep_axes
 from app.window.panels.base import LEAST_HEIGHT, Moment, level_words

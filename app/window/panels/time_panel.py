@@ -14,8 +14,8 @@ from app.analysis.growing import Growing, keep_up
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
+from app.views.controls.elided_label import Readout
 from app.views.controls.parts import lay_out_view
-from app.views.controls.readout import Readout
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel

@@ -49,21 +49,18 @@ from app.views import theme
 from app.views.controls import (
     browser,
     browser_rows,
+    choosers,
     deck,
     drop_sign,
     elided_label,
-    filter_button,
     focus_ring,
     form,
     knob,
-    name_button,
-    note_box,
     notice_bar,
     number_box,
     overflow,
     plain,
     progress_strip,
-    readout,
     segments,
     sideways,
 )
@@ -81,7 +78,7 @@ from app.views.plots import figures_table, kept_plot, legend, plots, pointed_plo
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
-BASES = {"ExportPage", "GrowingDialog", "Playable", "StageView"}
+BASES = {"ChoicesForm", "ExportPage", "GrowingDialog", "Playable", "StageView"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
@@ -101,7 +98,7 @@ def made_deck() -> QWidget:
 
 
 def filtered() -> QWidget:
-    made = filter_button.FilterButton("presets")
+    made = choosers.FilterButton("presets", lambda: None)
     made.show_listed(2, 3)
     return made
 
@@ -167,20 +164,20 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     deck.Deck: made_deck,
     drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
     elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
-    filter_button.FilterButton: filtered,
+    choosers.FilterButton: filtered,
     focus_ring.FocusRing: with_ring,
     form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
     knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
-    name_button.NameButton: lambda: with_name(name_button.NameButton("A name")),
-    note_box.NoteBox: lambda: note_box.NoteBox("Lowest key", "The lowest"),
+    choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print, 60, 200)),
+    number_box.NoteBox: lambda: number_box.NoteBox("Lowest key", "The lowest"),
     notice_bar.NoticeBar: notice,
-    number_box.NumberBox: lambda: form.spin_box("Length", (0, 5), 1, "The length", " m", 2),
-    number_box.CountBox: lambda: form.count_box("Trials", 50, 16, "How many"),
+    number_box.NumberBox: lambda: number_box.NumberBox("Length", (0, 5), 1, "The length", " m", 2),
+    number_box.CountBox: lambda: number_box.CountBox("Trials", 50, 16, "How many"),
     overflow.Overflow: lambda: overflow.Overflow("the row"),
     plain.Label: lambda: plain.Label("A text"),
     plain.SteadyLabel: lambda: with_text(plain.SteadyLabel("A wide text")),
     progress_strip.ProgressStrip: lambda: progress_strip.ProgressStrip("Progress"),
-    readout.Readout: lambda: with_text(readout.Readout()),
+    elided_label.Readout: lambda: with_text(elided_label.Readout()),
     segments.Segments: lambda: segments.Segments("Surface", [("a", "A", "The first"), ("b", "B", "The second")]),
     sideways.Sideways: lambda: sideways.Sideways(plain.Label("A text")),
     figures_table.FiguresTable: lambda: figures_table.FiguresTable(

@@ -18,10 +18,10 @@ from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
+from app.views.controls.elided_label import Readout
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
-from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
@@ -99,7 +99,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
         qtbot.addWidget(view)
     panel.bar.show_patch(patch, own=True, changed=True)
     panel.bar.show_note(EVIL)
-    panel.knobs.show_facts({EVIL: EVIL})
+    panel.knobs.facts.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
     browser.show_rows([patch_row(entry)], (), entry.name, EVIL)
     for view in views:

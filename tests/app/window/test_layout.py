@@ -30,7 +30,7 @@ from app.views.controls.app_menu import ENTRIES
 from app.views.controls.drop_sign import DropSign
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.knob import Knob
-from app.views.controls.notice_list import NoticeList
+from app.views.controls.notice_bar import NoticeList
 from app.views.controls.overflow import Overflow
 from app.views.controls.sideways import Sideways
 from app.window.main_window import COMPILING, LOADING, MainWindow

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QSpinBox, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from app.analysis.abx.trials import AbxChoices
 from app.instrument import events
 from app.instrument.events import PluckAt, TimedEvent
 from app.instrument.offline import render_events
+from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window import controller
 from app.window.settings import load_settings
@@ -96,7 +97,7 @@ def test_the_test_keeps_its_pluck_and_volume_and_all_comes_back_as_it_was(
     assert heard.choices.volume_db == 12.0 and volume(heard) == pytest.approx(10 ** (-6 / 20))
     press(dialog, "▶  Hear B")
     heard.wait(lambda: sounds(heard))
-    find(dialog, QSpinBox, "Number of trials").setValue(25)
+    find(dialog, CountBox, "Number of trials").setValue(25)
     heard.key(KEY.Key_Escape, on=dialog)
     heard.wait(lambda: not sounds(heard))
     heard.wait(lambda: volume(heard) == pytest.approx(10 ** (12 / 20)))

@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from app.shared.typed_number import SIGNS, typed_number
 from app.views.controls.knob import Knob
-from app.views.controls.notice_list import NoticeList
+from app.views.controls.notice_bar import NoticeList
 from app.views.controls.number_box import CountBox, NumberBox
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.audio_dialog import AudioDialog

@@ -12,11 +12,9 @@ from pytestqt.qtbot import QtBot
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.views.controls.app_menu import ENTRIES, MENUS, AppMenu
-from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.elided_label import ElidedLabel, Readout
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
-from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
-from app.views.controls.notice_list import NoticeList
-from app.views.controls.readout import Readout
+from app.views.controls.notice_bar import MOST_KEPT, NoticeBar, NoticeList
 from app.views.controls.segments import Segments
 from app.views.controls.slot_buttons import NARROW_WIDTH, WIDTH, SlotButtons
 from app.views.controls.transport_bar import TransportBar

@@ -13,9 +13,7 @@ from PySide6.QtWidgets import QAbstractSpinBox, QDialog, QPushButton, QToolTip, 
 from pytestqt.qtbot import QtBot
 
 import app
-from app.views.controls.form import count_box, spin_box
-from app.views.controls.note_box import NoteBox
-from app.views.controls.number_box import NumberBox
+from app.views.controls.number_box import CountBox, NoteBox, NumberBox
 from tests.app.gestures import reported
 
 KINDS = {  # as in the dialogs
@@ -36,7 +34,7 @@ def locale(request: pytest.FixtureRequest) -> Iterator[str]:
 
 def made(qtbot: QtBot, kind: str, value: float) -> NumberBox:
     limits, suffix, decimals, prefix = KINDS[kind]
-    box = spin_box("number", limits, value, "", suffix, decimals, prefix=prefix)
+    box = NumberBox("number", limits, value, "", suffix, decimals, prefix=prefix)
     qtbot.addWidget(box)
     box.show()
     return box
@@ -100,7 +98,7 @@ def test_a_word_for_no_value(qtbot: QtBot, locale: str) -> None:
 
 
 def test_counts_are_whole(qtbot: QtBot, locale: str) -> None:
-    box = count_box("trials", 5000, 16, "")
+    box = CountBox("trials", 5000, 16, "")
     qtbot.addWidget(box)
     box.show()
     for text, value in (("12", 12), ("2.5", 12), ("1 234", 1234), ("5001", 1234), ("0", 1234), ("8.0", 8), ("a", 8)):

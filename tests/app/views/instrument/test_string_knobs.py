@@ -104,7 +104,7 @@ def test_a_knob_shows_what_it_makes_of_the_string_and_asks_for_a_figure(
 
 def test_the_facts_are_reported_in_their_units(knobs: StringKnobs) -> None:
     before = picture(knobs.facts)
-    knobs.show_facts({"tension": "72.3 N", "length": "650 mm"})
+    knobs.facts.show_facts({"tension": "72.3 N", "length": "650 mm"})
     assert knobs.facts.accessibleDescription() == "tension 72.3 N, length 650 mm"
     assert picture(knobs.facts) != before
 
