@@ -1,4 +1,4 @@
-"""The folders of presets: the shipped one and the user's own. Importing this does not load torch."""
+"""The folders of presets, runs and data sets. Importing this does not load torch."""
 
 from __future__ import annotations
 
@@ -17,9 +17,25 @@ def user_folder() -> Path:
     """
     if folder := os.environ.get(FOLDER_VARIABLE):
         return Path(folder)
+    return _data_folder() / "presets"
+
+
+def working_folder(variable: str, name: str) -> Path:
+    """The path in an environment variable, else `name` beside the sources.
+
+    Installed without its project file, as a wheel or in a bundle, the program keeps it in the platform's folder for a
+    user's data.
+    """
+    if folder := os.environ.get(variable):
+        return Path(folder)
+    root = Path(__file__).parents[1]
+    return (root if (root / "pyproject.toml").exists() else _data_folder()) / name
+
+
+def _data_folder() -> Path:
     from platformdirs import user_data_path
 
-    return user_data_path("learned-strings", appauthor=False) / "presets"
+    return user_data_path("learned-strings", appauthor=False)
 
 
 def usable_files() -> list[Path]:

@@ -12,6 +12,11 @@ _ROOT = os.path.realpath(Path(__file__).parents[1])
 _SAFE = "PYTHONSAFEPATH"
 
 
+def is_bundled() -> bool:
+    """Return True if the program runs from a bundle, whose own program takes the place of Python."""
+    return getattr(sys, "frozen", False)
+
+
 def python_command(*words: str) -> list[str]:
     """The command of another process of this Python: `words` are "-m", a module and its arguments, or "-c", code."""
     return [sys.executable, "-P", *words]

@@ -29,7 +29,7 @@ sys.exit(run(alive=close_when_playable))
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bundle, made anew and moved to another place: a few minutes."""
+    """The bundle, made and moved to another place: a few minutes."""
     pytest.importorskip("PyInstaller", reason="PyInstaller is not installed: pip install 'learned-strings[bundle]'")
     made, elsewhere = (tmp_path_factory.mktemp(name) for name in ("made", "elsewhere"))
     places = ("--distpath", str(made), "--workpath", str(made / "build"))
@@ -75,4 +75,4 @@ def test_it_says_that_it_builds_no_plugins(program: Path, tmp_path: Path) -> Non
     environment = {"PATH": "", "HOME": str(tmp_path)}
     done = subprocess.run([program, "plugin", "concert_harp"], env=environment, capture_output=True, text=True)
     assert done.returncode == 1
-    assert "learned-strings[plugin]" in done.stderr
+    assert "start the program with Python" in done.stderr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
@@ -16,6 +15,7 @@ import torch
 from filelock import FileLock, Timeout
 
 from engine.compare.relative import ErrorSums
+from engine.folders import working_folder
 from engine.models.base import StringModel, count_parameters
 from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write
@@ -281,8 +281,8 @@ def device_of(wanted: str) -> str:
 
 
 def default_runs() -> Path:
-    """LEARNED_STRINGS_RUNS, else `runs` beside the project: a folder per run, with its checkpoint and log."""
-    return Path(os.environ.get("LEARNED_STRINGS_RUNS", Path(__file__).parents[1] / "runs"))
+    """LEARNED_STRINGS_RUNS, else the working folder `runs`: a folder per run, with its checkpoint and log."""
+    return working_folder("LEARNED_STRINGS_RUNS", "runs")
 
 
 def preset_info(

@@ -99,7 +99,9 @@ def vanished(device_name: str, detail: str = "") -> AudioProblem:
 
 def refused(error: Exception, device_name: str, rate_hz: int) -> AudioProblem:
     """Return why a device did not open or start, from PortAudio's error code and text."""
-    output, detail, text = f"The sound output “{device_name}”", str(error), str(error).lower()
+    output = f"The sound output “{device_name}”"
+    detail = str(error)
+    text = str(error).lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)
     # PortAudio reports many errors of drivers as "unanticipated host error", hence the search in the text.
     if code == _PA_INVALID_SAMPLE_RATE or "sample rate" in text:

@@ -67,7 +67,9 @@ def write_played(
         PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
-    patch, source, recorded = played.patch, played.source, played.recorded
+    patch = played.patch
+    source = played.source
+    recorded = played.recorded
     rate_hz = settings.rate_hz or RATE_HZ
     origin = InstrumentSound(
         program=PROGRAM,

@@ -139,7 +139,9 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
         else:
             data |= {"patch": instrument, "single": None}
     elif "single" not in data and data.keys() & {"preset", "patch", "keys_play"}:
-        preset, place, patch = data.pop("preset", ""), data.pop("keys_play", "") == "place", data.get("patch")
+        preset = data.pop("preset", "")
+        place = data.pop("keys_play", "") == "place"
+        patch = data.get("patch")
         data["single"] = preset if patch is None or place else None
         model = patch.get("preset", Patch.model_fields["preset"].default) if isinstance(patch, dict) else preset
         if data["single"] is None and preset not in ("", model):

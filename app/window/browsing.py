@@ -109,7 +109,9 @@ class PresetDesk(BrowserDesk):
         self, window: MainWindow, session: Session, library: Library, favourites: Iterable[str] = ()
     ) -> None:
         super().__init__(window, window.presets, preset_browser(window), favourites)
-        self._session, self._library, self._bar = session, library, window.presets
+        self._session = session
+        self._library = library
+        self._bar = window.presets
         self._known = set(library.names)
         self._bar.step_asked.connect(self.step)
         library.changed.connect(self._library_changed)

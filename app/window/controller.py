@@ -189,7 +189,9 @@ class Controller(QObject):
 
     def _connect_actions(self) -> None:
         """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
-        window, session, history = self.window, self.session, self.history
+        window = self.window
+        session = self.session
+        history = self.history
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
             "export": lambda: self.exports.open("note"),

@@ -106,7 +106,9 @@ class PatchDesk(BrowserDesk):
 
     def _connect(self) -> None:
         session = self._session
-        panel, bar, browser = self._panel, self._panel.bar, self.browser
+        panel = self._panel
+        bar = self._panel.bar
+        browser = self.browser
         panel.pressed.connect(self._press)
         panel.released.connect(lambda key, string: self._instruments.play(NoteOff(key, KEYS, string)))
         panel.touch_chosen.connect(self._choose_touch)

@@ -224,7 +224,9 @@ class Performance(QObject):
 
     def _follow_blow(self, note: KeyNote) -> None:
         """Show the latest blow on the drums that are played, once its motion is rendered."""
-        choices, entry, keys = self._session.choices, self._library.find(note.patch.preset), note.player.keys
+        choices = self._session.choices
+        entry = self._library.find(note.patch.preset)
+        keys = note.player.keys
         patch = choices.patch
         if note is self._blow or choices.drums is None or patch is None or note.patch.name != patch.name:
             return
@@ -280,7 +282,9 @@ class Performance(QObject):
 
     def _request(self) -> RenderRequest | BlowRequest | None:
         """The motion that the choices ask for: of drums the latest blow, until other ones are played."""
-        choices, asked, blow = self._session.choices, self._asked, self._blow
+        choices = self._session.choices
+        asked = self._asked
+        blow = self._blow
         if choices.drums is None:
             return request_of(choices, self._library)
         is_theirs = blow is not None and choices.patch is not None and blow.patch.name == choices.patch.name

@@ -123,7 +123,9 @@ def _take(mixer: Mixer, amp: Amplifier) -> bool:
 @kernel
 def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
-    filter, raw, all_shaped = amp.filter, amp.input, amp.shaped
+    filter = amp.filter
+    raw = amp.input
+    all_shaped = amp.shaped
     drive = amp.drive
     goal = amp.wanted_drive if amp.wanted_drive != 0.0 else drive  # it is switched off: as it was
     for row in range(OVERSAMPLING):
@@ -153,7 +155,9 @@ def _shape(amp: Amplifier) -> None:
 @kernel
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
-    filter, out, mix = amp.filter, amp.out, mixer.mix
+    filter = amp.filter
+    out = amp.out
+    mix = mixer.mix
     out[:] = 0.0
     for row in range(OVERSAMPLING):
         for lag in range(LAGS):
@@ -163,7 +167,9 @@ def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
                 out[frame] += tap * shaped[frame]
     gain, tone = amp.gain, amp.tone
     if amp.wanted_drive != 0.0:  # else it is switched off: as it was
-        amp.drive, amp.gain, amp.tone = amp.wanted_drive, amp.wanted_gain, amp.wanted_tone
+        amp.drive = amp.wanted_drive
+        amp.gain = amp.wanted_gain
+        amp.tone = amp.wanted_tone
     gain_to, tone_to = amp.gain, amp.tone
     blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer.rate_hz)
     follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer.rate_hz)

@@ -126,7 +126,9 @@ def higher_orders(program: at.BankProgram, energy: np.ndarray, out: np.ndarray, 
     if program.adiabatic:
         shares = behind(program, program.shares, n * n)
         largest = behind(program, program.largest, n)
-        linear, share, change = _room(scratch, 0, n), _room(scratch, 1, n), _room(scratch, 2, n)
+        linear = _room(scratch, 0, n)
+        share = _room(scratch, 1, n)
+        change = _room(scratch, 2, n)
         for step in range(3):
             change[:] = 0.0
             for m in range(n):
@@ -293,7 +295,9 @@ def generate(
 
     Where it is not audible only time advances.
     """
-    n, ratio, first = program.modes, program.ratio, voice.generated
+    n = program.modes
+    ratio = program.ratio
+    first = voice.generated
     if program.higher:
         _integrate_to(voice, program, first * ratio, scratch)
     if fading and voice.weights_faded == 0:  # what could not be heard there may be heard here
@@ -354,7 +358,9 @@ def _segment(
     voice: at.Voice, program: at.BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
-    n, ratio, limit = program.modes, program.ratio, program.limit
+    n = program.modes
+    ratio = program.ratio
+    limit = program.limit
     end = _room(scratch, 8, 5 * n)
     end[4 * n :] = 0.0
     _move(voice, program, (first + length) * ratio, end, scratch)
@@ -482,7 +488,9 @@ def _modulate(
     row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
     change, next_change = row(voice, at.CHANGE), row(voice, at.CHANGE + 1)
     squares = scratch[(SCRATCH_ROWS + 2 * QUANTUM) * MOST_LATENTS :].view(np.float32)
-    alive, columns, rows_kept = voice.audible_count, voice.columns, voice.rows
+    alive = voice.audible_count
+    columns = voice.columns
+    rows_kept = voice.rows
     while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
         columns -= 1
     while rows_kept > 0 and row_list[rows_kept - 1] >= alive:

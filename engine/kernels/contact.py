@@ -129,7 +129,9 @@ def sound(player_address: int, mixer_address: int) -> None:
     player = player_at(player_address)
     if player.table == 0:
         return
-    table, gain, sounding = table_at(player.table), 0.0, 0
+    table = table_at(player.table)
+    gain = 0.0
+    sounding = 0
     for source in range(table.sources):
         if player.source_gains[source] != 0.0:
             gain = player.source_gains[source]
@@ -177,9 +179,16 @@ def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
-    b0, a1, a2 = noise.b0, noise.a1, noise.a2
-    x1, x2, y1, y2 = noise.past[0], noise.past[1], noise.past[2], noise.past[3]
-    seed, done, stops = noise.seed, noise.done, noise.stops
+    b0 = noise.b0
+    a1 = noise.a1
+    a2 = noise.a2
+    x1 = noise.past[0]
+    x2 = noise.past[1]
+    y1 = noise.past[2]
+    y2 = noise.past[3]
+    seed = noise.seed
+    done = noise.done
+    stops = noise.stops
     for frame in range(begin, end):
         x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
@@ -191,7 +200,10 @@ def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np
             force += pulse * (0.5 - 0.5 * math.cos(2 * math.pi * (done + 0.5) / pulse_frames))
         _add(mix, frame, force, before, gain, stops)
         done += 1
-    noise.past[0], noise.past[1], noise.past[2], noise.past[3] = x1, x2, y1, y2
+    noise.past[0] = x1
+    noise.past[1] = x2
+    noise.past[2] = y1
+    noise.past[3] = y2
     noise.envelope = envelope
     noise.done = done
 

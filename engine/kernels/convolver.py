@@ -191,7 +191,9 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
 @kernel
 def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
     """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
-    channels, early, late = impulse.channels, impulse.early, impulse.late
+    channels = impulse.channels
+    early = impulse.early
+    late = impulse.late
     spectra = reals(address_of(impulse))
     response, sums = shaped(spectra, BEHIND_IMPULSE, (early, channels, 2, QUANTUM + 1)), convolver.early_sums[:]
     count = min(early, convolver.early_filled)

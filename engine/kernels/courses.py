@@ -71,7 +71,9 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
     state = begin(first_voice, mixer)
     if state != at.SOUNDING:
         return state
-    course, late, strings = first_voice.course, first_voice.late, 1
+    course = first_voice.course
+    late = first_voice.late
+    strings = 1
     was_dry, before = first_voice.dry, first_voice.generated
     mixer.course[0].address = mixer.voices[place]
     for later_place in range(place + 1, mixer.active if course != 0 else 0):
@@ -122,7 +124,9 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
             remember(alone, is_heard(alone), first, mixer.out[0])
         return
     sums = scratch[lanes.aligned(scratch) :][:SHARED]
-    place, solved, shared = lanes.aligned(scratch) + SHARED, False, 0
+    place = lanes.aligned(scratch) + SHARED
+    solved = False
+    shared = 0
     for number in range(strings):
         voice = voice_at(_string(mixer, number).address)
         solved = voice.kind == at.TRUTH
@@ -150,7 +154,9 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
     """A quantum of latents that share a tension."""
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
-    one, other, third = _string(mixer, 0), _string(mixer, min(1, strings - 1)), _string(mixer, strings - 1)
+    one = _string(mixer, 0)
+    other = _string(mixer, min(1, strings - 1))
+    third = _string(mixer, strings - 1)
     parts, modes = (one.parts, other.parts, third.parts), (one.first, other.first, third.first)
     for frame in range(QUANTUM):
         for number in range(strings):
@@ -235,7 +241,9 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
         modes = min(shared, voice.bridged, voice.moving)
         parts = scratch[first : first + PARTS].reshape(lanes.PARTS, SHARED)
         parts[:] = 0.0
-        lost, sigmas, squares = row(voice, at.BRIDGE), row(voice, at.SIGMA), following(voice)[6]
+        lost = row(voice, at.BRIDGE)
+        sigmas = row(voice, at.SIGMA)
+        squares = following(voice)[6]
         if voice.kind == at.TRUTH:
             for mode in range(modes):
                 part = math.sqrt(lost[mode])
@@ -250,7 +258,9 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
 @inlined
 def _advance(string: CourseString, voice: at.Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
-    first, near, ears = string.first, string.near, string.ears
+    first = string.first
+    near = string.near
+    ears = string.ears
     at_points, largest = string.heard[:], voice.largest_stretch
     sums, nothing = (string.stretch, string.second), (0.0, 0.0)
     for ear in range(ears):

@@ -81,7 +81,9 @@ def gain_of(player: Player, table: Table, key: int) -> float:
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
         _blow(drum, rows[STRUCK], _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0)), speeds)
-        loudest, modes, place = 0.0, 0, 0
+        loudest = 0.0
+        modes = 0
+        place = 0
         for mode in range(n):
             speeds[mode] /= math.sqrt(rows[SQUARE, mode])
             loud[mode] = 0.0

@@ -151,7 +151,9 @@ def _ring(
             scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
     largest, apart = voice.largest_stretch, 2 if voice.points == 1 else 1
     nothing, total = (0.0, 0.0), 0.0
-    gap, give, pushed = voice.javari.gap_m, voice.javari.give, voice.javari.force
+    gap = voice.javari.gap_m
+    give = voice.javari.give
+    pushed = voice.javari.force
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
@@ -194,7 +196,9 @@ def _ring_solved(voice: at.Voice, program: at.TruthProgram, fading: bool, audibl
     step_s = 1 / (program.rate_hz * steps)
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    gap, give, moving = voice.javari.gap_m, voice.javari.give, voice.moving
+    gap = voice.javari.gap_m
+    give = voice.javari.give
+    moving = voice.moving
     q, v = motion(voice)
     shapes = row(voice, at.JAVARI)
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)

@@ -34,7 +34,9 @@ UNDERFLOW = 4  # PortAudio's flag
 @kernel
 def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
     """The next frames, float32 (frames * channels,)."""
-    channels, mix, done = mixer.channels, mixer.mix[:], 0
+    channels = mixer.channels
+    mix = mixer.mix[:]
+    done = 0
     while done < frames:
         if mixer.left == 0:
             _quantum(mixer, now_s)
@@ -54,7 +56,9 @@ def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
 
 @inlined
 def _quantum(mixer: Mixer, now_s: float) -> None:
-    here, player, before = address_of(mixer), mixer.player, mixer.player_before
+    here = address_of(mixer)
+    player = mixer.player
+    before = mixer.player_before
     mixer.mix[:] = 0.0
     _take_up(mixer)
     fence()
@@ -120,7 +124,9 @@ def _take_up(mixer: Mixer) -> None:
 @kernel
 def _finish(mixer: Mixer) -> None:
     """Volume, test tone, limiter and meter."""
-    mix, volume, wanted = mixer.mix[:], mixer.volume, mixer.wanted_volume
+    mix = mixer.mix[:]
+    volume = mixer.volume
+    wanted = mixer.wanted_volume
     for frame in range(QUANTUM):
         if volume != wanted:
             volume = wanted + (volume - wanted) * mixer.smoothing
@@ -159,7 +165,9 @@ def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped
     """PaStreamCallback; `user` is the mixer."""
     mixer = mixer_at(user)
     clock = carray(times, (3,), np.float64)
-    now_s, dac_s, count = clock[1], clock[2], np.int64(frames)
+    now_s = clock[1]
+    dac_s = clock[2]
+    count = np.int64(frames)
     missed_s = dac_s - mixer.dac_s - count / mixer.rate_hz
     if flags & UNDERFLOW and mixer.calls > 0:
         mixer.underflows += 1

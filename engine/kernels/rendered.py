@@ -14,7 +14,9 @@ from engine.kernels.voice_records import RenderedProgram, Voice
 @kernel
 def generate(voice: Voice, program: RenderedProgram, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM). Where the samples are not there yet it fades out, stands still, and counts."""
-    taps, phases, ratio = program.taps, program.phases, program.ratio
+    taps = program.taps
+    phases = program.phases
+    ratio = program.ratio
     table = behind(program, program.filter, 2 * taps * (phases + 2))
     points, looped = voice.points, voice.looped
     ready, length = voice.ready, voice.length

@@ -41,9 +41,13 @@ def tune(player: Player, table: Table) -> None:
     count, rate_hz = 0, player.rate_hz
     everyone = table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
-        key, string, pitch_hz = number, -1, pitch_of(table, number)
+        key = number
+        string = -1
+        pitch_hz = pitch_of(table, number)
         if not everyone:
-            key, string, pitch_hz = int(table.open[number].note), number, table.open[number].pitch_hz
+            key = int(table.open[number].note)
+            string = number
+            pitch_hz = table.open[number].pitch_hz
         if not pitch_hz > 0.0:
             continue
         modes, _ = string_of(player, table, key, string, pitch_hz, False, string_row)
@@ -103,7 +107,9 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if count == 0:
         return
     mixer, driven = mixer_at(mixer_address), False
-    mix, force, out = mixer.mix[:], mixer.scratch[: of.QUANTUM], mixer.scratch[of.QUANTUM : 2 * of.QUANTUM]
+    mix = mixer.mix[:]
+    force = mixer.scratch[: of.QUANTUM]
+    out = mixer.scratch[of.QUANTUM : 2 * of.QUANTUM]
     for frame in range(of.QUANTUM):
         mono = 0.5 * (mix[frame, 0] + mix[frame, 1])
         force[frame] = mono if abs(mono) < LARGEST else 0.0  # also where it is not a number

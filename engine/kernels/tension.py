@@ -502,7 +502,9 @@ def generate(
     x, y = motion(voice)
     order = order_of(voice)
     loud, quiet = order[: voice.heard], order[voice.heard : voice.felt]
-    first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
+    first = lanes.aligned(scratch)
+    near = lanes.blocks_of(len(loud))
+    far = lanes.blocks_of(len(quiet))
     ear_sums, behind = scratch[first + lanes.slots(voice.modes) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
     ears = take(voice, loud, fading, audible, scratch, first)
     load(x, y, following(voice), quiet, scratch, behind)

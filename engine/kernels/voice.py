@@ -243,7 +243,9 @@ def end(voice: at.Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: boo
     """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state. One that is not `moved` stands still."""
     mix = mixer.mix[:]
     left_over = voice.left_over[:]
-    points, late, release = voice.points, voice.late, voice.release
+    points = voice.points
+    late = voice.late
+    release = voice.release
     audible = is_heard(voice)
     if audible and (not voice.velocity or voice.warm == WARMED):
         limit = voice.limit

@@ -118,7 +118,9 @@ def _bank(
         encode: a displacement's (grid_points,) latents (n,).
         decoder, offset: (grid_points, 2 n), real parts first, and (grid_points,).
     """
-    omega, ratio, scale = parts[1], info.rate_hz / rate_hz, info.scale_m / FULL_SCALE_M
+    omega = parts[1]
+    ratio = info.rate_hz / rate_hz
+    scale = info.scale_m / FULL_SCALE_M
     values = {**values, "modes": len(omega), "ratio": ratio, "loudness": math.log(scale)}
     memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
     if rate_hz != info.rate_hz:

@@ -142,7 +142,7 @@ class Channel:
     fine_tuning: int
 
 
-SWITCHES = ("legato", "slides", "harmonics", "tremolo", "strums")  # in the order of the kernels
+SWITCHES = ("pedal", "legato", "slides", "harmonics", "tremolo", "strums")  # in the order of the kernels
 CHANNEL_VALUES = tuple(field.name for field in fields(Channel) if field.name not in SWITCHES)
 
 
@@ -214,9 +214,14 @@ class CompiledPlayer(KernelMemory):
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at, mm, width, shape = 0.0, 0.0, 0.0, 0
+            at = 0.0
+            mm = 0.0
+            width = 0.0
+            shape = 0
             if by_hand is not None:
-                at, mm, width = by_hand.position, by_hand.amplitude_mm, by_hand.width
+                at = by_hand.position
+                mm = by_hand.amplitude_mm
+                width = by_hand.width
                 shape = SHAPES.index(by_hand.shape)
             head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
             self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
@@ -404,7 +409,7 @@ class CompiledPlayer(KernelMemory):
         state = self.record["channels"][number].copy()
         values = {name: state[name].item() for name in CHANNEL_VALUES}
         values |= zip(SWITCHES, map(bool, state["switches"]), strict=True)
-        values |= {"pedal": bool(values["pedal"]), "mute": round(127 * values["mute"])}
+        values["mute"] = round(127 * values["mute"])
         for name in ("slide", "range_semitones"):
             values[name] = values[name] if values[name] >= 0 else None
         return Channel(**values)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from filelock import FileLock
 from torch import Tensor
 
 from engine import bounds
+from engine.folders import working_folder
 from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
@@ -67,8 +67,8 @@ def split_rows(count: int, name: str) -> slice:
 
 
 def default_cache() -> Path:
-    """LEARNED_STRINGS_CACHE, else `cache` beside the project."""
-    return Path(os.environ.get("LEARNED_STRINGS_CACHE", Path(__file__).parents[2] / "cache"))
+    """LEARNED_STRINGS_CACHE, else the working folder `cache`."""
+    return working_folder("LEARNED_STRINGS_CACHE", "cache")
 
 
 def dataset_key(configuration: DatasetConfiguration) -> str:

@@ -154,7 +154,9 @@ def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedSt
     first_string = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
     if len(learned) == 1:
         return first_string
-    hz, smooth, same = np.log(first_string.smooth_hz), [np.log(first_string.smooth_ratio)], []
+    hz = np.log(first_string.smooth_hz)
+    smooth = [np.log(first_string.smooth_ratio)]
+    same = []
     for take in learned[1:]:
         lower = first.physics.f0_hz / take.physics.f0_hz
         string = first.strung.string

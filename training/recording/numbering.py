@@ -155,7 +155,9 @@ def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
     bins = bins[(bins > 1) & (bins < len(level) - 2) & (bins * step > 20.0)]
     above = level[bins] - floor[bins]
     bins = bins[(above > PRESENT_DB) & (level[bins] > level.max() - 75)]
-    before, at, after = level[bins - 1], level[bins], level[bins + 1]
+    before = level[bins - 1]
+    at = level[bins]
+    after = level[bins + 1]
     shift = 0.5 * (before - after) / np.minimum(before - 2 * at + after, -1e-9)
     return Peaks((bins + shift) * step, at - floor[bins], at, width_hz, highest_hz)
 

@@ -285,7 +285,9 @@ def corrections(physics: LearnedPhysics, string: StringParameters) -> dict[str, 
     pairs = [partial.poles for partial in physics.partials if len(partial.poles) == 2]
     split = float(np.median([_split(pair) for pair in pairs])) if pairs else 0.0
     slower = float(np.median([second.decay / first.decay for first, second in pairs])) if pairs else 1.0
-    cents, ratio, share = np.zeros(count), np.ones(count), np.zeros(count)
+    cents = np.zeros(count)
+    ratio = np.ones(count)
+    share = np.zeros(count)
     second_cents, second_ratio = np.full(count, split), np.full(count, slower)
     for partial in physics.partials:
         place = partial.number - 1

@@ -294,7 +294,9 @@ def moments(a: Complex, s: Complex) -> tuple[Array, Array, Array]:
     """∫ |z|², its moment in time and ∫ Im z' z̄ of z = Σ a exp(st), for poles (…, poles)."""
     sums = s[..., :, None] + s[..., None, :].conj()
     pairs = a[..., :, None] * a[..., None, :].conj()
-    energy, moment, turn = -pairs / sums, pairs / sums**2, -pairs * s[..., :, None] / sums
+    energy = -pairs / sums
+    moment = pairs / sums**2
+    turn = -pairs * s[..., :, None] / sums
     return energy.sum((-2, -1)).real, moment.sum((-2, -1)).real, turn.sum((-2, -1)).imag
 
 

@@ -155,7 +155,9 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
         raise ValueError(f"{count} modes need a width of {1 + 2 * pairs} and a depth of 3, not {width} and {depth}")
-    field, now, rate = 0, 1, 1 + pairs  # first channels
+    field = 0
+    now = 1
+    rate = 1 + pairs  # first channels
     last = points - 1
     analyse, turn, synthesise = layers = tuple(Kernels(points, width) for _ in range(3))
     for layer in layers:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from engine.python_process import is_bundled
+
 EXTRA = "learned-strings[plugin]"
 _HERE = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
 _MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
@@ -74,4 +76,7 @@ def install_folder(form: str, target: str) -> Path:
 def check_compiler() -> None:
     """Raise PluginError: the compiler is not installed."""
     if find_spec("ziglang") is None:
-        raise PluginError(f"building a plug-in needs a C compiler: pip install '{EXTRA}' brings one")
+        remedy = (
+            "start the program with Python, as docs/install.md says" if is_bundled() else f"pip install '{EXTRA}'"
+        )
+        raise PluginError(f"building a plug-in needs a C compiler, which is not here; {remedy}")

@@ -127,7 +127,9 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header["level_db"] = patch.level_db
     if kit is not None:
         header["kit"], header["kit_slots"] = put(kit.memory.tobytes()) // 8, len(kit.memory)
-        header["kit_room"], header["table_room"], header["modes"] = kit.room, kit.table_room, kit.modes
+        header["kit_room"] = kit.room
+        header["table_room"] = kit.table_room
+        header["modes"] = kit.modes
     header["body"] = put(body_of(patch).tobytes()) // 8
     header["longest_s"] = MOST_LOUD_S
     id = identifier(patch.name)
@@ -167,8 +169,13 @@ def _record(
     words = [parameter.shown(low + step) for step in range(round(high - low) + 1)] if parameter.whole else []
     record = np.zeros(1, PARAMETER)[0]
     record["id"] = zlib.crc32(parameter.id.encode()) & 0x7FFFFFFF  # stable; below 2³¹ for hosts with signed numbers
-    record["kind"], record["index"], record["steps"] = KINDS.index(kind), index, len(words)
-    record["low"], record["high"], record["standard"], record["curve"] = low, high, value, parameter.curve
+    record["kind"] = KINDS.index(kind)
+    record["index"] = index
+    record["steps"] = len(words)
+    record["low"] = low
+    record["high"] = high
+    record["standard"] = value
+    record["curve"] = parameter.curve
     record["name"] = _bytes(label or parameter.name, 63)
     record["module"] = _bytes(module, 63)
     record["unit"] = _bytes(parameter.taper.text.rpartition("}")[2].strip(), 15)

@@ -20,7 +20,9 @@ from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
 
 Record = np.dtype[np.void]
 
-MOST_IMAGES, MOST_PARAMETERS, MOST_TARGETS = 128, 64, 8
+MOST_IMAGES = 128
+MOST_PARAMETERS = 64
+MOST_TARGETS = 8
 KINDS = ("source", "volume", "value", "macro", "effect", "amp")  # of parameters
 SOURCES = ("model", "truth", "difference")
 

@@ -110,7 +110,9 @@ class AbxDialog(QDialog):
         self._leave()
 
     def _connect(self) -> None:
-        setup, trial, result = self._setup, self._trial, self._result
+        setup = self._setup
+        trial = self._trial
+        result = self._result
         setup.start.clicked.connect(self._start)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)

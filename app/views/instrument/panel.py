@@ -118,7 +118,9 @@ class InstrumentPanel(QFrame):
         self._build_plays()
         for button in (self._fold, self._lift, self.plays):
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._low, self._hinted, self._patch_area = False, False, True
+        self._low = False
+        self._hinted = False
+        self._patch_area = True
         self._stack = QStackedWidget()
         self._hint = Label(HINTS["keys"], self._stack, objectName="hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)

@@ -136,7 +136,9 @@ class PatchBar(QFrame):
         self._lower = tool_button("−", "Octave down", tip, "chip", lambda: self.octave_asked.emit(-1))
         tip = "The computer's keys play an octave higher (X)"
         self._higher = tool_button("+", "Octave up", tip, "chip", lambda: self.octave_asked.emit(1))
-        self.octave, self.velocity, self.voices = faint(), SteadyLabel("velocity 127"), SteadyLabel("0 voices")
+        self.octave = faint()
+        self.velocity = SteadyLabel("velocity 127")
+        self.voices = SteadyLabel("0 voices")
         for words, tip in (
             (self.octave, "The lowest C on the computer's keys; C4 is middle C (Z, X)"),
             (self.velocity, "How hard the computer's keys strike, 1 … 127 (1 … 9; C softer, V harder)"),

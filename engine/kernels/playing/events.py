@@ -58,7 +58,9 @@ def _cancel(player: Player, id: int, now: int) -> None:
 @kernel
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
     """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
-    kind, frame, now = event.kind, event.frame, mixer.frames
+    kind = event.kind
+    frame = event.frame
+    now = mixer.frames
     if kind == of.TABLE:
         _take_table(player, event.table, frame, now)
     elif kind == of.CANCEL:
@@ -81,8 +83,12 @@ def _handle(player: Player, mixer: Mixer, event: Event) -> None:
 @kernel
 def _handle_on_channel(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     """Play an event of one of the channels."""
-    kind, frame, now = event.kind, event.frame, mixer.frames
-    channel, key, value = event.channel, event.key, event.value
+    kind = event.kind
+    frame = event.frame
+    now = mixer.frames
+    channel = event.channel
+    key = event.key
+    value = event.value
     if kind == of.NOTE_ON and value > 0.0:
         if chords.strum(player, table, event, now):
             return

@@ -66,7 +66,9 @@ def string_of(
         number: on which of a set it is wanted, as of `strings.played`.
         wheeled: whether with the knob that the modulation wheel turns, as far as it does.
     """
-    whole, knobs, count = player.whole, player.knobs, table.strings
+    whole = player.whole
+    knobs = player.knobs
+    count = table.strings
     for which in range(of.KNOBS):
         knobs[which] = value_of(player, table, which) if wheeled else player.values[which]
     first = table.open[strings.played(table.open, count, key, number) if count > 0 else 0]

@@ -19,7 +19,9 @@ LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by
 
 # By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
 # differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
-VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
+VARIES_PLACE = 0.08
+VARIES_DB = 1.0
+VARIES_WIDTH = 0.12  # shares, dB
 
 
 @kernel
