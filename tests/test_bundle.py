@@ -12,6 +12,7 @@ import soundfile
 from app.commands import cli
 
 ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the bundle was tried on Linux alone")
 NOTE = ("--position", "0.3", "--amplitude-mm", "2", "--seconds", "0.5", "--bits", "32f")
 WINDOW = """
 import sys

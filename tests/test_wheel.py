@@ -18,12 +18,16 @@ for name in ("presets", "instruments"):
     print("\x1e")
 from app.views.theme import SIGNS
 from training.cell import load
+from training.data.dataset import default_cache
+from training.run import default_runs
+assert not any(folder.is_relative_to(sys.path[0]) for folder in (default_runs(), default_cache()))
 print(json.dumps([load("studio_nylon_b3").model, load("nylon_linear_noise_4k_lru").model, SIGNS.is_dir()]))
 """
 
 
 def run(*command: object, folder: Path, **variables: str) -> str:
-    environment = {**os.environ, **variables}
+    folders = ("LEARNED_STRINGS_RUNS", "LEARNED_STRINGS_CACHE")
+    environment = {name: value for name, value in os.environ.items() if name not in folders} | variables
     words = [str(part) for part in command]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

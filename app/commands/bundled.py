@@ -7,8 +7,9 @@ import os
 import runpy
 import sys
 
-# Kernels in the bundle are compiled for processors since 2013 or so, not for the one that made it.
-COMMON_PROCESSORS = {"x86-64-v3": ("avx2", "bmi2", "fma")}
+# Kernels in the bundle are compiled for any processor with these, x86 since 2013 or so, not for the one that made it.
+COMMON_PROCESSOR = "x86-64-v3"
+ITS_FEATURES = ("avx2", "bmi2", "fma")
 
 
 def main() -> int:
@@ -24,13 +25,12 @@ def main() -> int:
 
 
 def choose_processor() -> None:
-    """Let Numba take a common processor where this one has all that it has; so it finds the bundle's kernels."""
+    """Let Numba compile for COMMON_PROCESSOR where this one has its features: then it finds the bundle's kernels."""
     from llvmlite.binding import get_host_cpu_features
 
     present = get_host_cpu_features()
-    for name, features in COMMON_PROCESSORS.items():
-        if all(present.get(feature) for feature in features):
-            os.environ |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
+    if all(present.get(feature) for feature in ITS_FEATURES):
+        os.environ |= {"NUMBA_CPU_NAME": COMMON_PROCESSOR, "NUMBA_CPU_FEATURES": ""}
 
 
 def run_python(option: str, text: str, arguments: list[str]) -> None:

@@ -63,7 +63,7 @@ def tone_holes(sound: NDArray[np.float32], rate_hz: int) -> list[Span]:
 
 
 def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int) -> list[Span]:
-    """Where something must sound: from the first sound after a key on, until half a second after the last key."""
+    """The spans that must sound: from the first sound after a key on, until half a second after the last key."""
     sounds = np.flatnonzero(np.any(np.abs(sound) >= ZERO, axis=1))
     spans: list[Span] = []
     for key in sorted(keys):
@@ -160,7 +160,7 @@ def events(rest: Unpredicted, rate_hz: int) -> Events:
 def matched(
     keys: Sequence[int], found: Events, strength: NDArray[np.float64], usual: int, rate_hz: int
 ) -> list[int | None]:
-    """For each key the beginning of its pluck: the strongest event about `usual` frames after it; None without one.
+    """The beginning of each key's pluck: the strongest event about `usual` frames after it; None without one.
 
     An event that is much earlier or later is not matched; `untimely` finds it.
     """
@@ -247,7 +247,7 @@ def onset(sound: NDArray[np.floating], key: int, rate_hz: int) -> int | None:
 
 
 def _begins_at_once(rest: NDArray[np.float64], place: int) -> bool:
-    """Whether the residual is small right before this place: a step, and not a short tone of high partials."""
+    """Return True if the residual is small right before this place: a step, and not a short tone of high partials."""
     part = rest[max(place - ORDER, 0) : place + ORDER]
     start = int(np.argmax(part > 0.2 * part.max()))
     return start > 2 and bool(STANDS_OUT * part[: start - 1].max() < part.max())

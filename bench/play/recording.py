@@ -66,7 +66,7 @@ class CardClock:
 
 
 def _left_of(x: NDArray[np.float64], y: NDArray[np.float64], a: int, b: int, c: int) -> bool:
-    """Whether b is not below the line from a to c."""
+    """Return True if b is not below the line from a to c."""
     return bool((y[b] - y[a]) * (x[c] - x[a]) >= (y[c] - y[a]) * (x[b] - x[a]))
 
 

@@ -1,1 +1,1 @@
-"""How well recorded notes are learned: a folder of recordings against baselines, and synthetic notes."""
+"""The accuracy of learning recorded notes: a folder of recordings against baselines, and synthetic notes."""

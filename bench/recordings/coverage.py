@@ -26,7 +26,7 @@ def measure(count: int, report: ProgressReport) -> dict[str, Any]:
 
 
 def coverage(seeds: Iterable[int], progress: Callable[[int], None] = lambda done: None) -> dict[str, float]:
-    """By figure, the share of partials whose interval holds the truth, its half width and the middle's error.
+    """The share, by figure, of partials whose interval holds the truth, its half width and the middle's error.
 
     Widths are medians, errors root mean squares, in cents, shares and dB. Also how many partials, and how many notes
     are misnumbered.
