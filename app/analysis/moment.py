@@ -28,8 +28,7 @@ class StringFrame:
     Attributes:
         shapes: by source.
         lowest, highest: by source, the extremes within `BLUR_S`: the blur of the motion in real time.
-        caption: the time, and the slow motion's speed.
-        past_horizon: whether the model is past the end of its training.
+        caption: as of `caption_of`.
         envelopes: by source, the extremes within `ENVELOPE_S`; empty where they are not shown.
     """
 
@@ -37,7 +36,6 @@ class StringFrame:
     lowest: dict[str, NDArray[np.float32]]
     highest: dict[str, NDArray[np.float32]]
     caption: str = ""
-    past_horizon: bool = False
     envelopes: Mapping[str, Band] = field(default_factory=dict)
 
     def largest_mm(self, with_envelopes: bool = False) -> float:
@@ -125,6 +123,12 @@ def frame_at(
         shapes[motion.source] = motion.shape(position_s) * MM
         lowest[motion.source] = frames.min(axis=0) * MM
         highest[motion.source] = frames.max(axis=0) * MM
-    caption = f"{position_s:.3f} s" + ("" if speed >= 1 else f"   slow motion × {speed:.3f}")
     envelopes = envelope.before(position_s, rendered) if envelope else {}
-    return StringFrame(shapes, lowest, highest, caption, position_s > take.info.horizon_s, envelopes)
+    caption = caption_of(position_s, speed, take.horizon_s)
+    return StringFrame(shapes, lowest, highest, caption, envelopes)
+
+
+def caption_of(position_s: float, speed: float, horizon_s: float) -> str:
+    """The time, the speed of slow motion, and that the training ended before."""
+    slow = "" if speed >= 1 else f"   slow motion × {speed:.3f}"
+    return f"{position_s:.3f} s{slow}{'   past training' if position_s > horizon_s else ''}"

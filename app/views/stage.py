@@ -1,9 +1,10 @@
-"""The parts that pictures of string and drum share: backdrop, legend, buttons, and marks of listening points."""
+"""The frame that pictures of string and drum share: backdrop, legend, buttons, and marks of listening points."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import (
@@ -13,6 +14,7 @@ from PySide6.QtGui import (
     QLinearGradient,
     QMouseEvent,
     QPainter,
+    QPaintEvent,
     QPixmap,
     QPolygonF,
     QResizeEvent,
@@ -22,6 +24,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import plain_tip
 from app.views.painting import set_ink, write
 from app.views.plots.legend import paint_sources
 from engine.pluck import DEFAULT_LISTEN
@@ -31,15 +34,42 @@ MARGIN_TOP = 38
 MARGIN_BOTTOM = 40
 LEGEND_Y = 17.5  # the middle of the line above the picture
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
+WORDS_HEIGHT = 29  # pixels of the strip above the picture: legend, warning and buttons
 GRAB_PIXELS = 14  # how near a mark counts as on it
 ARROWS = {Qt.Key.Key_Left: (-1, 0), Qt.Key.Key_Right: (1, 0), Qt.Key.Key_Up: (0, 1), Qt.Key.Key_Down: (0, -1)}
 STEP = 0.01  # of a listening point, for a key
+FINE = 0.1  # of a drag, with Shift
 FOOT = 8.0  # pixels: half the width of a mark
 LABEL_GAP = 8  # pixels between the words of two marks
+SIDES = ("left", "right")
+
+_Shift = Qt.KeyboardModifier.ShiftModifier
+_Control = Qt.KeyboardModifier.ControlModifier
+
+
+@dataclass(frozen=True)
+class StageAxes:
+    """The axes of a picture in a widget of `width` × `height` pixels."""
+
+    width: int
+    height: int
+
+    @property
+    def bottom(self) -> float:
+        """The height at which the feet of listening points stand."""
+        return self.height - MARGIN_BOTTOM
+
+    def x(self, point: float) -> float:
+        """The x of a listening point, in pixels."""
+        raise NotImplementedError
 
 
 class StageView(QWidget):
-    """A picture above the decks. A `side` of the listener is "left" or "right", its points are 0 … 1 across."""
+    """A picture above the decks. A `side` of the listener is "left" or "right", its points are 0 … 1 across.
+
+    A part is what a press would take: a side's mark, or what the picture has. Dragging a mark beneath the picture
+    moves its listening point, with Shift more finely. A double-click resets it.
+    """
 
     listening_point_moved = Signal(str, float)  # side, position
     listening_point_reset = Signal(str)
@@ -47,32 +77,47 @@ class StageView(QWidget):
     drag_ended = Signal()
     motion_toggled = Signal(bool)
 
-    CURSORS: ClassVar[dict[str | None, Qt.CursorShape]]  # by part, without the marks
+    NAME: ClassVar[str]
+    ELSEWHERE: ClassVar[str]  # to which a mark is dragged, after "from"
+    MARK_NAMES: ClassVar[dict[str, str]]  # by side, where there are two
+    CURSORS: ClassVar[dict[str | None, Qt.CursorShape]]  # by part, without the marks; None: on nothing
+    TIPS: ClassVar[dict[str | None, str]]  # the same
 
-    def __init__(self, name: str, tip: str, parent: QWidget | None) -> None:
+    def __init__(self, parent: QWidget | None) -> None:
         super().__init__(parent)
         self.setMinimumSize(480, 112)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setAccessibleName(name)
-        self.setToolTip(tip)
+        self.setAccessibleName(self.NAME)
+        name = self.NAME.lower()
+        mark = f"Drag to hear the {name} from {self.ELSEWHERE}; double-click resets. Shift and arrow keys move it"
+        self._tips = {**self.TIPS, "left": mark, "right": mark.replace("Shift", "Ctrl, Shift")}
+        self.setToolTip(self._tips[None])
         self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
         self._warning, self._grave = "", True
         self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
-        self._drag: str | None = None  # a side, or what else is dragged
+        self._drag: str | None = None  # the part that is dragged
+        self._dragged_at = QPointF()
+        self._dragged_point = 0.0  # that the mark has come to, unlimited
         self._hovered: str | None = None
         self._plain = False
         self._ground_pixmap: QPixmap | None = None
         self._ground_key: tuple[object, ...] = ()
         self._toggles: list[QToolButton] = []
+        self._add_toggle("Motion", f"Show the {name} in motion; off saves processor time (M)", self.motion_toggled)
 
     def _add_toggle(self, text: str, tip: str, toggled: SignalInstance) -> None:
         button = tool_button(text, text, tip, "chip", toggled, checkable=True)
         button.setParent(self)
         button.setCursor(Qt.CursorShape.ArrowCursor)
         self._toggles.append(button)
+
+    @property
+    def axes(self) -> StageAxes:
+        """Places on the picture, in pixels."""
+        raise NotImplementedError
 
     # State
 
@@ -91,10 +136,21 @@ class StageView(QWidget):
             button.setVisible(not plain)
         self.update()
 
+    def set_shown(self, motion: bool, envelope: bool = False) -> None:
+        """Set the state of the buttons; the frames given to `show_frame` should agree with it."""
+        for button, on in zip(self._toggles, (motion, envelope), strict=False):
+            button.setChecked(on)
+        for button in self._toggles[1:]:
+            button.setEnabled(motion)
+
     def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
         """Set the sources that the slots hold; the frames given to `show_frame` should have these motions."""
         self._sources = sources
         self.update()
+
+    def show_frame(self, frame: Any) -> None:
+        """Show a moment of the motion; None: at rest."""
+        raise NotImplementedError
 
     def set_listening_points(self, left: float | None, right: float | None = None) -> None:
         """Set the points where it is heard; None: has no mark, as the right one in mono, or both at a bridge."""
@@ -103,6 +159,40 @@ class StageView(QWidget):
         self.update()
 
     # Gestures
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        part = self._part_at(event.position())
+        if part in self._listening:
+            self._dragged_point = self._listening[part]
+            self._start_drag(part, event.position())
+        else:
+            self._press(part, event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        part = self._part_at(event.position())
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        if part in self._listening:
+            self.listening_point_reset.emit(part)
+        else:
+            self._press_again(part, event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        at = event.position()
+        if self._drag is None:
+            self._hover(self._part_at(at))
+            on_warning = self._warning and at.y() < WORDS_HEIGHT
+            self.setToolTip(plain_tip(self._warning) if on_warning else self._tips[self._hovered])
+            return
+        by = (at - self._dragged_at) * (FINE if event.modifiers() & _Shift else 1.0)
+        self._dragged_at = at
+        if self._drag in SIDES:
+            self._dragged_point += by.x() / (self.axes.x(1.0) - self.axes.x(0.0))
+            self.listening_point_moved.emit(self._drag, min(max(self._dragged_point, 0.0), 1.0))
+        else:
+            self._drag_on(at, by)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
@@ -121,22 +211,47 @@ class StageView(QWidget):
         """Move a listening point by Shift with arrows, reset them by Shift with Delete; others are the picture's."""
         key, modifiers = Qt.Key(event.key()), event.modifiers()
         across, up = ARROWS.get(key, (0, 0))
-        if across and modifiers & Qt.KeyboardModifier.ShiftModifier:
-            self._step_mark(modifiers, across)
-        elif key == Qt.Key.Key_Delete and modifiers & Qt.KeyboardModifier.ShiftModifier:
-            self._reset_marks()
+        if across and modifiers & _Shift:
+            self._step_mark("right" if modifiers & _Control else "left", across)
+        elif key == Qt.Key.Key_Delete and modifiers & _Shift:
+            for side in self._listening:
+                self.listening_point_reset.emit(side)
         elif not self._take_key(key, across, up, modifiers):
             super().keyPressEvent(event)
+
+    def _start_drag(self, part: str, at: QPointF) -> None:
+        self.drag_started.emit()
+        self._drag, self._dragged_at = part, at
+        self.update()
+
+    def _press(self, part: str | None, event: QMouseEvent) -> None:
+        """Take a press on a part of the picture, or on none."""
+        raise NotImplementedError
+
+    def _press_again(self, part: str | None, event: QMouseEvent) -> None:
+        """Take the second press of a double-click."""
+        self._press(part, event)
+
+    def _drag_on(self, at: QPointF, by: QPointF) -> None:
+        """Drag a part of the picture by so many pixels, with Shift fewer than the pointer has gone."""
+
+    def _drop(self, part: str) -> None:
+        """End the drag of a part."""
 
     def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
         """Take a key, of an arrow with its direction; return False where it means nothing here."""
         raise NotImplementedError
 
-    def _drop(self, part: str) -> None:
-        """End the drag of a part."""
-
     def _part_at(self, at: QPointF) -> str | None:
-        """The part that can be grabbed there, of a mark its side; None: none."""
+        """The part that can be grabbed there; None: none."""
+        if at.y() <= self.axes.bottom - 6:
+            return self._picture_part_at(at)
+        near = {side: abs(at.x() - self.axes.x(point)) for side, point in self._listening.items()}
+        side = min(near, key=lambda name: near[name], default=None)
+        return side if side is not None and near[side] < GRAB_PIXELS else None
+
+    def _picture_part_at(self, at: QPointF) -> str | None:
+        """The same above the marks."""
         raise NotImplementedError
 
     def _hover(self, part: str | None) -> None:
@@ -145,28 +260,9 @@ class StageView(QWidget):
             self._hovered = part
             self.update()
 
-    # Marks of listening points
-
-    def _mark_x(self, point: float) -> float:
-        """The x of the mark of a listening point, in pixels."""
-        raise NotImplementedError
-
-    def _mark_under(self, at: QPointF) -> str | None:
-        if at.y() < self.height() - MARGIN_BOTTOM - 6:
-            return None
-        near = {side: abs(at.x() - self._mark_x(point)) for side, point in self._listening.items()}
-        side = min(near, key=lambda name: near[name], default=None)
-        return side if side is not None and near[side] < GRAB_PIXELS else None
-
-    def _step_mark(self, modifiers: Qt.KeyboardModifier, steps: int) -> None:
-        """Move the left mark, with Ctrl the right one."""
-        side = "right" if modifiers & Qt.KeyboardModifier.ControlModifier else "left"
+    def _step_mark(self, side: str, steps: int) -> None:
         if side in self._listening:
             self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
-
-    def _reset_marks(self) -> None:
-        for side in self._listening:
-            self.listening_point_reset.emit(side)
 
     # Painting
 
@@ -181,11 +277,49 @@ class StageView(QWidget):
             button.setGeometry(right, 6, size.width(), theme.px(22))
             right -= 6
 
+    def paintEvent(self, event: QPaintEvent) -> None:
+        axes = self.axes
+        below = event.rect().bottom() > axes.bottom  # what lies there is painted again
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._backdrop())
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._paint_picture(painter)
+        labels = []
+        for side, point in self._listening.items():
+            x, grabbed = axes.x(point), side in (self._drag, self._hovered)
+            self._paint_listening_line(painter, x, theme.translucent(theme.GOOD, 190 if grabbed else 120))
+            if below:
+                paint_mark(painter, x, axes.bottom, grabbed)
+            name = "listen" if len(self._listening) == 1 else self.MARK_NAMES[side]
+            labels.append((x, f"{name} {self._point_words(point)}"))
+        if below and labels:
+            paint_labels(painter, labels, axes.width, axes.bottom)
+        self._paint_over(painter)
+
+    def _backdrop(self) -> QPixmap:
+        """The picture behind all that moves."""
+        return self._ground()
+
+    def _paint_picture(self, painter: QPainter) -> None:
+        """Paint string or drum."""
+        raise NotImplementedError
+
+    def _paint_listening_line(self, painter: QPainter, x: float, colour: QColor) -> None:
+        """Paint the line from the picture to the mark of a listening point."""
+        raise NotImplementedError
+
+    def _point_words(self, point: float) -> str:
+        """The words for a listening point at its mark."""
+        raise NotImplementedError
+
+    def _paint_over(self, painter: QPainter) -> None:
+        """Paint what lies above the marks."""
+
     def _paint_ground(self, painter: QPainter) -> None:
         """Paint the ground behind the motion, on the backdrop."""
 
-    def _ground_of(self, *chosen: object) -> QPixmap:
-        """The picture behind the motion, painted again only when something in it changes, as `chosen`."""
+    def _ground(self, *chosen: object) -> QPixmap:
+        """The backdrop and the ground on it, painted again only when something in them changes, as `chosen`."""
         key = (
             self.size(),
             self.devicePixelRatioF(),
@@ -258,6 +392,12 @@ def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> Non
     painter.drawPolygon(
         QPolygonF([QPointF(x, bottom + 2), QPointF(x - FOOT, bottom + 15), QPointF(x + FOOT, bottom + 15)])
     )
+
+
+def paint_caption(painter: QPainter, place: QRectF, text: str) -> None:
+    """Paint the time that is shown, at the right of its place."""
+    align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+    write(painter, place, text, theme.TEXT, theme.small_font(12), align, place.width())
 
 
 def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: float, bottom: float) -> None:

@@ -9,7 +9,7 @@ from typing import Literal
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainterPath
 
-from app.views.stage import MARGIN_BOTTOM, MARGIN_TOP, MARGIN_X
+from app.views.stage import MARGIN_TOP, MARGIN_X, StageAxes
 
 Shape = Literal["circle", "rectangle", "bar"]
 Place = tuple[float, float]
@@ -19,26 +19,20 @@ FLATTEST = 0.12  # height of a picture, of its width: a bar is narrower
 
 
 @dataclass(frozen=True)
-class HeadAxes:
-    """Pictures of one drum, side by side, in a widget of `width` × `height` pixels.
+class HeadAxes(StageAxes):
+    """Pictures of one drum, side by side.
 
-    Places are given from the centre, in half-lengths, and y points up. Listening points are 0 … 1 from left to right.
+    Places are given from the centre, in half-lengths, and y points up. Listening points are 0 … 1 from left to right,
+    beneath the first picture.
 
     Attributes:
         sides: length and width of the drum, in any unit.
         heads: how many pictures there are.
     """
 
-    width: int
-    height: int
     shape: Shape = "circle"
     sides: tuple[float, float] = (1.0, 1.0)
     heads: int = 1
-
-    @property
-    def bottom(self) -> float:
-        """The height at which the feet of listening points stand."""
-        return self.height - MARGIN_BOTTOM
 
     def rect(self, head: int) -> QRectF:
         """The place of a picture."""
@@ -81,11 +75,6 @@ class HeadAxes:
         away = math.hypot(x, y) if self.shape == "circle" else max(abs(x), abs(y))
         return away <= RIM
 
-    def x(self, head: int, point: float) -> float:
-        """The horizontal position of a listening point, in pixels."""
-        area = self.rect(head)
+    def x(self, point: float) -> float:
+        area = self.rect(0)
         return area.left() + point * area.width()
-
-    def point(self, head: int, x: float) -> float:
-        area = self.rect(head)
-        return (x - area.left()) / area.width()

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPen
+from PySide6.QtGui import QColor, QImage, QPainter
 
-from app.session.shown import ShownSource, readable_unit
+from app.session.shown import readable_unit
 from app.views import theme
 from app.views.drum.axes import HeadAxes, Place
-from app.views.stage import MARGIN_X, paint_labels, paint_mark
+from app.views.painting import set_ink, write
+from app.views.stage import MARGIN_X
 
 COLOURS = 511  # odd: the middle one is rest
 STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # of a colour scale, in each decade
@@ -87,18 +88,17 @@ def paint_rest(painter: QPainter, axes: HeadAxes, head: int) -> None:
     painter.fillPath(axes.outline(head), QColor(theme.PANEL))
 
 
-def paint_edge(painter: QPainter, axes: HeadAxes, head: int, source: ShownSource | None) -> None:
+def paint_edge(painter: QPainter, axes: HeadAxes, head: int, source: str) -> None:
     """Paint the edge in the colour of its source; a bar is held at its ends alone."""
-    colour = theme.FAINT if source is None else theme.SOURCE_COLOURS[theme.source_kind(source.source)]
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(QPen(QColor(colour), 2.5))
+    colour = theme.SOURCE_COLOURS[theme.source_kind(source)]
     if axes.shape != "bar":
+        set_ink(painter, colour, 2.5)
         painter.drawPath(axes.outline(head))
         return
     area = axes.rect(head)
-    painter.setPen(QPen(theme.translucent(colour, 110), 1))
+    set_ink(painter, theme.translucent(colour, 110))
     painter.drawRect(area)
-    painter.setPen(QPen(QColor(colour), 4))
+    set_ink(painter, colour, 4)
     for x in (area.left(), area.right()):
         painter.drawLine(QLineF(x, area.top() - 3, x, area.bottom() + 3))
 
@@ -107,34 +107,19 @@ def paint_scale(painter: QPainter, axes: HeadAxes, head: int, scale_m: float) ->
     """Paint the value of the strongest colours below a picture."""
     factor, unit = readable_unit(scale_m, "displacement")
     area = axes.rect(head)
-    painter.setFont(theme.small_font(10))
-    painter.setPen(QColor(theme.FAINT))
     place = QRectF(area.left(), area.bottom() + 4, area.width(), 16)
-    painter.drawText(place, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop, f"± {factor * scale_m:g} {unit}")
+    align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
+    write(painter, place, f"± {factor * scale_m:g} {unit}", theme.FAINT, theme.small_font(10), align)
 
 
 def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
     """Paint the place of the strike, a ring with a dot; `clear` with the keyboard or the pointer on the drum."""
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(QPen(QColor(theme.BACKGROUND), 3.5))
-    painter.drawEllipse(at, PLACE_RADIUS, PLACE_RADIUS)
-    painter.setPen(QPen(theme.translucent(theme.TEXT, 255 if clear else 150), 1.5))
-    painter.drawEllipse(at, PLACE_RADIUS, PLACE_RADIUS)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.translucent(theme.TEXT, 255 if clear else 150))
+    colour = theme.translucent(theme.TEXT, 255 if clear else 150)
+    for ring, width in ((theme.BACKGROUND, 3.5), (colour, 1.5)):
+        set_ink(painter, ring, width)
+        painter.drawEllipse(at, PLACE_RADIUS, PLACE_RADIUS)
+    set_ink(painter, fill=colour)
     painter.drawEllipse(at, 1.8, 1.8)
-
-
-def paint_listening(painter: QPainter, axes: HeadAxes, points: Mapping[str, float], grabbed: str | None) -> None:
-    """Paint the directions that the drum is heard from, as feet below the first picture, with their angles."""
-    for side, point in points.items():
-        x, y = axes.x(0, point), axes.bottom
-        painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if side == grabbed else 120), 1))
-        painter.drawLine(QLineF(x, y - 8, x, y + 2))
-        paint_mark(painter, x, y, side == grabbed)
-    names = {side: "listen" if len(points) == 1 else f"{side[0].upper()}:" for side in points}
-    labels = [(axes.x(0, point), f"{names[side]} {angle_words(point)}") for side, point in points.items()]
-    paint_labels(painter, labels, axes.width, axes.bottom)
 
 
 def angle_words(point: float) -> str:
@@ -145,22 +130,12 @@ def angle_words(point: float) -> str:
     return f"{abs(degrees)}° {'left' if degrees < 0 else 'right'}"
 
 
-def paint_caption(painter: QPainter, axes: HeadAxes, text: str) -> None:
-    """Paint the time that is shown, in the lower right corner."""
-    painter.setFont(theme.small_font(12))
-    painter.setPen(QColor(theme.TEXT))
-    area = QRectF(MARGIN_X, axes.height - 22, axes.width - 2 * MARGIN_X, 18)
-    painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
-
-
-def paint_name(painter: QPainter, axes: HeadAxes, text: str, points: Mapping[str, float]) -> None:
+def paint_name(painter: QPainter, axes: HeadAxes, text: str, points: Iterable[float]) -> None:
     """Paint the drum's name in the lower left corner, as far as the words of the listening points."""
-    painter.setFont(theme.small_font(12))
-    painter.setPen(QColor(theme.FAINT))
-    first = min((axes.x(0, point) for point in points.values()), default=float(axes.width))
+    first = min(map(axes.x, points), default=float(axes.width))
     room = max(axes.rect(0).left() - MARGIN_X / 2, first - theme.px(FOOT_WORDS) - MARGIN_X / 2, 0.0)
-    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
-    painter.drawText(QRectF(MARGIN_X / 2, axes.height - 22, room, 18), Qt.AlignmentFlag.AlignVCenter, cut)
+    place = QRectF(MARGIN_X / 2, axes.height - 22, room, 18)
+    write(painter, place, text, theme.FAINT, theme.small_font(12), Qt.AlignmentFlag.AlignVCenter, room)
 
 
 def place_words(place: Place) -> str:

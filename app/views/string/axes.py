@@ -11,19 +11,17 @@ from pyqtgraph.functions import create_qpolygonf, ndarray_from_qpolygonf
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QPolygonF
 
-from app.views.stage import MARGIN_BOTTOM, MARGIN_TOP, MARGIN_X
+from app.views.stage import MARGIN_TOP, MARGIN_X, StageAxes
 
 
 @dataclass(frozen=True)
-class StringAxes:
-    """The axes in a widget of `width` × `height` pixels; `span_mm` is the half height.
+class StringAxes(StageAxes):
+    """The axes of a string; `span_mm` is the half height.
 
     Positions are shares of the string's length, 0 … 1. `x`, `y` and `at` give pixels of the widget, `position` and
     `displacement_mm` are their inverses.
     """
 
-    width: int
-    height: int
     span_mm: float
 
     @property
@@ -36,10 +34,6 @@ class StringAxes:
         return MARGIN_TOP
 
     @property
-    def bottom(self) -> float:
-        return self.height - MARGIN_BOTTOM
-
-    @property
     def middle(self) -> float:
         return (self.top + self.bottom) / 2
 
@@ -47,8 +41,8 @@ class StringAxes:
     def half_height(self) -> float:
         return max(1.0, (self.bottom - self.top) / 2)
 
-    def x(self, position: float) -> float:
-        return MARGIN_X + position * self.length
+    def x(self, point: float) -> float:
+        return MARGIN_X + point * self.length
 
     def y(self, displacement_mm: float) -> float:
         return self.middle - displacement_mm / self.span_mm * self.half_height

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from PySide6.QtCore import QLineF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QPainter, QPen
+from PySide6.QtGui import QBrush, QFontMetrics, QPainter
 
 from app.views import theme
+from app.views.painting import set_ink, write
 from app.views.stage import MARGIN_X
 from app.views.string.axes import StringAxes
 
@@ -44,7 +45,7 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | N
 
 def paint_grid(painter: QPainter, axes: StringAxes) -> None:
     """Tenths of the string and the scale's lines."""
-    painter.setPen(QPen(theme.translucent(theme.LINE, 120), 1))
+    set_ink(painter, theme.translucent(theme.LINE, 120))
     painter.drawLines(_grid(axes))
 
 
@@ -61,20 +62,15 @@ def _grid(axes: StringAxes) -> list[QLineF]:
 
 
 def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
-    painter.setFont(theme.small_font(10))
-    painter.setPen(QColor(theme.FAINT))
+    align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
     for share in scale(axes):
-        y = axes.middle - share * axes.half_height
-        painter.drawText(
-            QRectF(0, y - 8, MARGIN_X - 8, 16),
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-            f"{share * axes.span_mm:+g}" if share else "0 mm",
-        )
+        place = QRectF(0, axes.middle - share * axes.half_height - 8, MARGIN_X - 8, 16)
+        words = f"{share * axes.span_mm:+g}" if share else "0 mm"
+        write(painter, place, words, theme.FAINT, theme.small_font(10), align)
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.SHADE))
+    set_ink(painter, fill=theme.SHADE)
     painter.drawRect(area)
     painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
     painter.drawRect(area)
@@ -85,19 +81,19 @@ def _paint_untrained_positions(
 ) -> None:
     low, high = trained
     height = axes.bottom - axes.top
+    font = theme.small_font(11)
     lines = ("not trained here", f"only plucks at {low:g} … {high:g}") if words else ()
     for start, stop in ((0.0, low), (high, 1.0)):
         if stop <= start:
             continue
         area = QRectF(axes.x(start), axes.top, axes.x(stop) - axes.x(start), height)
         _shade(painter, area)
-        painter.setFont(theme.small_font(11))
         for row, text in enumerate(lines):
-            painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
             line = area.adjusted(4, 0, -4, -8 - theme.px(LINE_HEIGHT) * (1 - row))
-            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < theme.px(LINE_HEIGHT):
+            if QFontMetrics(font).horizontalAdvance(text) > line.width() or line.height() < theme.px(LINE_HEIGHT):
                 continue  # the hatching says it
-            painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
+            colour = theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190)
+            write(painter, line, text, colour, font, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
 
 
 def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int) -> None:
@@ -114,6 +110,5 @@ def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: Tr
         area = QRectF(axes.at(left, top_mm), axes.at(right, bottom_mm))
         _shade(painter, area)
         if area.height() >= theme.px(LINE_HEIGHT):
-            painter.setFont(theme.small_font(11))
-            painter.setPen(theme.translucent(theme.TEXT, 190))
-            painter.drawText(area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter, text)
+            line, align = area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter
+            write(painter, line, text, theme.translucent(theme.TEXT, 190), theme.small_font(11), align)

@@ -9,10 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLine, QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPen, QPolygonF
 
 from app.analysis.moment import Band, StringFrame
 from app.views import theme
+from app.views.painting import set_ink, write
 from app.views.string.axes import StringAxes
 from app.views.string.ground import paint_grid
 
@@ -51,16 +52,16 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front:
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
     for name in order:
         for far, share in GLOW if glows else ():
-            painter.setPen(QPen(theme.blended(_hue(name), theme.PANEL, share), 1))
+            set_ink(painter, theme.blended(_hue(name), theme.PANEL, share))
             for shift in (-far, far):
                 painter.drawPolyline(axes.curve(frame.shapes[name]).translated(0, shift))
-        painter.setPen(QPen(QColor(_hue(name)), 1))
+        set_ink(painter, _hue(name))
         curve = axes.curve(frame.shapes[name])
         for shift in (-0.8, 0.0, 0.8) if name == front else (-0.4, 0.4):  # wider pens are ten times slower
             painter.drawPolyline(curve.translated(0, shift))
     for name in order[:-1]:
         pieces = _hidden_pieces(axes, frame.shapes[name], frame.shapes[order[-1]])
-        painter.setPen(QPen(QColor(_hue(name)), 1))
+        set_ink(painter, _hue(name))
         for shift in (-0.6, 0.6) if pieces else ():
             painter.translate(0, shift)
             painter.drawLines(pieces)
@@ -97,13 +98,11 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
     """Paint an opaque area with thin edges, which show its extent where another band covers it in part."""
     colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.blended(colour, theme.PANEL, strength))
+    set_ink(painter, fill=theme.blended(colour, theme.PANEL, strength))
     area, *edges = axes.band(*band)
     painter.drawPolygon(area)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(QPen(theme.blended(colour, theme.PANEL, 3 * strength), 1))
+    set_ink(painter, theme.blended(colour, theme.PANEL, 3 * strength))
     for edge in edges:
         painter.drawPolyline(edge)
 
@@ -117,8 +116,7 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
     fill = QLinearGradient(0, axes.y(pluck.amplitude_mm), 0, axes.middle)
     fill.setColorAt(0, theme.translucent(theme.TEXT, 60))
     fill.setColorAt(1, theme.translucent(theme.TEXT, 0))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(fill)
+    set_ink(painter, fill=fill)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.drawPolygon(area)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
@@ -129,55 +127,40 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
     """Paint the handle: `full` on a string at rest, else a ring; with its values where it is full or grabbed."""
-    painter.setPen(Qt.PenStyle.NoPen)
     if grabbed:
-        painter.setBrush(theme.translucent(theme.TEXT, 50))
+        set_ink(painter, fill=theme.translucent(theme.TEXT, 50))
         painter.drawEllipse(at, 2 * HANDLE_RADIUS, 2 * HANDLE_RADIUS)
     solid = full or grabbed
-    painter.setPen(QPen(QColor(theme.BACKGROUND if solid else theme.FAINT), 2))
-    painter.setBrush(QColor(theme.TEXT) if solid else QColor(0, 0, 0, 90))
+    set_ink(painter, theme.BACKGROUND if solid else theme.FAINT, 2, theme.TEXT if solid else QColor(0, 0, 0, 90))
     painter.drawEllipse(at, HANDLE_RADIUS, HANDLE_RADIUS)
     if not solid:
         return
-    painter.setBrush(QColor(theme.BACKGROUND))
-    painter.setPen(Qt.PenStyle.NoPen)
+    set_ink(painter, fill=theme.BACKGROUND)
     painter.drawEllipse(at, 2.2, 2.2)
     words = f"at {pluck.position:.2f}   {pluck.amplitude_mm:.1f} mm"
     if pluck.label:
         words += f"   {pluck.label}"
-    painter.setFont(theme.small_font(12))
-    length = painter.fontMetrics().horizontalAdvance(words)
+    font = theme.small_font(12)
+    length = QFontMetrics(font).horizontalAdvance(words)
     beside = at.x() + 22 if at.x() + 22 + length < right else at.x() - 22 - length
     plate = QRectF(beside - 6, at.y() - 11, length + 12, 22)
-    painter.setBrush(theme.translucent(theme.RAISED, 220))
+    set_ink(painter, fill=theme.translucent(theme.RAISED, 220))
     painter.drawRoundedRect(plate, 4, 4)
-    painter.setPen(QColor(theme.TEXT))
-    painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, words)
+    write(painter, plate, words, theme.TEXT, font)
 
 
 def paint_ends(painter: QPainter, axes: StringAxes) -> None:
     """Paint the places where the string is fixed."""
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.FAINT))
+    set_ink(painter, fill=theme.FAINT)
     for x in (axes.x(0), axes.x(1)):
         painter.drawRoundedRect(QRectF(x - 3, axes.middle - 22, 6, 44), 3, 3)
 
 
-def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, grabbed: bool) -> None:
-    x = axes.x(position)
+def paint_listening_line(painter: QPainter, axes: StringAxes, x: float, colour: QColor) -> None:
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-    painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
+    set_ink(painter, colour)
     painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-
-
-def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
-    """Paint the time that is shown, in the corner of the picture."""
-    painter.setFont(theme.small_font(12))
-    painter.setPen(QColor(theme.TEXT))
-    area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
-    text = frame.caption + ("   past training" if frame.past_horizon else "")
-    painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
 
 
 def _hue(source: str) -> str:

@@ -19,21 +19,30 @@ from threadpoolctl import threadpool_limits
 
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Choices, Session
+from app.session.choices import Choices, Session, ShownString
+from app.session.listener import Listener
+from app.session.monitor import Monitor
 from app.session.shown import ShownSource, full_scale_words, shown_sources
+from app.session.silence import why_silent
 from app.shared.worker import Job, Work
 from app.views.background import Background
 from app.views.controls.parts import lay_out_alone, words_label
 from app.views.controls.plain import Label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.drum.view import DrumView
 from app.views.stage import StageView
-from app.views.string.view import StringView
 
 Location = Literal["stage", "left", "right"]
 LEAST_HEIGHT = 84  # pixels
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
 UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
+STAGE_FIELDS = {  # of `Choices`: what a picture above the decks depends on
+    "face",
+    "preset",
+    "volume_db",
+    *ShownString.model_fields,
+    *Listener.model_fields,
+    *Monitor.model_fields,
+}
 
 
 @dataclass(frozen=True)
@@ -261,7 +270,15 @@ class ComputedPanel(Panel):
 class StagePanel(Panel):
     """The picture of the string or the drum, above the decks; in Play of the audible source alone."""
 
-    view: StringView | DrumView
+    view: StageView
+
+    def __init__(self, session: Session, library: Library, view: StageView) -> None:
+        super().__init__(session, library)
+        self.view = view
+        lay_out_alone(self, view)
+        view.listening_point_moved.connect(self._move_listening_point)
+        view.listening_point_reset.connect(self._reset_listening_point)
+        view.motion_toggled.connect(lambda on: session.update(motion=on))
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:
@@ -269,33 +286,35 @@ class StagePanel(Panel):
         sources = shown_sources(self.session.choices, self.library)
         return tuple(source for source in sources if source.heard or self.session.choices.face != "play")
 
-    def _show_sources(self) -> None:
-        self.view.set_plain(self.session.choices.face == "play")
-        self.view.set_sources(self._sources)
+    def _warning(self) -> tuple[str, bool]:
+        """The reason why nothing is heard, or what is wrong with it; and True if that is a warning."""
+        return why_silent(self.session.choices, self.library), True
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        choices, view = self.session.choices, self.view
+        if names & STAGE_FIELDS:
+            view.set_plain(choices.face == "play")
+            view.set_sources(self._sources)
+            left, right = choices.listen, choices.listen_right if choices.stereo else None
+            at_bridge = self.of_strings and choices.pickup == "bridge"
+            view.set_listening_points(*((None, None) if at_bridge else (left, right)))
+            view.set_warning(*self._warning())
+        if names & {"motion", "envelope"}:
+            view.set_shown(choices.motion, choices.envelope)
 
     def _draw_moment(self, moment: Moment) -> None:
         choices = self.session.choices
         if not self._is_new(*moment.standing(choices)) and not moment.playing:
             return
-        if moment.in_motion(choices):
-            self._draw_motion(moment)
-        else:
-            self.view.show_frame(None)
+        self.view.show_frame(self._frame(moment) if moment.in_motion(choices) else None)
 
-    def _draw_motion(self, moment: Moment) -> None:
-        """Draw the string or the drum as it moves now."""
+    def _frame(self, moment: Moment) -> object:
+        """The string or the drum as it moves now; None: at rest."""
         raise NotImplementedError
-
-    def _put_on_stage(self, view: StageView) -> None:
-        """Lay out the picture, and let its gestures change the listening points."""
-        lay_out_alone(self, view)
-        view.listening_point_moved.connect(self._move_listening_point)
-        view.listening_point_reset.connect(self._reset_listening_point)
-        view.motion_toggled.connect(lambda on: self.session.update(motion=on))
 
     def _move_listening_point(self, side: str, point: float) -> None:
         if side == "right":
-            self.session.update(listen_right=min(max(point, 0.0), 1.0))
+            self.session.update(listen_right=point)
         else:
             self.session.move_listening_point(point)
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
+from app.analysis.moment import caption_of
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
 from app.session.choices import Session
-from app.session.listener import Listener
-from app.session.shown import LEGEND_FIELDS, ShownSource
-from app.session.silence import why_silent
+from app.session.shown import ShownSource
 from app.shared.key_names import note_name
 from app.shared.vocabulary import DIFFERENCE
 from app.views.drum.axes import Place
@@ -34,9 +33,7 @@ class DrumPanel(StagePanel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.view = DrumView()
-        self._put_on_stage(self.view)
+        super().__init__(session, library, DrumView())
         self.view.struck.connect(self._strike)
         self.view.place_moved.connect(lambda x, y: self._aim((x, y)))
         self.view.place_reset.connect(self._reset_place)
@@ -50,16 +47,9 @@ class DrumPanel(StagePanel):
         return self._place
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        choices = self.session.choices
-        if names & {"patch", "single"} and choices.drums is not None and self._key is not None:
+        if names & {"patch", "single"} and self._drum is not None and self._key is not None:
             self.show_key(self._key)
-        if names & {"face", "volume_db", *LEGEND_FIELDS}:
-            self._show_sources()
-            self.view.set_warning(why_silent(choices, self.library))
-        if names & Listener.model_fields.keys():
-            self.view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
-        if "motion" in names:
-            self.view.set_motion(choices.motion)
+        super().choices_changed(names)
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:
@@ -82,19 +72,17 @@ class DrumPanel(StagePanel):
             self._aim(place or drum.place)
         self._shown = drum
 
-    def _draw_motion(self, moment: Moment) -> None:
+    def _frame(self, moment: Moment) -> HeadFrame | None:
         blow, choices = moment.blow, self.session.choices
         if blow is None or not self._looks_like(blow):
-            self.view.show_frame(None)
-            return
+            return None
         position_s = min(moment.position_s, blow.ready_s)  # the sound may be ahead of the motions: all at one time
         pictures = {}
         for source in self._sources:
             amplitudes = blow.modal_m(source.source, position_s, choices.speed)
             if amplitudes is not None:
                 pictures[source.source] = blow.head.picture(amplitudes)
-        slow = "" if choices.speed >= 1 else f"   slow motion × {choices.speed:.3f}"
-        self.view.show_frame(HeadFrame(pictures, f"{position_s:.3f} s{slow}"))
+        return HeadFrame(pictures, caption_of(position_s, choices.speed, blow.horizon_s))
 
     def _looks_like(self, blow: BlowTake) -> bool:
         """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""

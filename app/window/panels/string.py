@@ -6,17 +6,14 @@ import math
 from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
-from app.analysis.moment import Envelope, frame_at
+from app.analysis.moment import Envelope, StringFrame, frame_at
 from app.instrument.facts import by_two_numbers, outside_of_string
 from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
 from app.session.choices import Choices, Session, ShownString
-from app.session.listener import Listener
-from app.session.monitor import Monitor
-from app.session.shown import LEGEND_FIELDS
-from app.session.silence import why_difference_silent, why_silent
+from app.session.silence import why_difference_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
 from app.views.string.ground import TrainedPlucks
@@ -24,14 +21,13 @@ from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from app.window.panels.base import Moment, StagePanel
 from engine.bounds import WIDTH_RANGE
-from engine.pluck import SHAPES, Pluck
-from engine.presets import PresetInfo, outside_training
+from engine.pluck import SHAPES
+from engine.presets import outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
 PLUCK_FIELDS = {"preset", *ShownString.model_fields}
-WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.model_fields}
 
 
 class StringPanel(StagePanel):
@@ -45,9 +41,7 @@ class StringPanel(StagePanel):
     )
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.view = StringView()
-        self._put_on_stage(self.view)
+        super().__init__(session, library, StringView())
         self.view.pluck_drawn.connect(session.move_pluck)
         self.view.pluck_released.connect(self.pluck_asked)
         self.view.pluck_reset.connect(self._reset_pluck)
@@ -59,17 +53,10 @@ class StringPanel(StagePanel):
         self._judged: Listened | None = None  # the signals for which the warning was last set
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        choices = self.session.choices
         if names & PLUCK_FIELDS:
             self._take = None
-        if names & WARNING_FIELDS:
             self._show_pluck()
-        if names & {"face", *LEGEND_FIELDS}:
-            self._show_sources()
-        if "face" in names:
-            self.view.set_warning(*self._pluck_warning())
-        if names & {"motion", "envelope"}:
-            self.view.set_shown(choices.motion, choices.envelope)
+        super().choices_changed(names)
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
@@ -77,17 +64,16 @@ class StringPanel(StagePanel):
 
     def take_finished(self, take: Take) -> None:
         self._take = take
-        self.view.set_warning(*self._pluck_warning())
+        self.view.set_warning(*self._warning())
 
     def show_moment(self, moment: Moment) -> None:
         self._judge()
         super().show_moment(moment)
 
-    def _draw_motion(self, moment: Moment) -> None:
+    def _frame(self, moment: Moment) -> StringFrame | None:
         choices, take = self.session.choices, moment.take
         if take is None:
-            self.view.show_frame(None)
-            return
+            return None
         motions = [HeardMotion(take.motions, s.source, s.gain) for s in self._sources]
         rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
@@ -96,30 +82,29 @@ class StringPanel(StagePanel):
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
             frame = replace(frame, caption=f"all modes, although mode {choices.solo} is soloed   {frame.caption}")
-        self.view.show_frame(frame)
+        return frame
 
     def _judge(self) -> None:
         """Set the warning again once the signals are complete: only then is a silent difference known."""
         take = self._take
         if take is not None and take.listened is not self._judged and take.listened.complete:
             self._judged = take.listened
-            self.view.set_warning(*self._pluck_warning())
+            self.view.set_warning(*self._warning())
 
     def _show_pluck(self) -> None:
         choices = self.session.choices
-        entry = self.library.find(self.session.choices.preset)
-        view = self.view
+        entry = self.library.find(choices.preset)
         shape_mm = choices.pluck.displacement(SHAPE_POINTS) * MM
-        view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
-        left, right = choices.listen, choices.listen_right if choices.stereo else None
-        view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))
-        view.set_trained(_trained_plucks(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
-        view.set_warning(*self._pluck_warning())
+        self.view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
+        trained = TrainedPlucks()
+        if entry is not None:
+            info = info_of(choices, entry)
+            trained = TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(choices.pluck))
+        self.view.set_trained(trained)
 
-    def _pluck_warning(self) -> tuple[str, bool]:
-        """The reason why nothing is heard, or what lies outside the training; and True if that is a warning."""
+    def _warning(self) -> tuple[str, bool]:
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
-        silent = why_silent(choices, self.library)
+        silent = super()._warning()[0]
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
         if silent or choices.face == "play" or entry is None:
@@ -158,7 +143,3 @@ def outside_of_shown(choices: Choices, entry: PresetEntry) -> str:
 def _label(choices: Choices) -> str:
     words = shape_word(choices.shape)
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
-
-
-def _trained_plucks(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
-    return TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(pluck))

@@ -40,8 +40,8 @@ def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
     assert frame.shapes["truth"][50] == pytest.approx(expected, abs=0.02)
     assert frame.highest["truth"][50] == pytest.approx(1.0, abs=0.02)
     assert frame.lowest["model"][50] == pytest.approx(-0.5, abs=0.02)
-    assert frame.past_horizon
-    assert not frame_at(take, both(take), 0.05, 1.0).past_horizon
+    assert frame.caption.endswith("past training")
+    assert frame_at(take, both(take), 0.05, 1.0).caption == "0.050 s"
 
 
 def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None:

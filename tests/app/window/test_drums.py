@@ -257,8 +257,8 @@ def test_a_dragged_mark_changes_the_sound_and_a_seek_keeps_the_picture(toms: Win
     take = whole(toms)
     above, motion = take.listened.signals["model"].read().copy(), take.motions["model"].size_m.copy()
     axes = view.axes
-    foot = QPoint(round(axes.x(0, 0.5)), round(axes.bottom) + 8)
-    toms.drag(view, foot, QPoint(round(axes.x(0, 0.97)), foot.y()))
+    foot = QPoint(round(axes.x(0.5)), round(axes.bottom) + 8)
+    toms.drag(view, foot, QPoint(round(axes.x(0.97)), foot.y()))
     assert toms.choices.listen == pytest.approx(0.97, abs=0.02) == toms.patch.pickup.points[0]
     ear = toms.choices.ear
     toms.wait(lambda: take.listened.ear == ear and take.listened.complete)

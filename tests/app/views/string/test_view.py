@@ -9,10 +9,11 @@ from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
+from app.views.stage import WORDS_HEIGHT
 from app.views.string.axes import StringAxes
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
-from app.views.string.view import WORDS_HEIGHT, StringView
+from app.views.string.view import StringView
 from tests.app.gestures import (
     CONTROL,
     LEFT,
