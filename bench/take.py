@@ -13,7 +13,7 @@ from typing import Any
 
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
-from app.rendering.job import PluckJob
+from app.rendering.job import RenderJob
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
 from engine.values.ear import Ear
@@ -72,8 +72,8 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     sources = Sources()
     request = RenderRequest(path, Pluck(), SECONDS, EARS[0], SPEED)
-    _finish(PluckJob(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
-    job = PluckJob(request, sources.load, _Nobody(), helper)
+    _finish(RenderJob(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
+    job = RenderJob(request, sources.load, _Nobody(), helper)
     rendered_s, _ = _finish(job)
     take = job.take
     assert take is not None
@@ -86,7 +86,7 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     return TakeCost(path.stem, SECONDS, take.frames_hz, rendered_s, megabytes, moved_s, moved_wall_s)
 
 
-def _finish(job: PluckJob) -> tuple[float, float]:
+def _finish(job: RenderJob) -> tuple[float, float]:
     """Finish the job; return processor time and wall-clock time in s."""
     began_s, began_wall_s = time.process_time(), time.perf_counter()
     while not job.idle:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points 
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
+FRAMES_OF_FLASH = RATE_HZ // FLASH_HZ
+TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,8 @@ class BlowRequest:
     strike: Strike
     seconds: float
     ear: Ear
+    speed: ClassVar = 1.0  # slow motion needs nothing rendered
+    others: ClassVar[tuple[Path, ...]] = ()
 
     def same_motion(self, other: object) -> bool:
         """Return True if model and truth move alike: only listening points may differ."""
@@ -117,24 +122,51 @@ _heads: deque[tuple[Array, Head]] = deque(maxlen=MOST_HEADS)  # the worker's
 class ModalMotion:
     """The lowest modes of one source at flashes, which grow.
 
+    A mode's angle follows from its amplitude and speed, its speed at a frame from the frames beside it.
+
     Attributes:
+        size_m, angle: of the modes at flashes, (flashes, modes): amplitude, and what it has turned through.
         ready: flashes so far.
+        ready_frames: so far; the first is at the blow, at rest.
+        block_m: the latest frames, (frames, modes), of all modes.
     """
 
-    def __init__(self, flashes: int, modes: int) -> None:
-        self.flashes, self.ready = flashes, 0
-        self.size_m = np.zeros((flashes, modes))
-        self.angle = np.zeros((flashes, modes))
+    def __init__(self, seconds: float, omega: Array) -> None:
+        self.flashes = int(seconds * FLASH_HZ) + 1
+        self.ready, self.ready_frames = 0, 1
+        self.size_m = np.zeros((self.flashes, len(omega)))
+        self.angle = np.zeros((self.flashes, len(omega)))
+        self.block_m = np.zeros((0, len(omega)))
+        self._turn = omega / RATE_HZ
+        most = max(1.0, math.tau / TURNS / float(self._turn[-1]))
+        steps = [step for step in range(1, FRAMES_OF_FLASH + 1) if FRAMES_OF_FLASH % step == 0 and step <= most]
+        self._step = steps[-1]  # frames from one whose angle is computed to the next
+        self._known = 0  # frames whose angles are known, as far as they are computed
+        self._last = np.zeros((1, len(omega)))  # the last two frames, of which the second has no angle yet
+        self._wrapped = self._angle = np.zeros(len(omega))  # the last angle, within a turn and as it has grown
 
-    def append(self, size_m: Array, angle: Array) -> None:
-        """The next flashes, of the modes that move; flashes after the last are left out."""
-        first, moving = self.ready, size_m.shape[1]
-        stop = min(first + len(size_m), self.flashes)
-        self.size_m[first:stop, :moving], self.angle[first:stop, :moving] = (
-            size_m[: stop - first],
-            angle[: stop - first],
-        )
-        self.ready = stop
+    def append(self, block_m: Array) -> None:
+        """The next frames, (frames, all modes)."""
+        q = block_m[:, : len(self._turn)]
+        before_m = self._last if len(self._last) == 2 else np.concatenate([-q[:1], self._last])  # odd about the blow
+        q = np.concatenate([before_m, q])
+        first, stop = self._known, self._known + len(q) - 2
+        numbers = np.arange(-(-first // self._step) * self._step, stop, self._step)
+        indices = numbers - first + 1
+        swing = (q[indices + 1] - q[indices - 1]) / (2 * np.sin(self._turn))  # v/ω
+        size_m, angle = np.hypot(q[indices], swing), np.arctan2(-swing, q[indices])
+        if len(numbers):
+            before = angle[0] if first == 0 else self._wrapped
+            steps = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
+            angles = (before if first == 0 else self._angle) + np.cumsum(steps, axis=0)
+            self._wrapped, self._angle = angle[-1], angles[-1]
+            flash = numbers % FRAMES_OF_FLASH == 0
+            count = min(int(flash.sum()), self.flashes - self.ready)  # those after the last are left out
+            flashes = slice(self.ready, self.ready + count)
+            self.size_m[flashes], self.angle[flashes] = size_m[flash][:count], angles[flash][:count]
+            self.ready += count
+        self._known, self._last, self.block_m = stop, q[-2:], block_m
+        self.ready_frames += len(block_m)
 
 
 class BlowTake(Sounding):
@@ -146,11 +178,10 @@ class BlowTake(Sounding):
 
     Attributes:
         head: the drum's shapes on a grid.
-        motions: by source.
     """
 
     full_scale = FULL_SCALE_PA
-    ready_frames = 0
+    motions: Mapping[str, ModalMotion]
 
     def __init__(self, request: BlowRequest, head: Head) -> None:
         self.request = request
@@ -159,13 +190,21 @@ class BlowTake(Sounding):
         self.rate_hz = RATE_HZ
         self.frames = int(request.seconds * RATE_HZ) + 2
         self.frames_hz = RATE_HZ
-        self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
+        omega = request.modes.omega[: len(head.shapes)]
+        self.motions = {name: ModalMotion(request.seconds, omega) for name in SOURCES}
         self.partials_hz = np.asarray(request.modes.omega / math.tau)
-        omega, sigma = request.modes.omega[0], request.modes.sigma[0]
-        self.fundamental_hz = math.sqrt(max(omega**2 - sigma**2, 1.0)) / math.tau
+        lowest = request.modes.omega[0] ** 2 - request.modes.sigma[0] ** 2
+        self.fundamental_hz = math.sqrt(max(lowest, 1.0)) / math.tau
         window_s = WINDOW_PERIODS / self.fundamental_hz
         self.error_course = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
         self.listened = Listened(request.ear)
+        self._measured = 1  # frames; the first is no prediction
+
+    def measure(self) -> None:
+        if self.ready_frames > self._measured:
+            model, truth = (self.motions[name].block_m for name in SOURCES)
+            self.error_course.add(model, truth, self.request.modes.scale**2)
+            self._measured = self.ready_frames
 
     @property
     def ready_s(self) -> float:

@@ -1,50 +1,127 @@
-"""A pluck that the worker renders: the motions and signals of its sources, block by block."""
+"""A pluck or a blow that the worker renders: the motions and signals of its sources, block by block."""
 
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING
 
+from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.line import SourceLine
-from app.rendering.rendering import Rendering, RenderRequest
+from app.rendering.rendering import RenderListener, RenderRequest
 from app.rendering.strobe import Strobe
+from app.rendering.subject import Loaded, Subject
 from app.rendering.take import SOURCES, Listened, Pictures, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
 from engine.sources import ModelSource
 from engine.values.ear import Ear
 
+if TYPE_CHECKING:
+    from app.rendering.drum_line import DrumLine
+
 PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
-FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
-BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
-class PluckJob(Rendering[RenderRequest, Take]):
-    """The rendering of a pluck; requests for one motion differ in listening points, slow motion or other presets."""
+class RenderJob:
+    """The rendering of a request; `advance` does the next block of it, and calls `listener` in its thread.
 
-    _strobe: Strobe | None = None
+    Requests for one motion differ in listening points, slow motion or other presets.
 
-    def _satisfied(self, take: Take) -> bool:
+    Args:
+        load: returns a preset's model and truth; raises PresetError.
+        helper: another thread, so that two sources are rendered at the same time.
+
+    Attributes:
+        take: the result, which grows; None before the first block.
+    """
+
+    def __init__(
+        self,
+        request: RenderRequest | BlowRequest,
+        load: Callable[[Subject], Loaded],
+        listener: RenderListener,
+        helper: Executor,
+    ) -> None:
+        self.request = request
+        self.take: Take | BlowTake | None = None
+        self._load = load
+        self._listener = listener
+        self._helper = helper
+        self._lines: dict[str, SourceLine | DrumLine] = {}
+        self._strobe: Strobe | None = None
+        self._coming: Listened | None = None  # signals at other listening points, until they are complete
+        self._finished = False  # whether the listener has been called for it
+        self._begun_s = time.monotonic()
+
+    def ask_again(self, request: RenderRequest | BlowRequest) -> None:
+        """Take a request for the same motion: see `same_motion` for what may differ."""
+        self.request = request
+
+    def announce(self) -> None:
+        """Report again what there is: the window may have shown another motion in between."""
+        if self.take is not None:
+            self._listener.take_started(self.take)
+            if self._finished:
+                self._listener.take_finished(self.take)
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since the request."""
+        return time.monotonic() - self._begun_s
+
+    @property
+    def rendered_s(self) -> float:
+        """Seconds of the motion that are rendered."""
+        return 0.0 if self.take is None else self.take.ready_frames / self.take.frames_hz
+
+    @property
+    def idle(self) -> bool:
+        """Return True if there is nothing left to do: all is as the latest request has it."""
+        take = self.take
         return (
-            super()._satisfied(take)
+            take is not None
+            and self._finished
+            and self._coming is None
+            and take.listened.ear == self.request.ear
             and self._strobe == self._wanted_strobe(take)
             and all(name in self._lines and self._lines[name].complete for name in self._source_names())
         )
 
-    def _continue(self, take: Take) -> None:
-        self._find_others(take)
+    def advance(self) -> None:
+        """Render a block of each source.
+
+        Raises:
+            PresetError: the preset cannot be used.
+            ValueError: its model cannot start so.
+        """
+        begins = self.take is None
+        take = self.take = self.take or self._begin()
+        if isinstance(take, Take):
+            self._find_others(take)
         self._show(take)
         self._listen(take)
         self._advance_lines(take)
         take.measure()
+        if begins:
+            self._listener.take_started(take)
+        if not self._finished and take.complete and take.listened.complete:
+            self._finished = True
+            self._listener.take_finished(take)
 
-    def _begin(self) -> Take:
+    def _begin(self) -> Take | BlowTake:
         request, loaded = self.request, self._load(self.request.preset)
-        info, stride = loaded.preset.info, _stride(loaded.model)
-        take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-        self._lines = {
-            "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
-            "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
-        }
+        take: Take | BlowTake
+        lines: Mapping[str, SourceLine | DrumLine]
+        if isinstance(request, BlowRequest):
+            from app.rendering.drum_line import begin_blow  # and torch
+
+            take, lines = begin_blow(request, loaded)
+        else:
+            take, lines = _begin_pluck(request, loaded)
+        self._lines.update(lines)
         take.listened = self._listened(request.ear)
         return take
 
@@ -70,7 +147,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
             listened.signals[name] = line.listen(listened.ear)
             take.motions[name] = motion
 
-    def _show(self, take: Take) -> None:
+    def _show(self, take: Take | BlowTake) -> None:
         """Begin new flashes where the slow motion has changed; flashes that are under way are finished first."""
         behind = any(self._lines[name].behind for name in self._source_names() if name in self._lines)
         if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
@@ -78,7 +155,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
             for line in self._lines.values():
                 line.show(strobe)
 
-    def _listen(self, take: Take) -> None:
+    def _listen(self, take: Take | BlowTake) -> None:
         """Begin new signals where the listening points have changed.
 
         Complete signals stay until the new ones are complete, so that plots follow a point that is dragged as often
@@ -99,18 +176,17 @@ class PluckJob(Rendering[RenderRequest, Take]):
     def _is_whole(self, listened: Listened) -> bool:
         return all(listened.signals[name].complete for name in self._source_names() if name in listened.signals)
 
-    def _wanted_strobe(self, take: Take) -> Strobe:
+    def _wanted_strobe(self, take: Take | BlowTake) -> Strobe:
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
-    def _advance_lines(self, take: Take) -> None:
+    def _advance_lines(self, take: Take | BlowTake) -> None:
         """Render a block of the model here, of the truth in the helper, and there others up to its end."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
-        most = BLOCK_FRAMES * truth.stride
-        frames = min(min(2 * first, most) if first else 1 + FIRST_FRAMES, truth.frames - first)
+        frames = min(max(truth.first_frames, min(2 * first, truth.block_frames)), truth.frames - first)
         end_s = (first + frames) / truth.rate_hz if first + frames < truth.frames else take.seconds + 1.0
         others = [self._lines[name] for name in self._source_names()[len(SOURCES) :]]
-        behind = {line: min(BLOCK_FRAMES * line.stride, line.until(end_s)) for line in others}
+        behind = {line: min(line.block_frames, _samples_until(line, end_s)) for line in others}
         pending = [self._helper.submit(line.advance, count) for line, count in ({truth: frames} | behind).items()]
         model.advance(frames)
         for call in pending:
@@ -119,6 +195,20 @@ class PluckJob(Rendering[RenderRequest, Take]):
 
     def _source_names(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
+
+
+def _begin_pluck(request: RenderRequest, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
+    info, stride = loaded.preset.info, _stride(loaded.model)
+    take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
+    return take, {
+        "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
+        "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
+    }
+
+
+def _samples_until(line: SourceLine | DrumLine, time_s: float) -> int:
+    """The number of samples left to be rendered before a time."""
+    return max(0, min(line.frames, math.ceil(time_s * line.rate_hz)) - line.done)
 
 
 def _stride(model: ModelSource) -> int:

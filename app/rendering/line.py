@@ -18,6 +18,9 @@ from engine.sources import Runaway, SourceState, StringSource
 from engine.values.ear import Ear
 from engine.voices import Program
 
+FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
+BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
+
 
 class SourceLine:
     """The rendering of a source into its motion and its signal.
@@ -30,6 +33,7 @@ class SourceLine:
 
     Attributes:
         frames: samples in all, the initial displacement first.
+        first_frames, block_frames: samples that are rendered at once, at first and later.
         done: samples whose pictures have been rendered.
     """
 
@@ -46,6 +50,7 @@ class SourceLine:
         self.stride = stride
         self.motion = motion
         self.frames = int(take.seconds * info.rate_hz + 1e-6) + 1
+        self.first_frames, self.block_frames = 1 + FIRST_FRAMES, BLOCK_FRAMES * stride
         self._seconds = take.seconds
         self._source = source
         self._program = program
@@ -73,10 +78,6 @@ class SourceLine:
         """The time of the last valid frame where the source ran away, and is at rest since. None: it did not."""
         ends = self._pictures.ends
         return None if ends is None else ends / self.rate_hz
-
-    def until(self, time_s: float) -> int:
-        """The number of samples left to be rendered before a time."""
-        return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
     def show(self, strobe: Strobe) -> None:
         """Begin the flashes of another strobe; they replace the present ones when they have caught up."""
@@ -114,7 +115,7 @@ class SourceLine:
                 flashes.take(stop, union, frames)
             self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
         if self._shown is not None and flashes is not None:
-            self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
+            self._catch_up(self._shown, flashes, max(samples, self.block_frames))
         if self._listening is not None:
             self._listening.advance()
             if self._listening.signal.complete:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,9 @@ from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource
 from engine.values.ear import Ear
+
+if TYPE_CHECKING:
+    from app.rendering.blow import ModalMotion
 
 SOURCES = ("model", "truth")
 WINDOW_PERIODS = 2.0  # of the fundamental, in which errors are measured: shorter windows would show its phase
@@ -126,6 +131,8 @@ class Sounding(ABC):
         partials_hz: the frequencies of the partials at rest, (modes,), rising.
         frames: of the motions of model and truth when complete, `frames_hz` a second.
         error_course: the model's errors over time, of all frames after the first that are ready.
+        motions: by source.
+        model_ends_s: the time of the last valid frame where the model's output ran away; it is at rest from then on.
     """
 
     seconds: float
@@ -137,11 +144,17 @@ class Sounding(ABC):
     frames: int
     frames_hz: float
     error_course: ErrorWindows
+    motions: Mapping[str, Pictures | ModalMotion]
+    model_ends_s: float | None = None
+
+    @abstractmethod
+    def measure(self) -> None:
+        """Add the errors of new frames."""
 
     @property
-    @abstractmethod
     def ready_frames(self) -> int:
         """Frames that are ready of both model and truth."""
+        return min(self.motions[name].ready_frames for name in SOURCES)
 
     @property
     def complete(self) -> bool:
@@ -167,10 +180,11 @@ class Take(Sounding):
     Attributes:
         stride: samples between two pictures of model and truth.
         model: renders more of the model where it is needed; has no state.
-        model_ends_s: the time of the last valid frame where the model's output ran away; it is at rest from then on.
         motions: by source; those of other presets' models each at its own rate and on its own grid.
         errors: of the model, over the pictures after the first that are ready.
     """
+
+    motions: dict[str, Pictures]
 
     def __init__(
         self,
@@ -188,7 +202,6 @@ class Take(Sounding):
         self.seconds = seconds
         self.stride = stride
         self.model = model
-        self.model_ends_s: float | None = None
         self.rate_hz = info.rate_hz
         self.horizon_s = info.horizon_s
         self.frames_hz = info.rate_hz / stride
@@ -213,10 +226,6 @@ class Take(Sounding):
         return tuple(window.rel_mae for window in self.errors.windows(self.frames_hz, ends_s))
 
     @property
-    def ready_frames(self) -> int:
-        return min(self.motions[name].ready_frames for name in SOURCES)
-
-    @property
     def progress(self) -> tuple[object, ...]:
         """A value as that of any sound, which flashes change too."""
         motions = self.motions.values()
@@ -224,7 +233,6 @@ class Take(Sounding):
         return *super().progress, *(motion.ready_frames for motion in motions), *flashes
 
     def measure(self) -> None:
-        """Add the errors of new pictures."""
         first, stop = self._measured, self.ready_frames
         if stop > first:
             model, truth = (self.motions[name].read(first, stop) for name in SOURCES)

@@ -10,18 +10,14 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
 
 from app.rendering.blow import BlowRequest
-from app.rendering.job import PluckJob
+from app.rendering.job import RenderJob
 from app.rendering.rendering import RenderListener, RenderRequest
 from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
 from engine.presets import PresetError
-
-if TYPE_CHECKING:
-    from app.rendering.blow_job import BlowJob
 
 TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given back
 IN_STEP_S = 0.5  # for how long after its pluck a motion may be held in step with its sound
@@ -79,7 +75,7 @@ class RenderWorker:
         ends_s = time.monotonic() + PATIENCE_S
         while not (self._closing or self._sounds() or time.monotonic() > ends_s):
             time.sleep(LOOK_AGAIN_S)
-        job: PluckJob | BlowJob | None = None
+        job: RenderJob | None = None
         untidy = False  # whether anything was rendered since free memory was given back
         while True:
             with self._mailbox:
@@ -96,10 +92,10 @@ class RenderWorker:
                 request, self._request = self._request, None
             if request is not None:
                 if job is not None and request.same_motion(job.request):
-                    job.ask_again(request)  # type: ignore[arg-type]  # of the same kind
+                    job.ask_again(request)
                     job.announce()
                 else:
-                    job = self._job(request)
+                    job = RenderJob(request, self._load, self._listener, self._helper)
             assert job is not None
             if self._in_step(job):
                 continue
@@ -113,13 +109,6 @@ class RenderWorker:
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 
-    def _job(self, request: RenderRequest | BlowRequest) -> PluckJob | BlowJob:
-        if isinstance(request, RenderRequest):
-            return PluckJob(request, self._load, self._listener, self._helper)
-        from app.rendering.blow_job import BlowJob  # and torch
-
-        return BlowJob(request, self._load, self._listener, self._helper)
-
-    def _in_step(self, job: PluckJob | BlowJob) -> bool:
+    def _in_step(self, job: RenderJob) -> bool:
         """Return True if the motion is far enough ahead of its sound for now."""
         return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.rendering import Take, blow_job
+from app.rendering import Take, drum_line
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, Head
-from app.rendering.blow_job import BlowJob
+from app.rendering.job import RenderJob
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.subject import Loaded
 from app.rendering.worker import RenderWorker
@@ -72,7 +72,7 @@ def request_of(modes: DrumModes, strike: Strike = HARD, seconds: float = 0.25) -
 
 def rendered(request: BlowRequest, helper: Executor) -> BlowTake:
     log = Log()
-    job = BlowJob(request, lambda _: LOADED, log, helper)
+    job = RenderJob(request, lambda _: LOADED, log, helper)
     while not job.idle:
         job.advance()
     assert log.calls == ["started", "finished"]
@@ -126,7 +126,7 @@ def test_the_difference_is_that_of_the_motions(helper: Executor) -> None:
 
 def test_any_length_of_blocks_gives_the_same(helper: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     one = rendered(request_of(TOM), helper)
-    monkeypatch.setattr(blow_job, "BLOCK_FRAMES", 317)
+    monkeypatch.setattr(drum_line, "BLOCK_FRAMES", 317)
     other = rendered(request_of(TOM), helper)
     for name in ("model", "truth"):
         assert other.motions[name].ready == one.motions[name].ready == one.motions[name].flashes
@@ -151,7 +151,7 @@ def test_errors_are_those_over_the_surface(helper: Executor) -> None:
 
 
 def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:
-    job = BlowJob(request_of(TOM), lambda _: LOADED, Log(), helper)
+    job = RenderJob(request_of(TOM), lambda _: LOADED, Log(), helper)
     while not job.idle:
         job.advance()
     take = job.take
@@ -199,7 +199,7 @@ def test_the_edge_of_a_head_rests_and_a_bar_moves_alike_across() -> None:
 
 def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
     nylon = Loaded(load_preset(SHIPPED / "studio_nylon_b3.safetensors"))
-    job = BlowJob(request_of(TOM), lambda _: nylon, Log(), helper)
+    job = RenderJob(request_of(TOM), lambda _: nylon, Log(), helper)
     with pytest.raises(PresetError, match="many strings"):
         job.advance()
 

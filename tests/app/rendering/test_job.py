@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from app.playing.sources import Sources
 from app.rendering import SOURCES, BlowTake, RenderRequest, Take
-from app.rendering.job import PluckJob
+from app.rendering.job import RenderJob
 from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
@@ -31,7 +31,7 @@ EARS = pytest.mark.parametrize(
     "ear", [Ear((0.37,)), Ear((0.2, 0.7), "velocity"), Ear((0.3,), solo=2)], ids=["one", "stereo velocity", "solo"]
 )
 PLUCK = Pluck(0.3, 3.0)
-Render = Callable[..., PluckJob]
+Render = Callable[..., RenderJob]
 
 
 class Heard:
@@ -63,19 +63,19 @@ def sources() -> Sources:
 
 
 @pytest.fixture
-def job(sources: Sources) -> Iterator[Callable[..., PluckJob]]:
+def job(sources: Sources) -> Iterator[Callable[..., RenderJob]]:
     """A job of a preset for a quarter of a second, nothing of it done."""
     helper = ThreadPoolExecutor(1)
 
-    def made(preset: Any, **changes: Any) -> PluckJob:
+    def made(preset: Any, **changes: Any) -> RenderJob:
         request = replace(RenderRequest(preset, PLUCK, 0.25, Ear((0.37,)), 0.004), **changes)
-        return PluckJob(request, sources.load, Heard(), helper)
+        return RenderJob(request, sources.load, Heard(), helper)
 
     yield made
     helper.shutdown()
 
 
-def finished(job: PluckJob) -> Take:
+def finished(job: RenderJob) -> Take:
     while not job.idle:
         job.advance()
     assert job.take is not None
