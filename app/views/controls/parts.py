@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from PySide6.QtCore import QEvent, QMargins, Qt, SignalInstance
@@ -32,6 +32,7 @@ Button = TypeVar("Button", bound=QAbstractButton)
 Handler = Callable[..., object] | SignalInstance
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 NO_MARGINS = QMargins()
+SMALL = "padding: 2px 8px; border-radius: 4px;"  # of controls above a view
 
 
 def tool_button(
@@ -144,9 +145,9 @@ def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
 
 def lay_out_view(
     view: QWidget,
-    before: Iterable[QWidget],
+    before: Sequence[QWidget],
     words: QWidget,
-    behind: Iterable[QWidget],
+    behind: Sequence[QWidget],
     *below: QWidget,
     top: int = 2,
     gap: int = 4,
@@ -155,6 +156,9 @@ def lay_out_view(
 
     `top` and `gap`: pixels above the row, and below it.
     """
+    for control in (*before, *behind):
+        if isinstance(control, QComboBox | QToolButton) and not control.styleSheet():
+            control.setStyleSheet(SMALL)
     row = filled(QHBoxLayout(), *before, words, *behind, spacing=8, margins=QMargins(4, 0, 4, 0))
     row.setStretchFactor(words, 1)
     column = filled(QVBoxLayout(view), row, spacing=gap, margins=QMargins(0, top, 0, 0))

@@ -7,9 +7,7 @@ from collections.abc import Iterable
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
 
-from app.views.controls.parts import NO_MARGINS, filled, tool_button
-
-SMALL = "padding: 2px 8px; border-radius: 4px;"
+from app.views.controls.parts import NO_MARGINS, SMALL, filled, tool_button
 
 
 class Segments(QWidget):

@@ -10,7 +10,6 @@ from PySide6.QtGui import QFontMetrics
 
 from app.views import theme
 
-LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
 LETTER_PIXELS = 12
 AIR = 8  # of a label, at its ends together
 TICK_PIXELS = 14  # the least distance of numbers on a vertical axis
@@ -42,11 +41,6 @@ class UprightLabel:
             self._axis.setLabel(text)
         self._axis.showLabel(bool(text))
         self._axis.resizeEvent(None)  # puts the label in the middle again
-
-
-def fit_foot(plot: pg.PlotWidget) -> None:
-    """Show the label beneath a plot only where it is high enough; to be called when it is resized."""
-    plot.getPlotItem().getAxis("bottom").showLabel(plot.height() >= LABELLED_HEIGHT)
 
 
 class UprightTicks:
@@ -87,9 +81,3 @@ def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float,
 def frequency_ticks() -> list[tuple[float, str]]:
     """The log₁₀ of frequencies in Hz, and their texts: (2.0, "100"), (3.0, "1k")."""
     return [(math.log10(hz), f"{hz:g}" if hz < 1000 else f"{hz / 1000:g}k") for hz in _LABELLED_HZ]
-
-
-def keep_axes(plot: pg.PlotItem) -> None:
-    """Paint axes again only when they change. They are most of a painting, and a key that is played waits for it."""
-    for side in ("left", "bottom"):
-        plot.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)

@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
-from app.views.controls.segments import SMALL
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
@@ -216,6 +215,4 @@ def lay_out_table(
     """Lay out a table as `lay_out_view`, with a button that copies the table."""
     copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
     copy.clicked.connect(table.copy)
-    for control in (*before, *behind, copy):
-        control.setStyleSheet(SMALL)
     lay_out_view(view, before, words, (*behind, copy), progress, table)

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import pyqtgraph as pg
 from PySide6.QtCore import QPoint, QPointF, QRect, QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPixmap, QRegion
-from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.plots.plot import Plot
 
 STRIP = 2  # pixels to either side of the line that are painted with it
 
 
-class KeptPlot(pg.PlotWidget):
+class KeptPlot(Plot):
     """A plot with a vertical line, which `move_line` puts at a place on the horizontal axis.
 
     Where only the line has moved, its old and new strips are painted from a picture of the plot. The picture is made
     when it is first needed after the plot has changed.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, tip: str, foot: str = "") -> None:
         self._picture: QPixmap | None = None
         self._moved = QRegion()  # strips of the line that changed since the last painting
         self._line_at = 0.0
         self._strip = QRect()  # where it was drawn last
         self._next_strip = QRect()  # and where it is to be
-        super().__init__(parent, enableMenu=False)
+        super().__init__(name, tip, foot)
 
     @property
     def line_at(self) -> float:

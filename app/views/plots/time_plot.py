@@ -7,12 +7,10 @@ same: arrows, + and -, Home.
 from __future__ import annotations
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 
 from app.views import theme
-from app.views.plots.axis_label import fit_foot, keep_axes
 from app.views.plots.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1
@@ -27,21 +25,13 @@ class TimePlot(KeptPlot):
 
     seek_asked = Signal(float)  # a time in s
     pointed = Signal(float, float)  # a press with Shift: time in s, place on the vertical axis
-    hovered = Signal(float, float)  # the same, of the mouse; NaN where it has left
 
-    def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
+    def __init__(self, name: str, tip: str, *, shaded: bool = True) -> None:
         """Make a plot; `shaded`: the time past training is shaded; not under an image, which would hide the shade."""
-        super().__init__(parent)
-        self.setAccessibleName(name)
-        self.setToolTip(tip)
+        super().__init__(name, tip, "time (s)")
         self.setMinimumHeight(84)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         item = self.getPlotItem()
-        item.setLabel("bottom", "time (s)")
-        item.getAxis("bottom").enableAutoSIPrefix(False)
-        keep_axes(item)
         item.setContentsMargins(0, 6, 4, 0)  # room for half of the topmost number
-        item.hideButtons()
         item.setMouseEnabled(True, False)
         self._shaded = shaded
         self._seconds = 1.0
@@ -125,7 +115,7 @@ class TimePlot(KeptPlot):
     def wheelEvent(self, event: QWheelEvent) -> None:
         turn, low_high = event.angleDelta(), self.times_s
         if turn.y():
-            self.zoom(ZOOM_STEP ** (-turn.y() / 120), self._point_at(event.position()).x())
+            self.zoom(ZOOM_STEP ** (-turn.y() / 120), self.place_at(event.position()).x())
         if turn.x():
             self.pan(-turn.x() / 120 * 0.1 * (low_high[1] - low_high[0]))
         event.accept()
@@ -142,24 +132,16 @@ class TimePlot(KeptPlot):
             self._follow(event)
         elif event.buttons() & _PAN_BUTTONS and self._pan_from is not None:
             at = event.position()
-            shift_s = self._point_at(QPointF(self._pan_from, at.y())).x() - self._point_at(at).x()
+            shift_s = self.place_at(QPointF(self._pan_from, at.y())).x() - self.place_at(at).x()
             self._pan_from = at.x()
             self.pan(shift_s)
-        if self._plot_rect_has(event.position()):
-            point = self._point_at(event.position())
-            self.hovered.emit(point.x(), point.y())
-        else:
-            self._hover_nothing()
+        self._hover(event.position())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self._pan_from = None
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.show_all()
-
-    def leaveEvent(self, event: QEvent) -> None:
-        self._hover_nothing()
-        super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         low, high = self.times_s
@@ -180,25 +162,11 @@ class TimePlot(KeptPlot):
             case _:
                 super().keyPressEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent | None) -> None:
-        super().resizeEvent(event)
-        if self.getPlotItem() is not None:  # as it is while the plot is being made, and when it has been closed
-            fit_foot(self)
-
     def _follow(self, event: QMouseEvent) -> None:
-        point = self._point_at(event.position())
+        point = self.place_at(event.position())
         if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             self.pointed.emit(point.x(), point.y())
         self._seek(point.x())
 
     def _seek(self, time_s: float) -> None:
         self.seek_asked.emit(min(max(time_s, 0.0), self._seconds))
-
-    def _hover_nothing(self) -> None:
-        self.hovered.emit(float("nan"), float("nan"))
-
-    def _point_at(self, place: QPointF) -> QPointF:
-        return self.getPlotItem().vb.mapSceneToView(self.mapToScene(place.toPoint()))
-
-    def _plot_rect_has(self, place: QPointF) -> bool:
-        return bool(self.getPlotItem().vb.sceneBoundingRect().contains(self.mapToScene(place.toPoint())))

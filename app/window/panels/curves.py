@@ -9,8 +9,8 @@ import pyqtgraph as pg
 from app.presets.library import Library
 from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES, LEGEND_FIELDS, ShownSource, part_words, shown_sources
-from app.views.plots.axis_label import UprightLabel
 from app.views.plots.legend import Legend, set_curves
+from app.views.plots.plot import Plot
 from app.window.panels.base import Panel
 
 
@@ -21,10 +21,9 @@ class CurvesPanel(Panel):
     every = 2
     faint_alpha: ClassVar[int]  # of the curve that is not heard
 
-    def __init__(self, session: Session, library: Library, plot: pg.PlotWidget) -> None:
+    def __init__(self, session: Session, library: Library, plot: Plot) -> None:
         super().__init__(session, library)
         self.plot, self.legend = plot, Legend(plot)
-        self._label = UprightLabel(plot.getPlotItem())
         self._curves: dict[str, pg.PlotDataItem] = {}
         plot.getPlotItem().showGrid(x=True, y=True, alpha=0.18)
         self.set_sources(DEFAULT_SOURCES)

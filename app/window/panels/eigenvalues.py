@@ -11,8 +11,8 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent
 
 from app.analysis.poles import PoleFigure, Poles, pole_figure
 from app.presets.library import Library
@@ -21,9 +21,7 @@ from app.session.choices import Session
 from app.session.slots import subject_of
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, combo_box, lay_out_view
-from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import fit_foot
-from app.views.plots.pointed_plot import PointedPlot
+from app.views.plots.plot import Plot
 from app.window.panels.base import ComputedPanel, Moment
 
 NEAR_PIXELS = 16  # within which a point is pointed at
@@ -47,12 +45,10 @@ class EigenvaluesPanel(ComputedPanel):
         super().__init__(session, library, "This preset cannot be read")
         self._figure: PoleFigure | None = None
         self._shown = np.zeros(0, np.int64)  # the learned points of the chosen layer
-        self._axes = combo_box("Axes", [(text, key) for key, text in AXES.items()])
-        self._axes.setToolTip("Frequency and decay time, or the complex plane")
-        self._axes.activated.connect(lambda _: self._draw())
-        self._layer = combo_box("Layer", [])
-        self._layer.setToolTip("Which layer's eigenvalues are shown")
-        self._layer.activated.connect(lambda _: self._draw())
+        axes, tip = [(text, key) for key, text in AXES.items()], "Frequency and decay time, or the complex plane"
+        self._axes = combo_box("Axes", axes, tip=tip, picked=lambda _: self._draw())
+        tip = "Which layer's eigenvalues are shown"
+        self._layer = combo_box("Layer", [], tip=tip, picked=lambda _: self._draw())
         self._layer.hide()
         self.plane = _Plane()
         self.plane.pointed.connect(self._show_values)
@@ -60,8 +56,6 @@ class EigenvaluesPanel(ComputedPanel):
         self.plane.escaped.connect(lambda: self.solo(0))
         theme.changes.theme_changed.connect(self._take_theme)
         self.background.finished.connect(self._show_figure)
-        for control in (self._axes, self._layer):
-            control.setStyleSheet(SMALL)
         lay_out_view(self, (self._axes, self._layer), self._words, (), self.plane)
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -172,12 +166,13 @@ def _t60_text(t60_s: float) -> str:
     return "∞: it grows" if math.isinf(t60_s) else f"{t60_s:.3g} s"
 
 
-class _Plane(PointedPlot):
+class _Plane(Plot):
     """The points: wheel zooms, drag pans, double-click shows all, a click takes a point."""
 
     pointed = Signal(int)  # the number of a point, the learned ones first; -1: none
     taken = Signal(int)
     escaped = Signal()
+    KEPT_KEYS = (*ENTER_KEYS, Qt.Key.Key_Escape)
 
     def __init__(self) -> None:
         super().__init__(
@@ -185,6 +180,7 @@ class _Plane(PointedPlot):
             "Amber rings: learned; blue dots: the string's own. Click or Enter: hear this mode alone, again for all\n"
             "Arrow keys go from point to point; the wheel zooms, double-click shows all",
         )
+        self.hovered.connect(self._point_near)
         item = self.getPlotItem()
         item.showGrid(x=True, y=True, alpha=0.18)
         turn = np.linspace(0, np.pi, 721)
@@ -229,14 +225,14 @@ class _Plane(PointedPlot):
         item.setAspectLocked(not musical)
         if musical:
             item.setLabel("bottom", "frequency (Hz)")
-            self._label.set("decay: T60 (s)", "T60 (s)", "s")
+            self.label.set("decay: T60 (s)", "T60 (s)", "s")
             item.setLimits(xMin=-0.02 * rate_hz, xMax=0.52 * rate_hz)
         else:
             item.setLabel("bottom", "Re λ")
-            self._label.set("Im λ")
+            self.label.set("Im λ")
             item.setLimits(xMin=None, xMax=None)
-        self._ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
-        fit_foot(self)
+        self.ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
+        self.fit_foot()
         self._musical, self._rate_hz = musical, rate_hz
         self.show_all()
 
@@ -262,24 +258,19 @@ class _Plane(PointedPlot):
         pressed, self._pressed = self._pressed, None
         if event.button() == Qt.MouseButton.LeftButton and pressed is not None:
             still = (event.position() - pressed).manhattanLength() < 4
-            if still and (point := self._nearest(event.position())) >= 0:
+            if still and (point := self._nearest(self.place_at(event.position()))) >= 0:
                 self._point_at(point)
                 self.taken.emit(point)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        super().mouseMoveEvent(event)
-        if not event.buttons():
-            point = self._nearest(event.position())
+    def _point_near(self, x: float, y: float) -> None:
+        if not QGuiApplication.mouseButtons():
+            point = self._nearest(QPointF(x, y))
             self.setCursor(Qt.CursorShape.PointingHandCursor if point >= 0 else Qt.CursorShape.ArrowCursor)
             self._point_at(point)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        if self._nearest(event.position()) < 0:
+        if self._nearest(self.place_at(event.position())) < 0:
             self.show_all()
-
-    def leaveEvent(self, event: QEvent) -> None:
-        self._point_at(-1)
-        super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))
@@ -295,11 +286,11 @@ class _Plane(PointedPlot):
         else:
             super().keyPressEvent(event)
 
-    def _nearest(self, at: QPointF) -> int:
-        """The point nearest to a place of the widget, a learned one where both lie there; -1: none is near."""
-        if not len(self._places):
+    def _nearest(self, here: QPointF) -> int:
+        """The point nearest to a place on the axes, a learned one where both lie there; -1: none is near."""
+        if not len(self._places) or math.isnan(here.x()):
             return -1
-        here, (wide, high) = self._place_at(at), self.getPlotItem().vb.viewPixelSize()
+        wide, high = self.getPlotItem().vb.viewPixelSize()
         off = np.hypot((self._places[:, 0] - here.x()) / wide, (self._places[:, 1] - here.y()) / high)
         point = int((off + CLOSER_PIXELS * (np.arange(len(off)) >= self._learned_count)).argmin())
         return point if off[point] <= NEAR_PIXELS else -1

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
@@ -24,7 +24,7 @@ from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, lay_out_view
 from app.views.plots.axis_label import UprightTicks
 from app.views.plots.colour_maps import share_map
-from app.views.plots.pointed_plot import PointedPlot
+from app.views.plots.plot import Plot
 from app.window.panels.base import ComputedPanel, Moment
 from engine.pluck import Pluck
 from engine.presets import preset_digest
@@ -157,24 +157,26 @@ def _pluck_form(pluck: Pluck) -> tuple[object, ...]:
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
 
 
-class _Map(PointedPlot):
+class _Map(Plot):
     """The picture with its colour bar, the trained range, the present pluck and a cursor."""
 
     pointed = Signal(float, float)  # position, amplitude in mm; NaN: nowhere
     taken = Signal(float, float)
+    KEPT_KEYS = (*ENTER_KEYS, Qt.Key.Key_Escape)
 
     def __init__(self) -> None:
         super().__init__(
             "Map of errors",
             "The model's error as trained (the first figure in the header) for each pluck position and amplitude.\n"
             "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the training range",
+            "pluck position",
         )
+        self.hovered.connect(lambda x, y: self._point_at(self._pluck_at(QPointF(x, y))))
         self.setCursor(Qt.CursorShape.CrossCursor)
         item = self.getPlotItem()
         item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
         item.setMouseEnabled(False, False)
-        item.setLabel("bottom", "pluck position")
-        self._label.set("amplitude (mm)", "mm")
+        self.label.set("amplitude (mm)", "mm")
         self._area = QRectF(
             POSITIONS[0] - _STEP_X / 2,
             math.log10(AMPLITUDES_MM[0]) - _STEP_Y / 2,
@@ -182,7 +184,7 @@ class _Map(PointedPlot):
             math.log10(AMPLITUDES_MM[-1] / AMPLITUDES_MM[0]) + _STEP_Y,
         )
         item.setRange(self._area, padding=0)
-        self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
+        self.ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
         self._image = pg.ImageItem()
         self._image.setLevels([math.log10(end) for end in SCALE])
         item.addItem(self._image)
@@ -237,20 +239,13 @@ class _Map(PointedPlot):
         return _is_within(position, places) and _is_within(amplitude_mm, amplitudes_mm(position))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        at = self._at(event.position())
+        at = self._pluck_at(self.place_at(event.position()))
         if event.button() == Qt.MouseButton.LeftButton and at is not None:
             self._point_at(at)
             self.taken.emit(*at)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        self._point_at(self._at(event.position()))
-
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         event.accept()
-
-    def leaveEvent(self, event: QEvent) -> None:
-        self._point_at(None)
-        super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {
@@ -272,9 +267,8 @@ class _Map(PointedPlot):
         else:
             super().keyPressEvent(event)
 
-    def _at(self, place: QPointF) -> tuple[float, float] | None:
-        """The pluck that a place of the widget stands for, None beside the map."""
-        at = self._place_at(place)
+    def _pluck_at(self, at: QPointF) -> tuple[float, float] | None:
+        """The pluck that a place on the axes stands for, None beside the map."""
         if not self._area.contains(at):
             return None
         position = min(max(at.x(), float(POSITIONS[0])), float(POSITIONS[-1]))

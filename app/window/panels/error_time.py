@@ -15,8 +15,8 @@ from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.views import theme
-from app.views.controls.parts import tool_button
-from app.views.controls.segments import SMALL, Segments
+from app.views.controls.parts import SMALL, tool_button
+from app.views.controls.segments import Segments
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
 from engine.compare.relative import ErrorWindows
@@ -130,7 +130,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
             curve.setVisible((name == "level_db") == self._level)
         for line in self._stored.values():
             line.setVisible(not self._level)
-        self._label.set(*(("level error (dB)", "dB") if self._level else ("relative error", "error")))
+        self.plot.label.set(*(("level error (dB)", "dB") if self._level else ("relative error", "error")))
         self._range = None
         self._fit([])
         self._show_legend()
@@ -151,7 +151,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         if limits != self._range:
             self._range = limits
             self.plot.getPlotItem().setYRange(*limits, padding=0)
-            self._ticks.set(None if self._level else _decades(*limits), _between_decades(*limits))
+            self.plot.ticks.set(None if self._level else _decades(*limits), _between_decades(*limits))
 
     def _always_in_view(self) -> NDArray[np.float64]:
         if self._level:

@@ -66,9 +66,11 @@ class PartialsPanel(ComputedPanel):
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library, "The partials of this pluck could not be measured")
-        self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
-        self._window.setToolTip("The part of the pluck that is measured")
-        self._window.activated.connect(self._show)
+        windows, tip = (
+            [(text.capitalize(), key) for key, text in WINDOWS.items()],
+            "The part of the pluck that is measured",
+        )
+        self._window = combo_box("Window of time", windows, tip=tip, picked=lambda _: self._show())
         self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._choose)

@@ -13,8 +13,8 @@ from app.rendering import SOURCES, BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.session.shown import readable_unit
 from app.views import theme
-from app.views.controls.parts import combo_box
-from app.views.controls.segments import SMALL, Segments
+from app.views.controls.parts import SMALL, combo_box
+from app.views.controls.segments import Segments
 from app.views.plots.colour_maps import displacement_map, error_map, magnitudes_of
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
@@ -51,14 +51,13 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         )
         super().__init__(session, library, TimePlot("Space–time", tip, shaded=False))
         self.quantities = Segments("Shown", QUANTITIES)
-        self.gains = combo_box(
-            "Gain of the colours", [("auto gain", AUTO), *((f"gain {_times(gain)}", gain) for gain in GAINS)], AUTO
-        )
-        self.gains.setMinimumContentsLength(12)
-        self.gains.setToolTip(
+        gains = [("auto gain", AUTO), *((f"gain {_times(gain)}", gain) for gain in GAINS)]
+        tip = (
             "Gain of the colour scale; the colour bar shows the displacement.\n"
             "Auto fits most of the visible part; model and truth always have the same scale"
         )
+        self.gains = combo_box("Gain of the colours", gains, AUTO, tip, self._choose_gain)
+        self.gains.setMinimumContentsLength(12)
         self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
         self._gain = {"displacement": AUTO, "error": AUTO}
         self._typical_mm = 1.0
@@ -66,8 +65,8 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._picture: Picture | None = None
         item = self.plot.getPlotItem()
         item.setYRange(0, 1, padding=0)
-        self._label.set("position")
-        self._ticks.set((place, f"{place:g}") for place in PLACES)
+        self.plot.label.set("position")
+        self.plot.ticks.set((place, f"{place:g}") for place in PLACES)
         self._image = pg.ImageItem(axisOrder="row-major")
         item.addItem(self._image, ignoreBounds=True)
         self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))
@@ -81,7 +80,6 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._map_shown = ("displacement", True)
         theme.changes.theme_changed.connect(self._take_theme)
         self.quantities.chosen.connect(self._choose_quantity)
-        self.gains.activated.connect(self._choose_gain)
         self.plot.pointed.connect(lambda _, place: session.move_listening_point(min(max(place, 0.0), 1.0)))
         self._lay_out(self.quantities, self.gains)
         self.setTabOrder(self.gains, self.plot)
@@ -151,8 +149,8 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))
         self._show_scale()
 
-    def _choose_gain(self) -> None:
-        self._gain[self._kind] = self.gains.currentData()
+    def _choose_gain(self, gain: int) -> None:
+        self._gain[self._kind] = gain
         self._show_scale()
 
     def _show_scale(self) -> None:

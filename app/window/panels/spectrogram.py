@@ -16,7 +16,7 @@ from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.views import theme
 from app.views.controls.parts import combo_box
-from app.views.controls.segments import SMALL, Segments
+from app.views.controls.segments import Segments
 from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, frequency_ticks
 from app.views.plots.colour_maps import level_map
 from app.views.plots.time_plot import TimePlot
@@ -52,9 +52,11 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         super().__init__(session, library, TimePlot("Spectrogram", tip, shaded=False))
         self.quantities = Segments("Shown", QUANTITIES)
         self.scales = Segments("Frequency axis", SCALES)
-        self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), 90)
-        self.ranges.setToolTip("Range of levels below full scale, the same for every source")
-        self.ranges.setStyleSheet(SMALL)
+        ranges, tip = (
+            [(f"{db} dB", db) for db in RANGES_DB],
+            "Range of levels below full scale, the same for every source",
+        )
+        self.ranges = combo_box("Dynamic range", ranges, 90, tip, lambda _: self._choose_range())
         self._rows: FrequencyRows | None = None
         self._levels_db = np.zeros((0, ROWS), np.float32)  # of the columns drawn so far
         self._pixels = np.zeros((0, ROWS), np.uint8)
@@ -62,7 +64,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._hop_s = 1.0
         self._highest_hz = 8000.0
         item = self.plot.getPlotItem()
-        self._label.set("frequency (Hz)", "Hz")
+        self.plot.label.set("frequency (Hz)", "Hz")
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
         item.addItem(self._image, ignoreBounds=True)
         self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
@@ -71,7 +73,6 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._take_theme()
         theme.changes.theme_changed.connect(self._take_theme)
         self.scales.chosen.connect(self._label_frequencies)
-        self.ranges.activated.connect(self._choose_range)
         self._label_frequencies()
         self._lay_out(self.quantities, self.scales, self.ranges)
 
@@ -168,4 +169,4 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def _label_frequencies(self) -> None:
         self.plot.getPlotItem().setYRange(*self._heights(), padding=0)
-        self._ticks.set(frequency_ticks() if self.logarithmic else None)
+        self.plot.ticks.set(frequency_ticks() if self.logarithmic else None)

@@ -9,8 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import Qt
 
 from app.analysis.heard import HeardSignal
 from app.analysis.spectrogram import FrequencyRows
@@ -21,8 +20,8 @@ from app.session.shown import ShownSource, shown_sources
 from app.views import theme
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view
-from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, fit_foot, frequency_ticks, keep_axes
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, frequency_ticks
+from app.views.plots.plot import Plot
 from app.window.panels.base import LEAST_HEIGHT, Moment, level_words
 from app.window.panels.curves import CurvesPanel
 
@@ -94,26 +93,18 @@ class SpectrumPanel(CurvesPanel):
         self._area_of: str | None = None
         self._levels_db: dict[str, NDArray[np.float32]] = {}
         self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
-        super().__init__(session, library, pg.PlotWidget(enableMenu=False))
+        tip = "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
+        super().__init__(session, library, Plot("Spectrum", tip, "frequency (Hz)"))
         self.setMinimumHeight(LEAST_HEIGHT)
-        self.plot.setAccessibleName("Spectrum")
-        self.plot.setToolTip(
-            "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
-        )
-        self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
-        self.ranges.setToolTip("How far below full scale the axis reaches, the same for every source")
-        self.ranges.setStyleSheet(SMALL)
-        self.ranges.activated.connect(self._fit)
+        tip = "How far below full scale the axis reaches, the same for every source"
+        ranges = [(f"{db} dB", db) for db in RANGES_DB]
+        self.ranges = combo_box("Dynamic range", ranges, RANGES_DB[-1], tip, lambda _: self._fit())
         self.readout = Readout()
         item = self.plot.getPlotItem()
         item.setLogMode(x=True)
-        item.setLabel("bottom", "frequency (Hz)")
-        self._label.set("dB re 10 mm", "dB")
-        keep_axes(item)
-        item.hideButtons()
+        self.plot.label.set("dB re 10 mm", "dB")
         item.setMouseEnabled(False, False)
         item.getAxis("bottom").setTicks([frequency_ticks()])
-        item.getAxis("bottom").enableAutoSIPrefix(False)
         item.addItem(self._area)
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
@@ -122,18 +113,18 @@ class SpectrumPanel(CurvesPanel):
         self._rate_hz = 16_000  # the highest of what is drawn
         self._hovered_hz = math.nan
         self._fit()
-        self.plot.viewport().installEventFilter(self)
+        self.plot.hovered.connect(lambda height, _: self.hover(10**height))
         lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         super().choices_changed(names)
         if "pickup" in names:
-            self._label.set(level_words(self.session.choices), "dB")
+            self.plot.label.set(level_words(self.session.choices), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
         self._partials_hz = take.partials_hz
-        self._label.set(level_words(self.session.choices, take), "dB")
+        self.plot.label.set(level_words(self.session.choices, take), "dB")
 
     def _draw_moment(self, moment: Moment) -> None:
         take, choices = moment.sounding, self.session.choices
@@ -219,24 +210,6 @@ class SpectrumPanel(CurvesPanel):
                 self._partial.setValue(math.log10(partial_hz))
         self.readout.report(text)
         self._partial.setVisible(nearest is not None)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        fit_foot(self.plot)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.MouseMove:
-            place = event.position()  # type: ignore[attr-defined]
-            self.hover(self._frequency_at(place))
-        elif event.type() == QEvent.Type.Leave:
-            self.hover(math.nan)
-        return super().eventFilter(watched, event)
-
-    def _frequency_at(self, place: QPointF) -> float:
-        box = self.plot.getPlotItem().vb
-        scene = self.plot.mapToScene(place.toPoint())
-        inside = box.sceneBoundingRect().contains(scene)
-        return float(10 ** box.mapSceneToView(scene).x()) if inside else math.nan
 
     def _fit(self) -> None:
         self.plot.getPlotItem().setRange(

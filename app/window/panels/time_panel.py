@@ -16,7 +16,6 @@ from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import lay_out_view
-from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 
@@ -31,10 +30,6 @@ class TimePanel(Panel, Generic[G]):
     def __init__(self, session: Session, library: Library, plot: TimePlot) -> None:
         super().__init__(session, library)
         self.plot, self.readout = plot, Readout()
-        item = plot.getPlotItem()
-        item.getAxis("left").enableAutoSIPrefix(False)
-        self._label = UprightLabel(item)
-        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self.plot.seek_asked.connect(self.seek_asked)
         self.plot.hovered.connect(self._hover)
         self._made: G | None = None

@@ -62,7 +62,6 @@ class WaveformPanel(CurvesPanel):
         )
         super().__init__(session, library, TimePlot("Waveform", tip))
         self.plot.seek_asked.connect(self.seek_asked)
-        self.plot.getPlotItem().getAxis("left").enableAutoSIPrefix(False)
         self.plot.horizon.label.setPosition(0.1)  # the legend has the upper edge
         self._take: Sounding | None = None
         self._period_s = 0.0  # of its string; 0: not known
@@ -132,7 +131,7 @@ class WaveformPanel(CurvesPanel):
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
         """Set the vertical axis, from −full to full in `unit`."""
         self.plot.getPlotItem().setYRange(-full, full, padding=0.02)
-        self._label.set(f"{quantity} ({unit})", unit)
+        self.plot.label.set(f"{quantity} ({unit})", unit)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
         """Show the samples so far, (frames,) from time 0, in the unit of the axis; draw all of those in view."""

@@ -74,7 +74,8 @@ from app.views.dialogs import (
     midi_dialog,
 )
 from app.views.instrument import patch_card
-from app.views.plots import figures_table, kept_plot, legend, plots, pointed_plot, time_plot
+from app.views.plots import figures_table, kept_plot, legend, plots, time_plot
+from app.views.plots import plot as plot_module
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
@@ -183,9 +184,9 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     figures_table.FiguresTable: lambda: figures_table.FiguresTable(
         "Figures", [figures_table.FigureColumn("name", "name", "a name")]
     ),
-    kept_plot.KeptPlot: lambda: with_name(kept_plot.KeptPlot()),
+    kept_plot.KeptPlot: lambda: kept_plot.KeptPlot("A plot", "A tip"),
     legend.Legend: made_legend,
-    pointed_plot.PointedPlot: lambda: pointed_plot.PointedPlot("A plot", "A tip"),
+    plot_module.Plot: lambda: plot_module.Plot("A plot", "A tip"),
     time_plot.TimePlot: lambda: time_plot.TimePlot("A plot", "A tip"),
     abx_pages.SetupPage: lambda: abx_pages.SetupPage("A pluck", ("Model", "Truth"), AbxChoices()),
     abx_pages.TrialPage: lambda: abx_pages.TrialPage(("Model", "Truth")),

@@ -1,0 +1,69 @@
+"""A plot of the panels: named, reached by Tab, its axes fit their room, and it says where the mouse points."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QResizeEvent
+
+from app.views.controls.parts import keeps_keys
+from app.views.plots.axis_label import UprightLabel, UprightTicks
+
+LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
+TIP_MS = 3000  # the tooltip covers what is pointed at
+
+
+class Plot(pg.PlotWidget):
+    """The left axis has a label and numbers that fit; the one beneath is shown where the plot is high enough."""
+
+    hovered = Signal(float, float)  # the place on the axes that the mouse points at; NaN where it has left them
+    KEPT_KEYS: ClassVar[tuple[Qt.Key, ...]] = ()  # shortcuts of the window that are the plot's while it has the focus
+
+    def __init__(self, name: str, tip: str, foot: str = "") -> None:
+        super().__init__(enableMenu=False)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self.setToolTipDuration(TIP_MS)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        item = self.getPlotItem()
+        item.hideButtons()
+        for side in ("left", "bottom"):
+            item.getAxis(side).enableAutoSIPrefix(False)
+            # painted again only when it changes: axes are most of a painting, and a key that is played waits for it
+            item.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+        item.setLabel("bottom", foot)
+        self.label = UprightLabel(item)
+        self.ticks = UprightTicks(item.getAxis("left"), item.vb)
+
+    def place_at(self, at: QPointF) -> QPointF:
+        """The values of both axes at a place of the widget."""
+        return self.getPlotItem().vb.mapSceneToView(self.mapToScene(at.toPoint()))
+
+    def fit_foot(self) -> None:
+        """Show the label beneath only where there is room; to be called when it is another one."""
+        self.getPlotItem().getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        super().mouseMoveEvent(event)
+        self._hover(event.position())
+
+    def _hover(self, at: QPointF) -> None:
+        inside = self.getPlotItem().vb.sceneBoundingRect().contains(self.mapToScene(at.toPoint()))
+        place = self.place_at(at) if inside else QPointF(math.nan, math.nan)
+        self.hovered.emit(place.x(), place.y())
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self.hovered.emit(math.nan, math.nan)
+        super().leaveEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # as it is while the plot is being made, and when it has been closed
+            self.fit_foot()
+
+    def event(self, event: QEvent) -> bool:
+        return keeps_keys(event, *self.KEPT_KEYS) or bool(super().event(event))
