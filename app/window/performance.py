@@ -17,7 +17,6 @@ from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
@@ -26,7 +25,7 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowRequest, BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import Session, ShownString
+from app.session.choices import Session
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
@@ -38,7 +37,6 @@ from engine.plain_text import name_text
 from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"single", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 @dataclass
@@ -261,7 +259,7 @@ class Performance(QObject):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
-        choices, entry = self._session.choices, self.entry
+        choices = self._session.choices
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
@@ -271,9 +269,6 @@ class Performance(QObject):
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         request = self._request()
-        if names & PLACED and isinstance(request, RenderRequest) and entry is not None and not choices.plays_patch:
-            plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
-            self.notes.prepare_plucks(request.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
         if request != self._asked:  # else an event may have chosen another pluck, which the session takes later
