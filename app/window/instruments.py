@@ -10,7 +10,6 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.instrument.strings import Strings, on_string
@@ -23,6 +22,7 @@ from app.playing.note import PluckVoices
 from app.playing.playback import Due
 from app.presets.library import Library
 from app.rendering import RenderRequest
+from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import Session, ShownString
 from app.session.slots import other_preset

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects import Effects
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
@@ -32,8 +31,6 @@ class OfflineVoice:
     Args:
         seconds: of one whose samples are rendered: how many of them there will be.
         source_rate_hz: their rate.
-        gain: a factor of its samples.
-        effects: body and room that it sounds through.
     """
 
     def __init__(
@@ -43,18 +40,12 @@ class OfflineVoice:
         ear: Ear,
         seconds: float = 0.0,
         source_rate_hz: int = 0,
-        gain: float = 1.0,
-        effects: Effects | None = None,
     ) -> None:
-        self.voice = Voice(program, initial_m, ear, gain, seconds, source_rate_hz)
+        self.voice = Voice(program, initial_m, ear, 1.0, seconds, source_rate_hz)
         self.voice.never_ends()
-        self.voice.sound_through_effects()
         self._mixer = Mixer(program.rate_hz, limited=False)
-        self._mixer.set_effects(effects)
         self._mixer.add(self.voice)
-        self.tail_s = effects.tail_s(program.rate_hz) if effects else 0.0
-        wide = effects.impulse(program.rate_hz).shape[1] if effects else 1
-        self.channels = max(wide, len(ear.points))
+        self.channels = len(ear.points)
 
     def read(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), ±1 being full scale.
@@ -91,26 +82,23 @@ def voice_blocks(
     seconds: float,
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
-    gain: float = 1.0,
-    effects: Effects | None = None,
 ) -> Iterator[NDArray[np.float32]]:
     """The first seconds of a pluck in blocks (frames, channels), ±1 being full scale; no limiter.
 
-    A channel is a listening point; a room or a wide body gives two of one.
+    A channel is a listening point.
 
     Args:
         source: what renders the samples of a program that is not compiled.
         advanced: receives the share that is done now and then; may raise, to end it.
         until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
-            voice is over; body and room then ring out.
-        gain, effects: see `OfflineVoice`.
+            voice is over.
 
     Raises:
         Runaway: the output stopped being a string's.
     """
     initial_m = project(pluck.displacement(info.grid_points), info.modes)
     filled_s = seconds + 0.1 if program.rendered else 0.0
-    offline = OfflineVoice(program, initial_m, ear, filled_s, info.rate_hz, gain, effects)
+    offline = OfflineVoice(program, initial_m, ear, filled_s, info.rate_hz)
     if program.rendered:
         assert source is not None
         _fill(offline.voice, source, initial_m, ear, advanced)
@@ -124,8 +112,8 @@ def voice_blocks(
         level_db = offline.voice.level_db
         loudest_db = max(loudest_db, level_db)
         if until_db is not None and (level_db < loudest_db - until_db or offline.voice.over):
-            rest = min(round((offline.tail_s or SILENCE_S) * program.rate_hz), frames - done)
-            yield offline.read(rest) if effects else np.zeros((rest, offline.channels), np.float32)
+            rest = min(round(SILENCE_S * program.rate_hz), frames - done)
+            yield np.zeros((rest, offline.channels), np.float32)
             return
 
 
