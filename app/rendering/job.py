@@ -131,16 +131,14 @@ class RenderJob:
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride = take.info, take.stride
-            source = program = None
+            info, stride, loaded = take.info, take.stride, None
             try:
-                loaded = self._load(path)
-                source, program = loaded.model, loaded.model_program
-                info, stride = loaded.preset.info, _stride(source)
+                other = self._load(path)
+                info, stride, loaded = other.preset.info, _stride(other.model), other
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
             motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(take, source, program, motion, info, stride)
+            line = self._lines[name] = SourceLine(take, name, loaded, motion, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened
@@ -200,10 +198,7 @@ class RenderJob:
 def _begin_pluck(request: RenderRequest, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
     info, stride = loaded.preset.info, _stride(loaded.model)
     take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-    return take, {
-        "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
-        "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
-    }
+    return take, {name: SourceLine(take, name, loaded, take.motions[name], stride) for name in SOURCES}
 
 
 def _samples_until(line: SourceLine | DrumLine, time_s: float) -> int:

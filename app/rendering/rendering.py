@@ -7,28 +7,19 @@ from pathlib import Path
 from typing import Protocol
 
 from app.rendering.blow import BlowTake
-from app.rendering.subject import Subject
+from app.rendering.note_sound import NoteSound
 from app.rendering.take import Take
-from engine.pluck import Pluck
-from engine.values.ear import Ear
 
 
 @dataclass(frozen=True)
-class RenderRequest:
-    """The pictures and signals of a pluck.
+class RenderRequest(NoteSound):
+    """The sound of a pluck, and how it is drawn.
 
     Attributes:
-        preset: the file, with another string for one of many.
-        seconds: the duration.
-        ear: listening points, pick-up and soloed mode.
         speed: of slow motion; 1 is real time.
         others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
     """
 
-    preset: Subject
-    pluck: Pluck
-    seconds: float
-    ear: Ear
     speed: float = 1.0
     others: tuple[Path, ...] = ()
 

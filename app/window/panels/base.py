@@ -19,12 +19,13 @@ from threadpoolctl import threadpool_limits
 
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Choices, Session, ShownString
+from app.session.choices import Choices, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.shown import ShownSource, full_scale_words, shown_sources
 from app.session.silence import why_silent
 from app.shared.worker import Job, Work
+from app.stage.session import Session
 from app.views.background import Background
 from app.views.controls.parts import lay_out_alone, words_label
 from app.views.controls.plain import Label

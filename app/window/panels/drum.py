@@ -8,10 +8,10 @@ from app.analysis.moment import caption_of
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
-from app.session.choices import Session
 from app.session.shown import ShownSource
 from app.shared.key_names import note_name
 from app.shared.vocabulary import DIFFERENCE
+from app.stage.session import Session
 from app.views.drum.axes import Place
 from app.views.drum.ink import HeadFrame
 from app.views.drum.view import DrumView
