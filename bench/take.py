@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.playing.sources import Sources
-from app.rendering import RenderRequest
+from app.rendering import RenderRequest, Take
 from app.rendering.job import RenderJob
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
@@ -76,13 +76,14 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     job = RenderJob(request, sources.load, _Nobody(), helper)
     rendered_s, _ = _finish(job)
     take = job.take
-    assert take is not None
+    assert isinstance(take, Take)
     moved = []
     for ear in EARS[1:]:
         job.ask_again(replace(request, ear=ear))
         moved.append(_finish(job))
     moved_s, moved_wall_s = map(min, zip(*moved, strict=True))
-    megabytes = take.bytes("model") / MEGABYTE
+    series = (take.motions["model"], take.listened.signals["model"])
+    megabytes = sum(part.read().nbytes for part in series) / MEGABYTE
     return TakeCost(path.stem, SECONDS, take.frames_hz, rendered_s, megabytes, moved_s, moved_wall_s)
 
 

@@ -9,29 +9,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering import SOURCES
-from app.rendering.strobe import Strobe
-from app.rendering.take import Pictures, Signal
+from app.rendering.take import FrameSeries, Pictures, Signal
 from app.shared.vocabulary import DIFFERENCE
-
-Each = TypeVar("Each", Pictures, Signal)
 
 
 @dataclass(frozen=True)
-class _Heard(Generic[Each]):
+class _Heard:
     """A source of a take, times `gain`."""
 
-    by_source: Mapping[str, Each]
+    by_source: Mapping[str, FrameSeries]
     source: str
     gain: float = 1.0
 
     @cached_property
-    def _series(self) -> list[Each]:
+    def _series(self) -> list[FrameSeries]:
         return [self.by_source[name] for name in _parts(self.source)]
 
     @property
@@ -59,8 +55,10 @@ class _Heard(Generic[Each]):
         return _subtract_parts([series.read(first, stop) for series in self._series], self.gain)
 
 
-class HeardMotion(_Heard[Pictures]):
+class HeardMotion(_Heard):
     """Displacement of a source on its grid in m, at its own rate of pictures: of the motions of a take."""
+
+    by_source: Mapping[str, Pictures]
 
     @property
     def grid_points(self) -> int:
@@ -68,19 +66,18 @@ class HeardMotion(_Heard[Pictures]):
 
     def shape(self, position_s: float) -> NDArray[np.float32]:
         """The string (grid_points,) in m that slow motion shows at the playhead."""
-        return _subtract_parts([motion.shape_m(position_s) for motion in self._series], self.gain)
-
-    def strobes(self, position_s: float) -> list[Strobe | None]:
-        """The strobes whose flashes `shape` is made of; None where it is the nearest picture instead."""
-        return [motion.strobe_at(position_s) for motion in self._series]
+        motions = [self.by_source[name] for name in _parts(self.source)]
+        return _subtract_parts([motion.shape_m(position_s) for motion in motions], self.gain)
 
 
-class HeardSignal(_Heard[Signal]):
+class HeardSignal(_Heard):
     """The signal that a pick-up senses of a source at the listening points, in m or m/s: of those of a take."""
+
+    by_source: Mapping[str, Signal]
 
     @property
     def rate_hz(self) -> int:
-        return self._series[0].rate_hz
+        return self.by_source[_parts(self.source)[0]].rate_hz
 
     def read(self, first: int, stop: int) -> NDArray[np.float32]:
         """Read as `read_all`, at the first listening point, (frames,)."""

@@ -64,10 +64,6 @@ class Flashes:
         self._shapes_m = np.zeros((len(places), grid_points), np.float32)
         self.ready = 0
 
-    @property
-    def bytes(self) -> int:
-        return self._shapes_m.nbytes
-
     def needed(self, first: int, stop: int) -> NDArray[np.int64]:
         """The frames of first … stop - 1 that are needed for flashes, ascending."""
         return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering.strobe import Flashes, Strobe
+from app.rendering.strobe import Flashes
 from engine.compare.relative import ErrorSums, ErrorWindows
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
@@ -50,11 +50,6 @@ class FrameSeries:
     def complete(self) -> bool:
         return self.ready_frames == self.frames
 
-    @property
-    def bytes(self) -> int:
-        """Memory in bytes."""
-        return self._values.nbytes
-
     def append(self, values: NDArray[np.float32]) -> None:
         start, stop = self.ready_frames, self.ready_frames + len(values)
         self._values[start:stop] = values
@@ -86,25 +81,14 @@ class Pictures(FrameSeries):
 
     flashes: Flashes | None = None
 
-    @property
-    def bytes(self) -> int:
-        return super().bytes + (self.flashes.bytes if self.flashes is not None else 0)
-
     def shape_m(self, position_s: float) -> NDArray[np.float32]:
         """The string (places,) that the strobe shows; the nearest picture where its flash is not ready."""
-        frame_m = self._flash_m(position_s)
+        flashes = self.flashes
+        frame_m = None if flashes is None else flashes.shape_m(flashes.strobe.flash(position_s))
         if frame_m is None:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
             frame_m = self.read(nearest, nearest + 1)[0]
         return frame_m
-
-    def strobe_at(self, position_s: float) -> Strobe | None:
-        """The strobe whose flash `shape_m` returns; None where that is a picture."""
-        return self.flashes.strobe if self.flashes is not None and self._flash_m(position_s) is not None else None
-
-    def _flash_m(self, position_s: float) -> NDArray[np.float32] | None:
-        flashes = self.flashes
-        return None if flashes is None else flashes.shape_m(flashes.strobe.flash(position_s))
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,10 +223,6 @@ class Take(Sounding):
             self.errors.add(model[None], truth[None], first - 1, row=0)
             self.error_course.add(model, truth)
             self._measured = stop
-
-    def bytes(self, source: str) -> int:
-        """Memory that a source takes, in bytes."""
-        return self.motions[source].bytes + self.listened.signals[source].bytes
 
     def motion_m(self, source: str) -> NDArray[np.float32]:
         """The pictures so far, (ready_frames, grid_points), in m."""

@@ -5,11 +5,10 @@ A request that differs only in listening points, slow motion or other presets ke
 
 from __future__ import annotations
 
-import threading
 import time
-import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 from app.rendering.blow import BlowRequest
 from app.rendering.job import RenderJob
@@ -17,6 +16,7 @@ from app.rendering.rendering import RenderListener, RenderRequest
 from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
+from app.shared.worker import Job, Worker
 from engine.presets import PresetError
 
 TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given back
@@ -27,7 +27,7 @@ PATIENCE_S = 5.0  # for the first sound
 
 
 class RenderWorker:
-    """A thread with a mailbox that holds the latest request.
+    """A worker that renders the latest request.
 
     Args:
         load: returns a preset's model and truth; called in the worker's thread.
@@ -47,68 +47,48 @@ class RenderWorker:
         self._load = load
         self._hurried = hurried
         self._sounds = sounds
-        self._mailbox = threading.Condition()
-        self._request: RenderRequest | BlowRequest | None = None
-        self._closing = False
+        self._patient_until_s = time.monotonic() + PATIENCE_S
+        self._rendering: RenderJob | None = None  # the latest; the worker's thread alone has it
         self._helper = ThreadPoolExecutor(1, "render-helper", lower_priority, (Rank.RENDERING,))
-        self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
-        self._thread.start()
+        self._worker = Worker("render-worker", self._hear, (PresetError,), rank=Rank.RENDERING, doing="Rendering")
 
     def submit(self, request: RenderRequest | BlowRequest) -> None:
-        """Replace a request that waits and abandon another motion being rendered. Any thread; return at once."""
-        with self._mailbox:
-            self._request = request
-            self._mailbox.notify()
+        """Replace a request that waits and abandon another motion being rendered; return at once."""
+        self._worker.start(partial(self._render, request))
 
     def close(self) -> None:
         """End the thread; may be called again."""
-        with self._mailbox:
-            self._closing = True
-            self._mailbox.notify()
-        self._thread.join(10)
+        self._worker.close()
         self._helper.shutdown()  # at most a block
 
     # All below runs in the worker's thread.
 
-    def _run(self) -> None:
-        lower_priority(Rank.RENDERING)
-        ends_s = time.monotonic() + PATIENCE_S
-        while not (self._closing or self._sounds() or time.monotonic() > ends_s):
-            time.sleep(LOOK_AGAIN_S)
-        job: RenderJob | None = None
-        untidy = False  # whether anything was rendered since free memory was given back
-        while True:
-            with self._mailbox:
-                waits = job is None or job.idle
-                if job is not None and not waits and self._request is None and self._in_step(job):
-                    self._mailbox.wait(LOOK_AGAIN_S)
-                while waits and self._request is None and not self._closing:
-                    # not while keys are played: it locks the heap, which the sound server's client uses too
-                    if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy and not self._hurried():
-                        return_free_pages()
-                        untidy = False
-                if self._closing:
-                    return
-                request, self._request = self._request, None
-            if request is not None:
-                if job is not None and request.same_motion(job.request):
-                    job.ask_again(request)
-                    job.announce()
-                else:
-                    job = RenderJob(request, self._load, self._listener, self._helper)
-            assert job is not None
-            if self._in_step(job):
-                continue
-            try:
-                job.advance()
-                untidy = True
-            except PresetError as error:
-                job = None
-                self._listener.render_failed(str(error), "")
-            except Exception as error:  # reported to the user; the worker continues
-                job = None
-                self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
+    def _hear(self, _: Job, signal_name: str, *values: str) -> None:
+        if signal_name == "failed":
+            self._rendering = None
+            self._listener.render_failed(*values)
 
-    def _in_step(self, job: RenderJob) -> bool:
+    def _render(self, request: RenderRequest | BlowRequest, job: Job) -> None:
+        while not self._sounds() and time.monotonic() < self._patient_until_s:
+            job.wait(LOOK_AGAIN_S)
+        rendering = self._rendering
+        if rendering is not None and request.same_motion(rendering.request):
+            rendering.ask_again(request)
+            rendering.announce()
+        else:
+            rendering = self._rendering = RenderJob(request, self._load, self._listener, self._helper)
+        while not rendering.idle:
+            if self._is_in_step(rendering):
+                job.wait(LOOK_AGAIN_S)
+            else:
+                rendering.advance()
+                job.wait()
+        job.wait(TIDY_AFTER_S)
+        while self._hurried():  # it locks the heap, which the sound server's client uses too
+            job.wait(TIDY_AFTER_S)
+        return_free_pages()
+
+    def _is_in_step(self, rendering: RenderJob) -> bool:
         """Return True if the motion is far enough ahead of its sound for now."""
-        return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()
+        age_s = rendering.age_s
+        return age_s < IN_STEP_S and rendering.rendered_s > age_s + LEAD_S and self._hurried()

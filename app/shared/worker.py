@@ -103,6 +103,8 @@ class Worker:
             result), "failed" (message, details) or "cancelled".
         expected: errors whose message is for the user; of any other the details have the traceback.
         rests: see `Job`.
+        rank: the priority of the thread.
+        doing: the word before "failed" in the message of an unexpected error.
     """
 
     def __init__(
@@ -111,11 +113,16 @@ class Worker:
         say: Callable[..., None],
         expected: tuple[type[Exception], ...] = (),
         rests: Callable[[], bool] = lambda: False,
+        *,
+        rank: Rank = Rank.BACKGROUND,
+        doing: str = "Computing",
     ) -> None:
         self._name = name
         self._say = say
         self._expected = expected
         self._rests = rests
+        self._rank = rank
+        self._doing = doing
         self._mailbox = threading.Condition()
         self._next: tuple[Job, Work] | None = None
         self._job: Job | None = None  # the latest
@@ -153,7 +160,7 @@ class Worker:
             self._thread.join(seconds)
 
     def _run(self) -> None:
-        lower_priority(Rank.BACKGROUND)
+        lower_priority(self._rank)
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._next is not None or self._closing)
@@ -169,6 +176,6 @@ class Worker:
             except self._expected as error:
                 self._say(job, "failed", str(error), "")
             except Exception as error:  # shown to the user; the thread continues
-                self._say(job, "failed", f"Computing failed: {error}", traceback.format_exc())
+                self._say(job, "failed", f"{self._doing} failed: {error}", traceback.format_exc())
             result = None
             del job, work  # they may hold a take
