@@ -47,16 +47,8 @@ class TakeCost:
     moved_wall_s: float
 
 
-class _Nobody:
-    """A listener that does nothing."""
-
-    def take_started(self, take: object) -> None: ...
-
-    def take_finished(self, take: object) -> None: ...
-
-    def other_failed(self, preset: str, message: str) -> None: ...
-
-    def render_failed(self, message: str, detail: str) -> None: ...
+def _say_nothing(*_: object) -> None:
+    """Ignore the signals of a job."""
 
 
 def measure(report: ProgressReport) -> dict[str, Any]:
@@ -72,8 +64,8 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     sources = Sources()
     request = RenderRequest(path, Pluck(), SECONDS, EARS[0], SPEED)
-    _finish(RenderJob(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
-    job = RenderJob(request, sources.load, _Nobody(), helper)
+    _finish(RenderJob(replace(request, seconds=0.1), sources.load, _say_nothing, helper))  # loads and compiles
+    job = RenderJob(request, sources.load, _say_nothing, helper)
     rendered_s, _ = _finish(job)
     take = job.take
     assert isinstance(take, Take)

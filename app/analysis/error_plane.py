@@ -44,12 +44,10 @@ class PlanePicture:
         error: relative MAE over the trained horizon, (positions, amplitudes) of the finest grid. Its logarithm is
             interpolated between the points of the finest complete level.
         spacing: between the points of that level, in steps of the finest grid.
-        share: of all points, how many are known, 0 … 1.
     """
 
     error: Array
     spacing: int
-    share: float
 
     def at(self, position: float, amplitude_mm: float) -> float:
         """The error at the grid's point nearest to a pluck."""
@@ -80,7 +78,7 @@ class ErrorPlane:
         if spacing is None:
             return None
         fine_errors = np.exp(refine(np.log(np.maximum(self.error[::spacing, ::spacing], 1e-9)), spacing))
-        return PlanePicture(fine_errors, spacing, self._share)
+        return PlanePicture(fine_errors, spacing)
 
     @property
     def _share(self) -> float:

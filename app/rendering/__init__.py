@@ -1,7 +1,7 @@
 """The rendering of plucks and blows to pictures and signals: the take, and the worker thread that renders it."""
 
 from app.rendering.blow import BlowRequest, BlowTake
-from app.rendering.rendering import RenderListener, RenderRequest
+from app.rendering.rendering import RenderRequest
 from app.rendering.take import SOURCES, Sounding, Take
 from app.rendering.worker import RenderWorker
 
@@ -9,7 +9,6 @@ __all__ = [
     "SOURCES",
     "BlowRequest",
     "BlowTake",
-    "RenderListener",
     "RenderRequest",
     "RenderWorker",
     "Sounding",

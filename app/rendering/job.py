@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.line import SourceLine
-from app.rendering.rendering import RenderListener, RenderRequest
+from app.rendering.rendering import RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Loaded, Subject
 from app.rendering.take import SOURCES, Listened, Pictures, Take
@@ -26,12 +26,15 @@ PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 24
 
 
 class RenderJob:
-    """The rendering of a request; `advance` does the next block of it, and calls `listener` in its thread.
+    """The rendering of a request; `advance` does the next block of it, and calls `say` in its thread.
 
     Requests for one motion differ in listening points, slow motion or other presets.
 
     Args:
         load: returns a preset's model and truth; raises PresetError.
+        say: is given a signal's name and its arguments: "started" (the take, of which a block is rendered),
+            "finished" (the same, with motion, signals and errors), "other_refused" (name of another preset, whose
+            model cannot be rendered beside this one and is at rest; message).
         helper: another thread, so that two sources are rendered at the same time.
 
     Attributes:
@@ -42,13 +45,13 @@ class RenderJob:
         self,
         request: RenderRequest | BlowRequest,
         load: Callable[[Subject], Loaded],
-        listener: RenderListener,
+        say: Callable[..., None],
         helper: Executor,
     ) -> None:
         self.request = request
         self.take: Take | BlowTake | None = None
         self._load = load
-        self._listener = listener
+        self._say = say
         self._helper = helper
         self._lines: dict[str, SourceLine | DrumLine] = {}
         self._strobe: Strobe | None = None
@@ -63,9 +66,9 @@ class RenderJob:
     def announce(self) -> None:
         """Report again what there is: the window may have shown another motion in between."""
         if self.take is not None:
-            self._listener.take_started(self.take)
+            self._say("started", self.take)
             if self._finished:
-                self._listener.take_finished(self.take)
+                self._say("finished", self.take)
 
     @property
     def age_s(self) -> float:
@@ -106,10 +109,10 @@ class RenderJob:
         self._advance_lines(take)
         take.measure()
         if begins:
-            self._listener.take_started(take)
+            self._say("started", take)
         if not self._finished and take.complete and take.listened.complete:
             self._finished = True
-            self._listener.take_finished(take)
+            self._say("finished", take)
 
     def _begin(self) -> Take | BlowTake:
         request, loaded = self.request, self._load(self.request.preset)
@@ -136,7 +139,7 @@ class RenderJob:
                 other = self._load(path)
                 info, stride, loaded = other.preset.info, _stride(other.model), other
             except (PresetError, ValueError) as error:
-                self._listener.other_failed(path.stem, str(error))
+                self._say("other_refused", path.stem, str(error))
             motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
             line = self._lines[name] = SourceLine(take, name, loaded, motion, stride)
             if self._strobe is not None:

@@ -1,14 +1,11 @@
-"""The request for a pluck that the render worker renders, and the listener to its results."""
+"""The request for a pluck that the render worker renders."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
-from app.rendering.blow import BlowTake
 from app.rendering.note_sound import NoteSound
-from app.rendering.take import Take
 
 
 @dataclass(frozen=True)
@@ -30,19 +27,3 @@ class RenderRequest(NoteSound):
             other.pluck,
             other.seconds,
         )
-
-
-class RenderListener(Protocol):
-    """The listener to the worker's results, called in the worker's thread."""
-
-    def take_started(self, take: Take | BlowTake) -> None:
-        """Show that a new pluck or blow has its first block."""
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        """Report that its motion, signals and errors are complete."""
-
-    def other_failed(self, preset: str, message: str) -> None:
-        """Report that another preset's model cannot be rendered beside this one; as a source it is at rest."""
-
-    def render_failed(self, message: str, detail: str) -> None:
-        """Report that nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""

@@ -12,7 +12,7 @@ from functools import partial
 
 from app.rendering.blow import BlowRequest
 from app.rendering.job import RenderJob
-from app.rendering.rendering import RenderListener, RenderRequest
+from app.rendering.rendering import RenderRequest
 from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
@@ -30,6 +30,8 @@ class RenderWorker:
     """A worker that renders the latest request.
 
     Args:
+        say: is called in the worker's thread, as by `RenderJob`, and with "failed" (message, details) where nothing
+            can be rendered.
         load: returns a preset's model and truth; called in the worker's thread.
         hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while:
             plucks in quick succession leave processor time for all else.
@@ -38,12 +40,12 @@ class RenderWorker:
 
     def __init__(
         self,
-        listener: RenderListener,
+        say: Callable[..., None],
         load: Callable[[Subject], Loaded],
         hurried: Callable[[], bool] = lambda: False,
         sounds: Callable[[], bool] = lambda: True,
     ) -> None:
-        self._listener = listener
+        self._say = say
         self._load = load
         self._hurried = hurried
         self._sounds = sounds
@@ -66,7 +68,7 @@ class RenderWorker:
     def _hear(self, _: Job, signal_name: str, *values: str) -> None:
         if signal_name == "failed":
             self._rendering = None
-            self._listener.render_failed(*values)
+            self._say(signal_name, *values)
 
     def _render(self, request: RenderRequest | BlowRequest, job: Job) -> None:
         while not self._sounds() and time.monotonic() < self._patient_until_s:
@@ -76,7 +78,7 @@ class RenderWorker:
             rendering.ask_again(request)
             rendering.announce()
         else:
-            rendering = self._rendering = RenderJob(request, self._load, self._listener, self._helper)
+            rendering = self._rendering = RenderJob(request, self._load, self._say, self._helper)
         while not rendering.idle:
             if self._is_in_step(rendering):
                 job.wait(LOOK_AGAIN_S)

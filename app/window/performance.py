@@ -79,7 +79,7 @@ class Playhead:
 
 
 class RenderSignals(QObject):
-    """The `RenderListener` of the window: calls of other threads become signals, which Qt queues for its thread."""
+    """The signals of the render worker in Qt, which queues them for the window's thread."""
 
     started = Signal(object)  # Take or BlowTake
     finished = Signal(object)  # the same
@@ -87,17 +87,8 @@ class RenderSignals(QObject):
     failed = Signal(str, str)  # message, details
     refused = Signal(str, str)  # a pluck cannot be played: message, details
 
-    def take_started(self, take: Take | BlowTake) -> None:
-        self.started.emit(take)
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        self.finished.emit(take)
-
-    def other_failed(self, preset: str, message: str) -> None:
-        self.other_refused.emit(preset, message)
-
-    def render_failed(self, message: str, detail: str) -> None:
-        self.failed.emit(message, detail)
+    def say(self, signal_name: str, *values: object) -> None:
+        getattr(self, signal_name).emit(*values)
 
 
 class Performance(QObject):
@@ -130,7 +121,9 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.report)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
-        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
+        self._worker = RenderWorker(
+            mail.say, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable
+        )
 
     @property
     def entry(self) -> PresetEntry | None:

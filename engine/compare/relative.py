@@ -187,18 +187,10 @@ class ErrorWindows:
         self._sums = np.zeros((5, self.windows + 1))  # of (û - u)², u², û², |û - u| and |u|
 
     @property
-    def complete(self) -> bool:
-        return self.ready == self.windows
-
-    @property
     def rel_mse(self) -> float:
         """The relative error of all frames so far; not a number where the truth rests."""
         wrong, true = self._sums[:2].sum(1)
         return float(wrong / true) if true > 0 else math.nan
-
-    def advance(self) -> bool:
-        """Return False: what renders the frames adds them."""
-        return False
 
     def add(
         self, model: NDArray[np.floating], truth: NDArray[np.floating], weight: NDArray[np.float64] | None = None

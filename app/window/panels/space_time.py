@@ -103,7 +103,9 @@ class SpaceTimePanel(TimePanel[Envelopes]):
 
     def _begin(self, take: Sounding) -> Envelopes:
         assert isinstance(take, Take)  # it draws no drums
-        return Envelopes(take)
+        figures = Envelopes(take)
+        self._keep_up(figures)
+        return figures
 
     def _draw(self, figures: Envelopes) -> None:
         quantity = self.quantities.key

@@ -100,7 +100,9 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
             self._label_frequencies()
 
     def _begin(self, take: Sounding) -> Spectrogram:
-        return Spectrogram(take, take.listened)
+        figures = Spectrogram(take, take.listened)
+        self._keep_up(figures)
+        return figures
 
     def _is_of(self, figures: Spectrogram, take: Sounding) -> bool:
         return figures.listened is take.listened

@@ -19,7 +19,7 @@ from app.views.controls.parts import lay_out_view
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 
-G = TypeVar("G", bound=Growing)
+G = TypeVar("G")
 
 
 class TimePanel(Panel, Generic[G]):
@@ -40,6 +40,10 @@ class TimePanel(Panel, Generic[G]):
     @abstractmethod
     def _begin(self, take: Sounding) -> G:
         """Begin what is to be computed from a take, or from a blow where the panel draws drums."""
+
+    def _keep_up(self, figures: Growing) -> None:
+        """Compute figures as their take grows, in the background."""
+        self.background.start(partial(keep_up, figures))
 
     @abstractmethod
     def _draw(self, figures: G) -> None:
@@ -71,7 +75,6 @@ class TimePanel(Panel, Generic[G]):
         figures = self._made
         if figures is None or not self._is_of(figures, take):
             self._made = figures = self._begin(take)
-            self.background.start(partial(keep_up, figures))
         self._draw(figures)
 
     def _hover(self, time_s: float, place: float) -> None:

@@ -72,7 +72,7 @@ def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: ob
     job.cancel_after = None  # type: ignore[attr-defined]
     whole = plane.compute(None, Pluck(), job)  # type: ignore[arg-type]
     assert len(asked) == len(set(asked)) == 49 * 33
-    assert (whole.spacing, whole.share) == (1, 1.0)
+    assert whole.spacing == 1
     np.testing.assert_allclose(whole.error, POSITIONS[:, None] * AMPLITUDES_MM, rtol=1e-9)
     assert whole.at(POSITIONS[3], AMPLITUDES_MM[5]) == pytest.approx(POSITIONS[3] * AMPLITUDES_MM[5])
     spacings = [found.spacing for found in job.results]  # type: ignore[attr-defined]

@@ -47,17 +47,9 @@ class Log:
     def __init__(self) -> None:
         self.calls: list[str] = []
 
-    def take_started(self, take: Take | BlowTake) -> None:
-        self.calls.append("started")
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        self.calls.append("finished")
-
-    def other_failed(self, preset: str, message: str) -> None:
-        raise AssertionError(message)
-
-    def render_failed(self, message: str, detail: str) -> None:
-        raise AssertionError(message)
+    def say(self, signal_name: str, *values: object) -> None:
+        assert signal_name in ("started", "finished"), values
+        self.calls.append(signal_name)
 
 
 @pytest.fixture
@@ -72,7 +64,7 @@ def request_of(modes: DrumModes, strike: Strike = HARD, seconds: float = 0.25) -
 
 def rendered(request: BlowRequest, helper: Executor) -> BlowTake:
     log = Log()
-    job = RenderJob(request, lambda _: LOADED, log, helper)
+    job = RenderJob(request, lambda _: LOADED, log.say, helper)
     while not job.idle:
         job.advance()
     assert log.calls == ["started", "finished"]
@@ -151,7 +143,7 @@ def test_errors_are_those_over_the_surface(helper: Executor) -> None:
 
 
 def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:
-    job = RenderJob(request_of(TOM), lambda _: LOADED, Log(), helper)
+    job = RenderJob(request_of(TOM), lambda _: LOADED, Log().say, helper)
     while not job.idle:
         job.advance()
     take = job.take
@@ -199,7 +191,7 @@ def test_the_edge_of_a_head_rests_and_a_bar_moves_alike_across() -> None:
 
 def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
     nylon = Loaded(load_preset(SHIPPED / "studio_nylon_b3.safetensors"))
-    job = RenderJob(request_of(TOM), lambda _: nylon, Log(), helper)
+    job = RenderJob(request_of(TOM), lambda _: nylon, Log().say, helper)
     with pytest.raises(PresetError, match="many strings"):
         job.advance()
 
@@ -207,12 +199,12 @@ def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
 def test_the_worker_renders_blows() -> None:
     done, takes = threading.Event(), []
 
-    class Listener(Log):
-        def take_finished(self, take: Take | BlowTake) -> None:
+    def say(signal_name: str, take: Take | BlowTake) -> None:
+        if signal_name == "finished":
             takes.append(take)
             done.set()
 
-    worker = RenderWorker(Listener(), lambda _: LOADED)
+    worker = RenderWorker(say, lambda _: LOADED)
     try:
         worker.submit(request_of(BAR, seconds=0.1))
         assert done.wait(60)

@@ -40,21 +40,15 @@ class Heard:
     def __init__(self) -> None:
         self.finished: Take | None = None
 
-    def take_started(self, take: Take | BlowTake) -> None:
+    def say(self, signal_name: str, take: Take | BlowTake, *_: str) -> None:
+        assert signal_name in ("started", "finished")
         assert take.ready_frames > 1
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        assert isinstance(take, Take)
-        assert take.complete
-        assert take.listened.complete
-        assert self.finished is None
-        self.finished = take
-
-    def other_failed(self, preset: str, message: str) -> None:
-        raise AssertionError(message)
-
-    def render_failed(self, message: str, detail: str) -> None:
-        raise AssertionError(message)
+        if signal_name == "finished":
+            assert isinstance(take, Take)
+            assert take.complete
+            assert take.listened.complete
+            assert self.finished is None
+            self.finished = take
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +63,7 @@ def job(sources: Sources) -> Iterator[Callable[..., RenderJob]]:
 
     def made(preset: Any, **changes: Any) -> RenderJob:
         request = replace(RenderRequest(preset, PLUCK, 0.25, Ear((0.37,)), 0.004), **changes)
-        return RenderJob(request, sources.load, Heard(), helper)
+        return RenderJob(request, sources.load, Heard().say, helper)
 
     yield made
     helper.shutdown()

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from app.playing.sources import Sources
-from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
+from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import SourceLine
 from engine.models._diagonal import KoopmanState
@@ -35,20 +35,14 @@ class Heard:
         self.failed: list[str] = []
         self.others_failed: list[str] = []
 
-    def take_started(self, take: Take | BlowTake) -> None:
-        assert isinstance(take, Take)
-        assert take.ready_frames > 1, "there is something to draw"
-        self.started.append(take)
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        assert isinstance(take, Take)
-        self.finished.append(take)
-
-    def other_failed(self, preset: str, message: str) -> None:
-        self.others_failed.append(f"{preset}: {message}")
-
-    def render_failed(self, message: str, detail: str) -> None:
-        self.failed.append(message)
+    def say(self, signal_name: str, value: Take | str, message: str = "") -> None:
+        if isinstance(value, Take):
+            assert value.ready_frames > 1, "there is something to draw"
+            (self.started if signal_name == "started" else self.finished).append(value)
+        elif signal_name == "failed":
+            self.failed.append(value)
+        else:
+            self.others_failed.append(f"{value}: {message}")
 
 
 def wait_until(done: Callable[[], bool]) -> None:
@@ -70,7 +64,7 @@ def sources() -> Sources:
 
 @pytest.fixture
 def worker(heard: Heard, sources: Sources) -> Iterator[RenderWorker]:
-    made = RenderWorker(heard, sources.load)
+    made = RenderWorker(heard.say, sources.load)
     yield made
     made.close()
     wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
@@ -82,7 +76,7 @@ def request_of(preset: Path, **changes: object) -> RenderRequest:
 
 def test_the_latest_request_wins(small_preset: Path, heard: Heard, sources: Sources) -> None:
     submitted = threading.Event()  # or the first could be finished before the last is submitted
-    worker = RenderWorker(heard, lambda subject: submitted.wait(20) and sources.load(subject))
+    worker = RenderWorker(heard.say, lambda subject: submitted.wait(20) and sources.load(subject))
     for position in (0.3, 0.35, 0.4, 0.45, 0.5):
         worker.submit(request_of(small_preset, pluck=Pluck(position, 3.0), seconds=4.0))
     submitted.set()
@@ -108,7 +102,7 @@ def test_while_plucks_are_heard_a_motion_keeps_step_with_its_sound(
     """And is whole at once when they are not heard any more."""
     monkeypatch.setattr(worker_module, "IN_STEP_S", 600.0)  # not over before this is looked at
     hurried = True
-    worker = RenderWorker(heard, Sources().load, lambda: hurried)
+    worker = RenderWorker(heard.say, Sources().load, lambda: hurried)
     try:
         worker.submit(request_of(small_preset, seconds=30.0))
         wait_until(lambda: bool(heard.started))
@@ -124,7 +118,7 @@ def test_while_plucks_are_heard_a_motion_keeps_step_with_its_sound(
 def test_the_first_motion_waits_until_a_pluck_would_sound(small_preset: Path, heard: Heard) -> None:
     """It may load torch, which would keep the sound waiting."""
     sounds = False
-    worker = RenderWorker(heard, Sources().load, sounds=lambda: sounds)
+    worker = RenderWorker(heard.say, Sources().load, sounds=lambda: sounds)
     try:
         worker.submit(request_of(small_preset))
         time.sleep(0.1)
