@@ -27,7 +27,8 @@ from app.session.silence import why_silent
 from app.shared.worker import Job, Work
 from app.stage.session import Session
 from app.views.background import Background
-from app.views.controls.parts import lay_out_alone, words_label
+from app.views.controls.elided_label import Readout
+from app.views.controls.parts import lay_out_alone
 from app.views.controls.plain import Label
 from app.views.controls.progress_strip import ProgressStrip
 from app.views.stage import StageView
@@ -220,7 +221,8 @@ class ComputedPanel(Panel):
         super().__init__(session, library)
         self.setAccessibleName(self.title)
         self.setMinimumHeight(LEAST_HEIGHT)
-        self._words = words_label()
+        self._words = Readout()
+        self._words.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.progress = ProgressStrip(f"Progress of the {self.title.lower()}")
         self._asked: object = None
         self._begun = False
@@ -244,8 +246,8 @@ class ComputedPanel(Panel):
         raise NotImplementedError
 
     def _say(self, words: str, share: float | None = None) -> None:
-        """Write the line of words, and show the share that is computed; None: nothing is."""
-        self._words.say(words)
+        """Write the words while nothing is pointed at, and show the share that is computed; None: nothing is."""
+        self._words.rest(words)
         self.progress.show_share(share)
 
     def choices_changed(self, names: frozenset[str]) -> None:

@@ -208,7 +208,7 @@ class ComparePanel(ComputedPanel):
         count, fresh = len(entries), sum(of_this for _, of_this in rows)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
         former = any(row.mae is not None and not of_this for row, of_this in rows)
-        self._words.setText(
+        self._words.rest(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {basis.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
         )

@@ -115,19 +115,13 @@ class EigenvaluesPanel(ComputedPanel):
         self.plane.show_points(learned, first_layer, string, self._modes == solo if solo else None)
         if not keep_view:
             self.plane.set_axes(musical, figure.rate_hz)
+        self._words.rest(f"Mode {solo} is soloed; Esc plays all modes" if solo else figure.note)
         self._show_values(-1)
 
     def _show_values(self, point: int) -> None:
-        """Write the values of a point above the plane; -1: the note of the figure."""
-        figure, solo = self._figure, self.session.choices.solo
-        if figure is None:
-            return
-        if point >= 0:
-            self._words.say(*self._describe(figure, point))
-        elif solo:
-            self._words.say(f"Mode {solo} is soloed; Esc plays all modes")
-        else:
-            self._words.say(figure.note)
+        """Write the values of a point above the plane; -1: none is pointed at."""
+        figure = self._figure
+        self._words.report(*(self._describe(figure, point) if figure is not None and point >= 0 else ("",)))
 
     def _describe(self, figure: PoleFigure, point: int) -> list[str]:
         """The description of a point in several wordings, the longest first."""

@@ -59,7 +59,6 @@ class ErrorPlanePanel(ComputedPanel):
         self.map.pointed.connect(self._show_values)
         self.map.taken.connect(self._audition)
         self._picture: PlanePicture | None = None
-        self._resting = ""
         self._moved = False  # the pluck's mark is of choices that have changed since
         self._planes = _Planes()
         self.background.progressed.connect(self._show_progress)
@@ -118,22 +117,16 @@ class ErrorPlanePanel(ComputedPanel):
         self.map.show_picture(picture)
         self._show_values(*(self.map.cursor or (math.nan, math.nan)))
 
-    def _say(self, words: str, share: float | None = None) -> None:
-        """Write the line above the map while nothing is pointed at, and show the share that is computed."""
-        self._resting = words
-        self.progress.show_share(share)
-        self._show_values(*(self.map.cursor or (math.nan, math.nan)))
-
     def _show_values(self, position: float, amplitude_mm: float) -> None:
         if self._picture is None or math.isnan(position):
-            self._words.setText(self._resting)
+            self._words.report("")
             return
         error = self._picture.at(position, amplitude_mm)
         text = "diverges" if math.isinf(error) else f"error as trained about {percent(error)}"
         if self._picture.spacing > 1:
             text += ", still coarse"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the training range"
-        self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
+        self._words.report(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Planes:

@@ -125,7 +125,7 @@ class PartialsPanel(ComputedPanel):
         )
         self._show_solo()
         short = f"{WINDOWS[window].capitalize()}: too short to measure; increase the duration"
-        self._words.setText("" if rows else short)
+        self._words.rest("" if rows else short)
 
     def _show_solo(self) -> None:
         self.table.choose(self.session.choices.solo or None)

@@ -91,8 +91,7 @@ class SpectrumPanel(CurvesPanel):
         # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
         self._area_of: str | None = None
-        self._levels_db: dict[str, NDArray[np.float32]] = {}
-        self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
+        self._levels: dict[str, tuple[Analyser, NDArray[np.float32]]] = {}  # by source, each of a rate of its own
         tip = "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
         super().__init__(session, library, Plot("Spectrum", tip, "frequency (Hz)"))
         self.setMinimumHeight(LEAST_HEIGHT)
@@ -160,12 +159,12 @@ class SpectrumPanel(CurvesPanel):
         if self._area_of:
             hue = theme.SOURCE_COLOURS[theme.source_kind(self._area_of)]
             self._area.setBrush(pg.mkBrush(theme.translucent(hue, 28)))
-        self._levels_db = {name: levels for name, levels in self._levels_db.items() if name in self._curves}
+        self._levels = {name: levels for name, levels in self._levels.items() if name in self._curves}
 
     def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
         """Draw the spectrum of a window of signal, (frames,), in units of full scale."""
         levels = analyser.level_db(signal)
-        self._levels_db[source], self._analysers[source] = levels, analyser
+        self._levels[source] = analyser, levels
         self._curves[source].setData(analyser.column_hz, levels)
         if source == self._area_of:
             tops_db = levels.reshape(-1, AREA_STEP).max(axis=1)
@@ -173,7 +172,7 @@ class SpectrumPanel(CurvesPanel):
             self._area.setData(middles, tops_db, skipFiniteCheck=True)
 
     def _clear(self, source: str) -> None:
-        self._levels_db.pop(source, None)
+        self._levels.pop(source, None)
         self._curves[source].setData([], [])
         if source == self._area_of:
             self._area.setData([], [])
@@ -181,8 +180,7 @@ class SpectrumPanel(CurvesPanel):
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources whose rate does not reach it."""
         levels_db = {}
-        for source, levels in self._levels_db.items():
-            analyser = self._analysers[source]
+        for source, (analyser, levels) in self._levels.items():
             if frequency_hz <= analyser.rate_hz / 2:
                 column = int(np.abs(np.log(analyser.column_hz / frequency_hz)).argmin())
                 levels_db[source] = float(levels[column])

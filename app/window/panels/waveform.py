@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +29,12 @@ class _Drawn:
     """A signal as far as it has been read."""
 
     origin: HeardSignal
-    signal: NDArray[np.float32] = field(init=False)
     ready: int = 0
     peak: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.signal = np.empty(self.origin.frames, np.float32)
 
     def catch_up(self) -> bool:
         """Read on, MOST_FRAMES at most; whether there was something to read."""
         new = self.origin.read(self.ready, self.ready + MOST_FRAMES)
-        self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
         self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
         return len(new) > 0
@@ -101,10 +96,8 @@ class WaveformPanel(CurvesPanel):
         choices, has_grown = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            origin, earlier = (
-                HeardSignal(take.listened.signals, source.source, source.gain),
-                before.get(source.source),
-            )
+            origin = HeardSignal(take.listened.signals, source.source, source.gain)
+            earlier = before.get(source.source)
             if not origin.there:
                 continue  # another preset's model, not yet rendered
             drawn = earlier if earlier is not None and earlier.origin == origin else _Drawn(origin)
@@ -124,7 +117,8 @@ class WaveformPanel(CurvesPanel):
         for source, curve in self._curves.items():
             if source in self._drawn:
                 drawn = self._drawn[source]
-                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.origin.rate_hz)
+                signal = np.float32(factor) * drawn.origin.read(0, drawn.ready)
+                self.show_signal(source, signal, drawn.origin.rate_hz)
             else:
                 curve.setData([], [])
 
