@@ -27,23 +27,20 @@ class StringFrame:
 
     Attributes:
         shapes: by source.
-        lowest, highest: by source, the extremes within `BLUR_S`: the blur of the motion in real time.
+        blurs: by source, the extremes within `BLUR_S`: the blur of the motion in real time.
         caption: as of `caption_of`.
         envelopes: by source, the extremes within `ENVELOPE_S`; empty where they are not shown.
     """
 
     shapes: dict[str, NDArray[np.float32]]
-    lowest: dict[str, NDArray[np.float32]]
-    highest: dict[str, NDArray[np.float32]]
+    blurs: Mapping[str, Band]
     caption: str = ""
     envelopes: Mapping[str, Band] = field(default_factory=dict)
 
     def largest_mm(self, with_envelopes: bool = False) -> float:
         """The largest displacement, in mm, of the motion; 0 where nothing is drawn yet."""
-        bands = [*self.lowest.values(), *self.highest.values()]
-        if with_envelopes:
-            bands += [edge for band in self.envelopes.values() for edge in band]
-        return max((float(np.abs(band).max()) for band in bands), default=0.0)
+        bands = [*self.blurs.values(), *(self.envelopes.values() if with_envelopes else ())]
+        return max((float(np.abs(edge).max()) for band in bands for edge in band), default=0.0)
 
 
 class Envelope:
@@ -114,18 +111,15 @@ def frame_at(
         speed: of slow motion; 1 is real time.
     """
     rendered = [motion for motion in motions if motion.there]
-    shapes = {}
-    lowest = {}
-    highest = {}
+    shapes, blurs = {}, {}
     for motion in rendered:
         last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
         frames = motion.read_all(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
         shapes[motion.source] = motion.shape(position_s) * MM
-        lowest[motion.source] = frames.min(axis=0) * MM
-        highest[motion.source] = frames.max(axis=0) * MM
+        blurs[motion.source] = frames.min(axis=0) * MM, frames.max(axis=0) * MM
     envelopes = envelope.before(position_s, rendered) if envelope else {}
     caption = caption_of(position_s, speed, take.horizon_s)
-    return StringFrame(shapes, lowest, highest, caption, envelopes)
+    return StringFrame(shapes, blurs, caption, envelopes)
 
 
 def caption_of(position_s: float, speed: float, horizon_s: float) -> str:

@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.analysis.growing import BLOCK_FRAMES
 from app.rendering import SOURCES, Take
 
 QUANTITIES = (*SOURCES, "error")
 STRIDE_S = 0.001  # of the envelopes
+BLOCK_FRAMES = 2048  # of a take, computed at a time: a millisecond or two, so that the interpreter is soon free again
 LARGEST_SHARE = 1 / 12  # the longest column, as a share of the fundamental's period, for which signs are drawn
 
 Detail = Literal["frames", "extremes", "envelope"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
-from app.rendering import SOURCES, BlowTake, Sounding
+from app.rendering import SOURCES, Sounding
 from app.rendering.take import Listened
 
 FLOOR_DB = -150.0
@@ -36,6 +36,7 @@ class Spectrogram:
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
         self.ready = 0
+        self._odd = take.pickup in ("velocity", "pressure")  # about the start
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
         self._window *= np.float32(2 / self._window.sum() / take.full_scale)
         self.columns = self._columns_of(self._heard["truth"].frames)
@@ -80,7 +81,7 @@ class Spectrogram:
         signal = source_signal.read(max(first, 0), last)
         if first < 0:
             mirror = source_signal.read(1, 1 - first)[::-1]
-            if isinstance(self.take, BlowTake) or self.listened.ear.pickup == "velocity":
+            if self._odd:
                 mirror = -mirror
             signal = np.concatenate([mirror, signal])
         windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]

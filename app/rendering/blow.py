@@ -181,6 +181,7 @@ class BlowTake(Sounding):
     """
 
     full_scale = FULL_SCALE_PA
+    pickup = "pressure"
     motions: Mapping[str, ModalMotion]
 
     def __init__(self, request: BlowRequest, head: Head) -> None:

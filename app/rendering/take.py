@@ -146,6 +146,11 @@ class Sounding(ABC):
         return self.ready_frames == self.frames
 
     @property
+    def pickup(self) -> str:
+        """The kind of pick-up, which signals are in the unit of."""
+        return self.listened.ear.pickup
+
+    @property
     def full_scale(self) -> float:
         """The level of 0 dB, in the unit of the signals."""
         return self.listened.ear.full_scale

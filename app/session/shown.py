@@ -9,7 +9,7 @@ from app.session.choices import Choices
 from app.session.monitor import Monitor
 from app.session.slots import source_title
 from app.shared.vocabulary import DIFFERENCE
-from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, FULL_SCALE_PA
 
 LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
@@ -67,10 +67,15 @@ def part_words(choices: Choices) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def full_scale_words(choices: Choices) -> str:
-    """The displacement, velocity or force that 0 dB stands for."""
-    words = {"displacement": f"{1000 * FULL_SCALE_M:g} mm", "velocity": f"{FULL_SCALE_M_S:g} m/s"}
-    return words.get(choices.pickup, f"{FULL_SCALE_N:g} N")
+def level_words(pickup: str) -> str:
+    """The label of levels: the displacement, velocity, force or pressure that 0 dB stands for."""
+    full_scales = {
+        "displacement": f"{1000 * FULL_SCALE_M:g} mm",
+        "velocity": f"{FULL_SCALE_M_S:g} m/s",
+        "bridge": f"{FULL_SCALE_N:g} N",
+        "pressure": f"{FULL_SCALE_PA:g} Pa",
+    }
+    return f"dB re {full_scales[pickup]}"
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:

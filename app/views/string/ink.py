@@ -44,8 +44,7 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front:
     order = sorted(frame.shapes, key=lambda name: name == front)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
-        band = frame.lowest[name], frame.highest[name]
-        _paint_band(painter, axes, band, name, 0.24 if name == front else 0.18)
+        _paint_band(painter, axes, frame.blurs[name], name, 0.24 if name == front else 0.18)
     if not glows:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         paint_grid(painter, axes)  # the opaque bands have covered it

@@ -22,7 +22,7 @@ from app.rendering import BlowTake, Take
 from app.session.choices import Choices, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
-from app.session.shown import ShownSource, full_scale_words, shown_sources
+from app.session.shown import ShownSource, shown_sources
 from app.session.silence import why_silent
 from app.shared.worker import Job, Work
 from app.stage.session import Session
@@ -87,12 +87,6 @@ class Moment:
         """Return True if a picture shows the motion, not rest: in Play as long as its note rings."""
         in_lab_or_audible = self.audible or choices.face != "play"
         return choices.motion and (self.playing or (self.position_s > 0 and in_lab_or_audible))
-
-
-def level_words(choices: Choices, sounding: Take | BlowTake | None = None) -> str:
-    """The label of levels: what 0 dB stands for, of a drum's blow or by the chosen pick-up."""
-    blow = sounding if isinstance(sounding, BlowTake) else None
-    return f"dB re {full_scale_words(choices) if blow is None else f'{blow.full_scale:g} Pa'}"
 
 
 class Panel(QWidget):

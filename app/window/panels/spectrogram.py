@@ -13,6 +13,7 @@ from PySide6.QtCore import QRectF
 from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
+from app.session.shown import level_words
 from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import combo_box
@@ -20,7 +21,6 @@ from app.views.controls.segments import Segments
 from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, frequency_ticks
 from app.views.plots.colour_maps import level_map
 from app.views.plots.time_plot import TimePlot
-from app.window.panels.base import level_words
 from app.window.panels.time_panel import TimePanel
 
 ROWS = 320
@@ -90,11 +90,11 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "pickup" in names:
-            self._bar_label.set(level_words(self.session.choices), "dB")
+            self._bar_label.set(level_words(self.session.choices.pickup), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        self._bar_label.set(level_words(self.session.choices, take), "dB")
+        self._bar_label.set(level_words(take.pickup), "dB")
         if take.rate_hz / 2 != self._highest_hz:
             self._highest_hz = take.rate_hz / 2
             self._label_frequencies()

@@ -15,14 +15,14 @@ from app.analysis.heard import HeardSignal
 from app.analysis.spectrogram import FrequencyRows
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.shown import ShownSource, shown_sources
+from app.session.shown import ShownSource, level_words, shown_sources
 from app.stage.session import Session
 from app.views import theme
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view
 from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, frequency_ticks
 from app.views.plots.plot import Plot
-from app.window.panels.base import LEAST_HEIGHT, Moment, level_words
+from app.window.panels.base import LEAST_HEIGHT, Moment
 from app.window.panels.curves import CurvesPanel
 
 FLOOR_DB, CEILING_DB = -130.0, 0.0
@@ -118,12 +118,12 @@ class SpectrumPanel(CurvesPanel):
     def choices_changed(self, names: frozenset[str]) -> None:
         super().choices_changed(names)
         if "pickup" in names:
-            self.plot.label.set(level_words(self.session.choices), "dB")
+            self.plot.label.set(level_words(self.session.choices.pickup), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
         self._partials_hz = take.partials_hz
-        self.plot.label.set(level_words(self.session.choices, take), "dB")
+        self.plot.label.set(level_words(take.pickup), "dB")
 
     def _draw_moment(self, moment: Moment) -> None:
         take, choices = moment.sounding, self.session.choices

@@ -6,13 +6,13 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable
 from functools import partial
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from PySide6.QtWidgets import QWidget
 
-from app.analysis.growing import Growing, keep_up
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
+from app.shared.worker import Job
 from app.stage.session import Session
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import lay_out_view
@@ -20,6 +20,24 @@ from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 
 G = TypeVar("G")
+LOOK_AGAIN_S = 0.03  # while a take has nothing new
+
+
+class Growing(Protocol):
+    """Results of which the first so many are ready and never change: one thread calls `advance`, any thread reads."""
+
+    @property
+    def complete(self) -> bool:
+        """Return True if all results are ready."""
+
+    def advance(self) -> bool:
+        """Compute the next few results; return False where the take has nothing new for them yet."""
+
+
+def keep_up(growing: Growing, job: Job) -> None:
+    """Compute all results as the take grows. Raises Cancelled: they are no longer wanted."""
+    while not growing.complete:
+        job.wait(0.0 if growing.advance() else LOOK_AGAIN_S)
 
 
 class TimePanel(Panel, Generic[G]):

@@ -108,12 +108,11 @@ class WaveformPanel(CurvesPanel):
         return has_grown
 
     def _draw(self, take: Sounding) -> None:
-        pickup = "pressure" if isinstance(take, BlowTake) else take.listened.ear.pickup
         peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)
-        factor, unit = readable_unit(self._full, pickup)
-        self.set_scale(factor * self._full, pickup, unit)
+        factor, unit = readable_unit(self._full, take.pickup)
+        self.set_scale(factor * self._full, take.pickup, unit)
         for source, curve in self._curves.items():
             if source in self._drawn:
                 drawn = self._drawn[source]

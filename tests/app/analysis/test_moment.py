@@ -38,8 +38,8 @@ def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
     frame = frame_at(take, both(take), 0.5, 1.0)
     expected = 1.0 * np.cos(2 * np.pi * take.fundamental_hz * 0.5)
     assert frame.shapes["truth"][50] == pytest.approx(expected, abs=0.02)
-    assert frame.highest["truth"][50] == pytest.approx(1.0, abs=0.02)
-    assert frame.lowest["model"][50] == pytest.approx(-0.5, abs=0.02)
+    assert frame.blurs["truth"][1][50] == pytest.approx(1.0, abs=0.02)
+    assert frame.blurs["model"][0][50] == pytest.approx(-0.5, abs=0.02)
     assert frame.caption.endswith("past training")
     assert frame_at(take, both(take), 0.05, 1.0).caption == "0.050 s"
 
@@ -70,9 +70,9 @@ def test_the_difference_and_another_preset_move_too() -> None:
     )
     envelope = Envelope()
     frame = frame_at(take, motions, 0.5, 1.0, envelope)
-    assert frame.lowest[DIFFERENCE][50] == pytest.approx(-5.0, abs=0.1)
+    assert frame.blurs[DIFFERENCE][0][50] == pytest.approx(-5.0, abs=0.1)
     assert frame.shapes["preset:other"] == pytest.approx(np.full(11, 0.5), abs=1e-5)
-    assert frame.highest["preset:other"][0] == pytest.approx(0.499, abs=1e-4)
+    assert frame.blurs["preset:other"][1][0] == pytest.approx(0.499, abs=1e-4)
     assert frame.envelopes["preset:other"][1][0] == pytest.approx(0.499, abs=1e-4)
     assert frame.envelopes[DIFFERENCE][1][50] == pytest.approx(5.0, abs=0.1)
     assert frame_at(take, [motions[1]], 9.0, 1.0).shapes["preset:other"][0] == pytest.approx(1.0)

@@ -9,7 +9,7 @@ import pytest
 
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
-from app.session.shown import DEFAULT_SOURCES, full_scale_words, part_words, readable_unit, shown_sources
+from app.session.shown import DEFAULT_SOURCES, level_words, part_words, readable_unit, shown_sources
 from engine.presets import read_info
 
 
@@ -38,10 +38,10 @@ def test_what_both_slots_hold_is_shown_once(library: Library) -> None:
 
 def test_the_axis_says_what_is_picked_up() -> None:
     assert part_words(Choices()) == ""
-    assert full_scale_words(Choices(pickup="bridge")) == "20 N"
+    assert level_words("bridge") == "dB re 20 N"
     choices = Choices(pickup="velocity", solo=3, stereo=True)
     assert part_words(choices) == "mode 3, left"
-    assert (full_scale_words(Choices()), full_scale_words(choices)) == ("10 mm", "30 m/s")
+    assert (level_words("displacement"), level_words("velocity")) == ("dB re 10 mm", "dB re 30 m/s")
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.analysis.growing import keep_up
 from app.shared import worker
 from app.shared.worker import Cancelled, Job
 from app.views.background import Background
+from app.window.panels.time_panel import keep_up
 from engine.presets import PresetError
 from tests.app.gestures import reported
 

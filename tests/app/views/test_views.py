@@ -105,7 +105,7 @@ def test_animated_plots_survive(qtbot: QtBot, waveform: WaveformPanel) -> None:
             waveform.show_signal("model", noise, 16_000)
         waveform.plot.show_playhead(frame / 150)
         shapes = {"model": noise[:101], "truth": noise[101:202]}
-        string.show_frame(StringFrame(shapes, shapes, shapes))
+        string.show_frame(StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()}))
         qtbot.wait(1)
     assert drawn(waveform).getData()[1].max() > 2
     levels = [curve.getData()[0] for curve in spectrum.plot.getPlotItem().listDataItems()]

@@ -60,7 +60,7 @@ def frame_of(mm: float = 0.0, **other_mm: float) -> StringFrame:
     """A moment of a string in its first shape, or of two."""
     shape = np.sin(np.pi * np.linspace(0, 1, 101)).astype(np.float32)
     shapes = {"model": mm * shape, **{name: (mm + by) * shape for name, by in other_mm.items()}}
-    return StringFrame(shapes, shapes, shapes)
+    return StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()})
 
 
 def test_axes_go_to_pixels_and_back() -> None:
@@ -212,7 +212,7 @@ def test_what_was_not_trained_and_the_envelope_are_seen(view: StringView) -> Non
     view.show_frame(still)
     without = picture(view)
     reach = {"model": (still.shapes["model"] - 0.05, still.shapes["model"] + 0.05)}
-    view.show_frame(StringFrame(still.shapes, still.shapes, still.shapes, envelopes=reach))
+    view.show_frame(StringFrame(still.shapes, still.blurs, envelopes=reach))
     at = StringAxes(WIDTH, HEIGHT, 0.1).at(0.42, 0.03).toPoint()
     assert picture(view).pixel(at) != without.pixel(at)
 
