@@ -32,9 +32,9 @@ class RenderJob:
 
     Args:
         load: returns a preset's model and truth; raises PresetError.
-        say: is given a signal's name and its arguments: "started" (the take, of which a block is rendered),
-            "finished" (the same, with motion, signals and errors), "other_refused" (name of another preset, whose
-            model cannot be rendered beside this one and is at rest; message).
+        say: is given a signal's name and its arguments. "started" (the take): a block of it is rendered. "finished"
+            (the take): motion, signals and errors are. "other_refused" (name of a preset, message): its model cannot
+            be rendered beside this one, and is at rest.
         helper: another thread, so that two sources are rendered at the same time.
 
     Attributes:
