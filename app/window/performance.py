@@ -7,7 +7,7 @@ pluck, and the views show it at the note's own time. All but `play_preset` runs 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QObject, Signal
@@ -25,12 +25,13 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowRequest, BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import Session
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
 from app.shared.vocabulary import DIFFERENCE
+from app.stage.session import Session
+from app.stage.stage import Turned
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from engine.plain_text import name_text
@@ -103,7 +104,6 @@ class Performance(QObject):
     """The owner of the notes and the render worker. Times are in s from the pluck or blow.
 
     Attributes:
-        by_hand: the chosen pluck as an event, which loops play.
         compared: a blind test is open: no other note begins, and all is heard without body and room.
     """
 
@@ -116,7 +116,6 @@ class Performance(QObject):
         self._library = library
         self._sound = sound
         self._panels = panels
-        self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self.compared = False
         self._asked: RenderRequest | BlowRequest | None = None  # the motion that is to be shown
         self._blow: KeyNote | None = None  # the note of a blow that is asked for
@@ -256,6 +255,7 @@ class Performance(QObject):
         self._shown.park(position_s)
         if not self._plays_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
             self.notes.latest = self._shown.note = note
+            self._session.send(Turned(note))
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
@@ -368,15 +368,14 @@ class Performance(QObject):
         if note is None or take is None or note.request is None or not note.began:
             return
         if turn is not None:
-            if turn.began and not turn.cut:
-                self.notes.latest = turn
-                if self._is_chosen(turn):
-                    self._shown.note = turn
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
                 self._next_turn = None
+                if not turn.cut:
+                    self.notes.latest = turn
+                    self._session.send(Turned(turn))
             return
         if not (note.cut or note.released):
-            self._next_turn = self.notes.turn(note, take.seconds, self.by_hand())
+            self._next_turn = self.notes.turn(note, take.seconds, self._session.stage.by_hand())
 
     def _forget_turn(self) -> None:
         turn, self._next_turn = self._next_turn, None
