@@ -117,7 +117,7 @@ class Ahead:
 
     Args:
         begin: hands a note over; called in the thread when enough of all its samples is rendered.
-        failed: is called there with a note and what went wrong.
+        failed: ends a note, and reports what went wrong; called there.
     """
 
     def __init__(
@@ -161,7 +161,6 @@ class Ahead:
             try:
                 self._advance(note)
             except Exception as error:
-                note.cut = True
                 self._failed(note, error)
             with self._mailbox:
                 if note.over or not note.unfinished:

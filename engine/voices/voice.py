@@ -185,11 +185,6 @@ class Voice(KernelMemory):
             self.record["ends_in"] = fade
 
     @property
-    def waits(self) -> bool:
-        """Return True if it has not begun."""
-        return bool(self.record["state"] == at.WAITING)
-
-    @property
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 until then."""
         return max(0, int(self.record["began_frame"]))
