@@ -20,24 +20,27 @@ from engine.voices import Program, Voice, model_program, truth_program
 
 @dataclass(frozen=True)
 class StringOf:
-    """A preset of many strings, played as this one."""
+    """A preset of many strings, played as this one; rate and modes as of `of_string`."""
 
     path: Path
     string: StringParameters
+    rate_hz: int | None = None
+    modes: int | None = None
 
 
 Subject = Path | StringOf
 
 
-def load_subject(subject: Subject) -> Preset:
-    """Load and check the preset.
+def load_subject(subject: Subject, rate_hz: int | None = None) -> Preset:
+    """Load and check the preset, of many strings at a rate where the subject gives none; None: its own.
 
     Raises:
         PresetError: the file cannot be used, or it is not of many strings, or this string is not possible.
     """
+    preset = load_preset(path_of(subject))
     if isinstance(subject, StringOf):
-        return of_string(load_preset(subject.path), subject.string)
-    return load_preset(subject)
+        return of_string(preset, subject.string, subject.rate_hz or rate_hz, subject.modes)
+    return preset if preset.info.family is None else of_string(preset, None, rate_hz)
 
 
 def path_of(subject: Subject) -> Path:

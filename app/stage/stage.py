@@ -11,13 +11,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, NoteOn, PluckAt
 from app.instrument.strings import KeyString, Strings, on_string
 from app.patches.patch import Patch, StringSet
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
+from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import OBSERVED, Choices, with_one_pickup
 from app.session.slots import other_preset

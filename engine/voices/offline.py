@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects import Effects
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
@@ -30,20 +29,15 @@ class OfflineVoice:
     """A voice that is read block by block, without a limiter.
 
     Args:
-        effects: body and room that it sounds through.
+        voice: the voice, which never ends by itself.
     """
 
-    def __init__(self, voice: Voice, effects: Effects | None = None) -> None:
+    def __init__(self, voice: Voice) -> None:
         self.voice = voice
-        rate_hz = voice.program.rate_hz
         voice.never_ends()
-        voice.sound_through_effects()
-        self._mixer = Mixer(rate_hz, limited=False)
-        self._mixer.set_effects(effects)
+        self._mixer = Mixer(voice.program.rate_hz, limited=False)
         self._mixer.add(voice)
-        self.tail_s = effects.tail_s(rate_hz) if effects else 0.0
-        wide = effects.impulse(rate_hz).shape[1] if effects else 1
-        self.channels = max(wide, len(voice.ear.points))
+        self.channels = len(voice.ear.points)
 
     def read(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), ±1 being full scale.
@@ -107,28 +101,24 @@ def voice_blocks(
     seconds: float,
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
-    gain: float = 1.0,
-    effects: Effects | None = None,
 ) -> Iterator[NDArray[np.float32]]:
     """The first seconds of a pluck in blocks (frames, channels), ±1 being full scale; no limiter.
 
-    A channel is a listening point; a room or a wide body gives two of one.
+    A channel is a listening point.
 
     Args:
         source: what renders the samples of a program that is not compiled.
         advanced: receives the share that is done now and then; may raise, to end it.
         until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
-            voice is over; body and room then ring out.
-        gain: a factor of the samples.
-        effects: see `OfflineVoice`.
+            voice is over.
 
     Raises:
         Runaway: the output stopped being a string's.
     """
     initial_m = project(pluck.displacement(info.grid_points), info.modes)
     filled_s = seconds + 0.1 if program.rendered else 0.0
-    voice = Voice(program, initial_m, ear, gain, filled_s, info.rate_hz)
-    offline = OfflineVoice(voice, effects)
+    voice = Voice(program, initial_m, ear, 1.0, filled_s, info.rate_hz)
+    offline = OfflineVoice(voice)
     if program.rendered:
         assert source is not None
         total = voice.room
@@ -144,6 +134,6 @@ def voice_blocks(
         level_db = offline.voice.level_db
         loudest_db = max(loudest_db, level_db)
         if until_db is not None and (level_db < loudest_db - until_db or offline.voice.over):
-            rest = min(round((offline.tail_s or SILENCE_S) * program.rate_hz), frames - done)
-            yield offline.read(rest) if effects else np.zeros((rest, offline.channels), np.float32)
+            rest = min(round(SILENCE_S * program.rate_hz), frames - done)
+            yield np.zeros((rest, offline.channels), np.float32)
             return
