@@ -395,12 +395,11 @@ class Controller(QObject):
     # Session → everything
 
     def _stage_changed(self, names: frozenset[str]) -> None:
+        self.performance.stage_changed(names)
         if not names.isdisjoint(OBSERVED):
-            self.performance.choices_changed(names)
             self.instruments.choices_changed(names)
             self._choices_shown(names)
         if names & {"note", "known"} and self.session.stage.known:
-            self.performance.follow()
             self._show_struck()
             self.patches.show_played()
             self.exports.refresh()
