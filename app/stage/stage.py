@@ -11,7 +11,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import KEYS, NoteOn, PluckAt
@@ -20,6 +19,7 @@ from app.patches.patch import Patch, StringSet
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering import BlowRequest, BlowTake, RenderRequest, Take
+from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import OBSERVED, Choices, with_one_pickup
 from app.session.slots import other_preset

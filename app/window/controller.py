@@ -21,10 +21,11 @@ from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
 from app.audio.sound import Sound
+from app.export.sound import compared_sounds
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
 from app.session.choices import OBSERVED
-from app.session.slots import missing_presets, through_words
+from app.session.slots import missing_presets, sound_of, through_words
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.stage.session import Session
@@ -41,7 +42,7 @@ from app.window.about import about_text
 from app.window.audio_control import AudioControl, MakeSound
 from app.window.browsing import PresetDesk
 from app.window.dropped_files import Dropped, receive, receive_body
-from app.window.exports import Exports, all_modes_words, note_of, note_words
+from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
@@ -54,7 +55,8 @@ from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
 if TYPE_CHECKING:
-    from app.instrument.learned import Kept
+    from app.export.sound import compared_sounds
+from app.instrument.learned import Kept
 
 LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
 IDLE_LOOK_MS = 50  # while nothing moves
@@ -268,19 +270,17 @@ class Controller(QObject):
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
         entry = self.performance.entry
         choices = self.session.choices
-        struck = self.session.stage.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
+        sound = sound_of(choices, entry.path, self.session.stage.struck)
         try:
-            words = note_words(entry.title, choices) if struck is None else struck.words + all_modes_words(choices)
-            material = material_of(entry, choices, words, struck)
+            material = material_of(sound, sound.words(entry.title), choices.volume_db)
         except PresetError as error:
             self.window.notices.report(str(error))
             return
         self.performance.stop()
-        note = note_of(choices, entry, struck)
-        render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
+        render = partial(self.performance.notes.compute, partial(compared_sounds, sound))
         self.performance.compare(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)

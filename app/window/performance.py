@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from PySide6.QtCore import QObject, Signal
 
@@ -16,7 +15,6 @@ from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
@@ -25,7 +23,7 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import OBSERVED, ShownString
+from app.session.choices import OBSERVED
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
@@ -38,7 +36,6 @@ from app.window.panels import Moment, Panel
 from engine.plain_text import name_text
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"single", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 class RenderSignals(QObject):
@@ -194,7 +191,7 @@ class Performance(QObject):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
-        choices, entry = self._session.choices, self.entry
+        choices = self._session.choices
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
@@ -205,9 +202,6 @@ class Performance(QObject):
             self.notes.listen(choices.ear)
         stage = self._session.stage
         request = stage.blow if choices.drums is not None else request_of(choices, self._library)
-        if names & PLACED and isinstance(request, RenderRequest) and entry is not None and not choices.plays_patch:
-            plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
-            self.notes.prepare_plucks(request.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
         if request != stage.request:  # else an event may have chosen another pluck, which the session takes later

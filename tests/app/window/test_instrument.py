@@ -20,7 +20,7 @@ from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, MacroTarget, Patch, Pickup
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
 from app.playing.note import PluckVoices
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices
@@ -106,24 +106,17 @@ def test_keys_of_computer_and_screen_play_pitches_and_the_window_shows_the_strin
     assert guitar.patch.knobs.tension == pytest.approx(16.0)
 
 
-def test_the_switch_of_keys_is_remembered_and_places_are_prepared_for_them_alone(
-    guitar: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    prepared: list[list[float]] = []
-    watch = lambda subject, plucks: prepared.append([pluck.position for pluck in plucks])  # noqa: E731
-    monkeypatch.setattr(guitar.notes, "prepare_plucks", watch)
+def test_the_switch_of_keys_is_remembered(guitar: Window) -> None:
     plays = guitar.window.instrument.plays
     pitches, places = plays.menu().actions()
     guitar.play(52)
     guitar.wait_for_string()
-    assert prepared == [] and plays.text().startswith("Keys play notes")
+    assert plays.text().startswith("Keys play notes")
     places.trigger()
     assert (
         plays.text().startswith("Keys set pluck position") and not guitar.window.instrument.bar.velocity.isVisible()
     )
     assert guitar.choices.preset == "studio_any_string" and not guitar.controller.settings().choices.plays_patch
-    guitar.change(amplitude_mm=3.3)
-    assert [len(set(positions)) for positions in prepared] == [PLACES, PLACES]
     guitar.wait(lambda: not guitar.keys.sounding())
     guitar.key(KEY.Key_A)
     assert isinstance(guitar.struck[-1], PluckVoices) and guitar.keys.sounding() == {}
