@@ -330,7 +330,7 @@ class Performance(QObject):
         errors, places = take.errors_by_training, ("in the training range", "beyond")
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
         growth = growth_words(errors, take.info.rel_mae)
-        self._show_error("Error of this pluck: " + ", ".join(parts), take.error, growth)
+        self._show_error("Error of this pluck: " + ", ".join(parts), growth)
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
@@ -341,11 +341,10 @@ class Performance(QObject):
 
     # Helpers
 
-    def _show_error(self, words: str, error: float = math.nan, growth: str = "") -> None:
+    def _show_error(self, words: str, growth: str = "") -> None:
         """Show the error of the shown motion in the header, and that it grew, as far as they are known."""
         self._error_words = words
         self._show_words()
-        self._window.show_error(error)
         self._window.show_growth(growth)
 
     def _show_words(self) -> None:
