@@ -13,7 +13,8 @@ from app.rendering.subject import Loaded
 from app.rendering.take import Signal
 from engine.presets import PresetError
 from engine.values.ear import Ear
-from training.family.drums import Blocks, StruckDrum, model_player, true_motion
+from training.family.drums import StruckDrum
+from training.family.motion import Blocks, model_player, true_motion
 
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
 

@@ -104,7 +104,7 @@ class SourceLine:
         if self._shown is not None and flashes is not None:
             self._catch_up(self._shown, flashes, max(samples, self.block_frames))
         if self._listening is not None:
-            self._listening.advance()
+            self._listening.advance(min(self.done, self._listening.signal.ready_frames + self.block_frames))
             if self._listening.signal.complete:
                 self._listening = None
 
