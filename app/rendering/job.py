@@ -13,16 +13,13 @@ from app.rendering.line import SourceLine
 from app.rendering.rendering import RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Loaded, Subject
-from app.rendering.take import SOURCES, Listened, Pictures, Take
+from app.rendering.take import SOURCES, Listened, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
-from engine.sources import ModelSource
 from engine.values.ear import Ear
 
 if TYPE_CHECKING:
     from app.rendering.drum_line import DrumLine
-
-PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 
 
 class RenderJob:
@@ -134,19 +131,17 @@ class RenderJob:
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride, loaded = take.info, take.stride, None
             try:
-                other = self._load(path)
-                info, stride, loaded = other.preset.info, _stride(other.model), other
+                line = SourceLine(take, name, self._load(path))
             except (PresetError, ValueError) as error:
                 self._say("other_refused", path.stem, str(error))
-            motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(take, name, loaded, motion, stride)
+                line = SourceLine(take, name, None)
+            self._lines[name] = line
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened
             listened.signals[name] = line.listen(listened.ear)
-            take.motions[name] = motion
+            take.motions[name] = line.motion
 
     def _show(self, take: Take | BlowTake) -> None:
         """Begin new flashes where the slow motion has changed; flashes that are under way are finished first."""
@@ -199,16 +194,13 @@ class RenderJob:
 
 
 def _begin_pluck(request: RenderRequest, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
-    info, stride = loaded.preset.info, _stride(loaded.model)
-    take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-    return take, {name: SourceLine(take, name, loaded, take.motions[name], stride) for name in SOURCES}
+    info, name = loaded.preset.info, loaded.preset.name
+    take = Take(name, info, request.pluck, request.seconds, request.ear, loaded.stride, model=loaded.model)
+    lines = {name: SourceLine(take, name, loaded) for name in SOURCES}
+    take.motions.update({name: line.motion for name, line in lines.items()})
+    return take, lines
 
 
 def _samples_until(line: SourceLine | DrumLine, time_s: float) -> int:
     """The number of samples left to be rendered before a time."""
     return max(0, min(line.frames, math.ceil(time_s * line.rate_hz)) - line.done)
-
-
-def _stride(model: ModelSource) -> int:
-    """Samples between pictures; 1 for a model that must step through every frame, which are then all kept."""
-    return math.ceil(model.rate_hz / PICTURE_HZ) if model.any_frame else 1

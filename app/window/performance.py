@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -38,25 +39,15 @@ from engine.plain_text import name_text
 GROWN = 3.0  # times the preset's own error, from which an error has grown
 
 
-class RenderSignals(QObject):
-    """The signals of the render worker in Qt, which queues them for the window's thread."""
-
-    started = Signal(object)  # Take or BlowTake
-    finished = Signal(object)  # the same
-    other_refused = Signal(str, str)  # name of the preset, message
-    failed = Signal(str, str)  # message, details
-    refused = Signal(str, str)  # a pluck cannot be played: message, details
-
-    def say(self, signal_name: str, *values: object) -> None:
-        getattr(self, signal_name).emit(*values)
-
-
 class Performance(QObject):
     """The owner of the notes and the render worker. Times are in s from the pluck or blow.
 
     Attributes:
         compared: a blind test is open: no other note begins, and all is heard without body and room.
     """
+
+    _reported = Signal(str, str)  # a notice and its details, from any thread
+    _rendered = Signal(object, bool)  # from the worker's thread: a take, and whether all of it is; None: it failed
 
     def __init__(
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
@@ -70,16 +61,12 @@ class Performance(QObject):
         self.compared = False
         self._turn: tuple[Note, Note] | None = None  # of a loop: what rings, and what waits for its end
         self._waiting_words = self._error_words = ""
-        mail = self._mail = RenderSignals()
-        mail.started.connect(self._take_started)
-        mail.finished.connect(self._take_finished)
-        mail.other_refused.connect(self._other_refused)
-        mail.failed.connect(self._render_failed)
-        mail.refused.connect(self._window.notices.report)
+        self._reported.connect(window.notices.report)
+        self._rendered.connect(self._take_rendered)
         self._sources = Sources()
-        self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
+        self.notes = Notes(sound, self._sources, library.find, self._reported.emit, sound.set_effects)
         self._worker = RenderWorker(
-            mail.say, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable
+            self._hear_worker, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable
         )
 
     @property
@@ -296,11 +283,29 @@ class Performance(QObject):
                 self.notes.keys.recorder.cancel(turn.event)
             note.release_at(0)
 
-    # Signals of the render worker
+    # As the `RenderListener`, in the worker's thread
 
-    def _take_started(self, take: Take | BlowTake) -> None:
-        if not self._is_of_chosen(take):  # overtaken
-            return
+    def _hear_worker(self, signal_name: str, *values: Any) -> None:
+        """Hear a signal of the render worker, in its thread."""
+        if signal_name == "failed":
+            self._rendered.emit(None, False)
+            self._reported.emit(*values)
+        elif signal_name == "other_refused":
+            self._reported.emit(f"{values[0]} cannot be heard beside this preset: {values[1]}", "")
+        else:
+            self._rendered.emit(values[0], signal_name == "finished")
+
+    # What has been rendered
+
+    def _take_rendered(self, take: Take | BlowTake | None, complete: bool) -> None:
+        if take is None:
+            self._show_error("")
+        elif complete:
+            self._finish(take)
+        elif self._is_of_chosen(take):  # else overtaken
+            self._begin(take)
+
+    def _begin(self, take: Take | BlowTake) -> None:
         is_shown = take is self._session.stage.take
         self._session.send(Rendered(take))
         if not is_shown:
@@ -309,7 +314,7 @@ class Performance(QObject):
                     panel.take_started(take)
             self._show_error("Rendering …")
 
-    def _take_finished(self, take: Take | BlowTake) -> None:
+    def _finish(self, take: Take | BlowTake) -> None:
         if take is not self._session.stage.take or self._session.stage.complete:
             return
         self._session.send(Rendered(take, complete=True))
@@ -324,13 +329,6 @@ class Performance(QObject):
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
         growth = growth_words(errors, take.info.rel_mae)
         self._show_error("Error of this pluck: " + ", ".join(parts), growth)
-
-    def _other_refused(self, preset: str, message: str) -> None:
-        self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
-
-    def _render_failed(self, message: str, detail: str) -> None:
-        self._show_error("")
-        self._window.notices.report(message, detail)
 
     # Helpers
 
