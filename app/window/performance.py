@@ -283,8 +283,6 @@ class Performance(QObject):
                 self.notes.keys.recorder.cancel(turn.event)
             note.release_at(0)
 
-    # As the `RenderListener`, in the worker's thread
-
     def _hear_worker(self, signal_name: str, *values: Any) -> None:
         """Hear a signal of the render worker, in its thread."""
         if signal_name == "failed":
