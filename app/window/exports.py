@@ -16,11 +16,11 @@ from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
 from app.rendering.note_sound import Struck
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
 from app.session.slots import other_preset, sound_of
+from app.stage.session import Session
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
-from app.window.instruments import Instruments
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
@@ -40,19 +40,17 @@ class Exports(QObject):
         session: Session,
         library: Library,
         recordings: Recordings,
-        instruments: Instruments,
         choices: tuple[ExportChoices, SampledChoices],
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
         self._window = window
-        self._recordings, self._instruments = recordings, instruments
+        self._recordings = recordings
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
-        instruments.played.connect(self.refresh)
         window.installEventFilter(self)
 
     @property
@@ -114,7 +112,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._instruments.struck),
+            "note": heard_note(choices, self._library, self._session.stage.struck),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,

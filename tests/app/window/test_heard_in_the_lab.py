@@ -110,7 +110,7 @@ def play_instrument(qtbot: QtBot, lab: Controller, patch: Patch) -> None:
     qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.name == patch.name)
     lab.instruments.play(NoteOn(sum(patch.range) // 2, 100))
     take(lab, 0.05)
-    qtbot.waitUntil(lambda: isinstance(lab.instruments.latest, KeyNote) and lab.instruments.latest.known)
+    qtbot.waitUntil(lambda: isinstance(lab.session.stage.note, KeyNote) and lab.session.stage.known)
 
 
 def choose(qtbot: QtBot, lab: Controller, preset: str) -> None:
@@ -127,7 +127,7 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     """The sound of a pluck from slot A or B, from its beginning on."""
     lab.session.update(heard=slot)
     lab.pluck()
-    note = lab.instruments.latest
+    note = lab.performance.notes.latest
     assert isinstance(note, PluckVoices)
     qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
     sound = take(lab, SECONDS)
@@ -220,7 +220,7 @@ def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked
     """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
     play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
     lab.instruments.play(NoteOn(60, 100))
-    late = lab.instruments.latest
+    late = lab.performance.notes.latest
     lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
     take(lab, 0.1)
     qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known)

@@ -265,7 +265,7 @@ def test_scales_and_mappings_tune_the_patch_in_either_order_and_undo_takes_them_
         tuning = Tuning(guitar.patch.tuning)
         return pytest.approx(1200 * math.log2(tuning.hz(high) / tuning.hz(low)), abs=1e-3)
 
-    before, history, name = guitar.patch, guitar.controller.history, guitar.patch.name
+    before, history, name = guitar.patch, guitar.session, guitar.patch.name
     guitar.drop(written("Five.SCL", FIVE))
     assert cents(60, 61) == 240 and f"Five.SCL tunes {name}" in guitar.window.notices.text
     history.undo()
@@ -320,7 +320,7 @@ def test_sounds_are_bodies_of_the_patch_as_far_as_they_are_short(
         assert [box.itemData(row) for row in range(len(BODIES) + 1)] == ["", *BODIES]
         assert box.currentData() == guitar.patch.body.name == file.stem and guitar.patch.body.mix > 0
         assert f"now has the body {file.stem}" in guitar.window.notices.text
-        guitar.controller.history.undo()
+        guitar.session.undo()
         assert guitar.patch == before
     for ending in ("wav", "flac"):
         guitar.drop(knock(tmp_path / f"hall_{ending}.{ending}", 6.97))
