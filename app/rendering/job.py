@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from app.rendering.line import SourceLine
-from app.rendering.rendering import Rendering, RenderRequest
+from app.rendering.rendering import Rendering
 from app.rendering.strobe import Strobe
 from app.rendering.take import SOURCES, Listened, Pictures, Take
 from app.shared.vocabulary import OTHER
@@ -18,7 +18,7 @@ FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
-class PluckJob(Rendering[RenderRequest, Take]):
+class PluckJob(Rendering[Take]):
     """The rendering of a pluck; requests for one motion differ in listening points, slow motion or other presets."""
 
     _strobe: Strobe | None = None

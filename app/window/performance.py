@@ -23,7 +23,8 @@ from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
-from app.rendering import BlowRequest, BlowTake, RenderRequest, RenderWorker, Take
+from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
+from app.rendering.note_sound import Struck
 from app.rendering.subject import path_of, string_of
 from app.session.listener import Listener
 from app.session.monitor import Monitor
@@ -35,7 +36,6 @@ from app.stage.stage import Turned
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from engine.plain_text import name_text
-from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
 
@@ -117,7 +117,7 @@ class Performance(QObject):
         self._sound = sound
         self._panels = panels
         self.compared = False
-        self._asked: RenderRequest | BlowRequest | None = None  # the motion that is to be shown
+        self._asked: RenderRequest | None = None  # the motion that is to be shown
         self._blow: KeyNote | None = None  # the note of a blow that is asked for
         self._shown = Playhead()
         self._next_turn: PluckVoices | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
@@ -221,24 +221,18 @@ class Performance(QObject):
 
     def _follow_blow(self, note: KeyNote) -> None:
         """Show the latest blow on the drums that are played, once its motion is rendered."""
-        choices = self._session.choices
-        entry = self._library.find(note.patch.preset)
-        keys = note.player.keys
+        choices, keys = self._session.choices, note.player.keys
         patch = choices.patch
         if note is self._blow or choices.drums is None or patch is None or note.patch.name != patch.name:
             return
-        drum_key = keys.of_key(note.event.key) if isinstance(keys, DrumKeys) else None
-        if drum_key is None or entry is None:
+        request = request_of(choices, self._library, Struck(note.patch, note.event))
+        if request is None or not isinstance(keys, DrumKeys) or keys.of_key(note.event.key) is None:
             return
-        strike = drum_key.strike(note.event.velocity, note.patch.pluck.curve)
-        if note.event.place is not None:
-            strike = Strike(note.event.place, strike.speed_m_s, strike.mallet)
-        self._asked = BlowRequest(entry.path, drum_key.modes, strike, choices.seconds, choices.ear)
-        self._blow = note
+        self._asked, self._blow = request, note
         shown = self._shown.take
-        if isinstance(shown, BlowTake) and self._asked.same_motion(shown.request):
+        if isinstance(shown, BlowTake) and request.same_motion(shown.request):
             self._shown = Playhead(shown, note)
-        self._worker.submit(self._asked)
+        self._worker.submit(request)
 
     def stop(self) -> None:
         """Fade all sound out; the playhead stays."""
@@ -275,7 +269,7 @@ class Performance(QObject):
             self._ask(request)
         self.follow()
 
-    def _request(self) -> RenderRequest | BlowRequest | None:
+    def _request(self) -> RenderRequest | None:
         """The motion that the choices ask for: of drums the latest blow, until other ones are played."""
         choices = self._session.choices
         asked = self._asked
@@ -283,19 +277,18 @@ class Performance(QObject):
         if choices.drums is None:
             return request_of(choices, self._library)
         is_theirs = blow is not None and choices.patch is not None and blow.patch.name == choices.patch.name
-        if not is_theirs or not isinstance(asked, BlowRequest):
+        if not is_theirs or asked is None or asked.struck is None:
             return None
-        is_heard = (asked.seconds, asked.ear) == (choices.seconds, choices.ear)
-        return asked if is_heard else replace(asked, seconds=choices.seconds, ear=choices.ear)
+        return replace(asked, seconds=choices.seconds, ear=choices.ear)
 
-    def _ask(self, request: RenderRequest | BlowRequest | None) -> None:
+    def _ask(self, request: RenderRequest | None) -> None:
         """Ask for another motion; None: there is none, and nothing is shown."""
-        if type(request) is not type(self._asked):
+        asked, self._asked = self._asked, request
+        plucked = request if request is not None and request.struck is None else None
+        if asked is None or request is None or (asked.struck is None) != (request.struck is None):
             self._shown = Playhead()
-        self._asked = request
-        plucked = request if isinstance(request, RenderRequest) else None
         self.notes.choose(plucked)
-        if not isinstance(request, BlowRequest):
+        if request is plucked:
             self._blow = None
         if plucked is not None:
             self.notes.prepare(plucked.preset, *plucked.others)
@@ -396,7 +389,7 @@ class Performance(QObject):
         is_same_strike = (
             isinstance(take, BlowTake)
             and isinstance(before.take, BlowTake)
-            and take.request.strike is before.take.request.strike
+            and take.request.struck is before.take.request.struck
         )
         if is_same_strike and before.note is None:
             self._shown.park(before.parked_s)
@@ -446,7 +439,8 @@ class Performance(QObject):
         """Return True if a note is of the chosen pluck."""
         chosen_request, request = self._asked, note.request
         return (
-            isinstance(chosen_request, RenderRequest)
+            chosen_request is not None
+            and chosen_request.struck is None
             and request is not None
             and (request.preset, request.pluck) == (chosen_request.preset, chosen_request.pluck)
         )
@@ -456,7 +450,7 @@ class Performance(QObject):
         request, entry = self._asked, self.entry
         if isinstance(take, BlowTake):
             return take.request.same_motion(request)
-        if not isinstance(request, RenderRequest) or entry is None:
+        if request is None or request.struck is not None or entry is None:
             return False
         string = string_of(request.preset) or entry.info.string
         chosen = entry.name, string, request.pluck, request.seconds
