@@ -15,7 +15,7 @@ from training.cli import arguments
 from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
-    from app.export.files import WavReport
+    from app.export.note import WavReport
     from app.export.wav import WavSettings
     from app.rendering.note_sound import NoteSound
     from engine.presets import Preset
@@ -200,7 +200,7 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
 
 
 def _render_again(file: Path, out: Path | None) -> None:
-    from app.export.files import default_file_name
+    from app.export.note import default_file_name
     from app.export.recipe import changed_notices, preset_of, read_recipe
     from app.shared.version import program_version
     from engine.folders import usable_files
@@ -221,7 +221,7 @@ def _render_again(file: Path, out: Path | None) -> None:
 
 def _write(sound: NoteSound, preset: Preset, source: Source, out: Path, settings: WavSettings) -> None:
     """Write the file; then, so that a failure is the only line, print what is to be known of it."""
-    from app.export.files import export_sounds
+    from app.export.note import export_sounds
     from engine.plain_text import duration
     from engine.presets import outside_training
 
