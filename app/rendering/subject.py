@@ -56,7 +56,7 @@ def string_of(subject: Subject) -> StringParameters | None:
 class Loaded:
     """Model and truth of a preset with the programs of their voices, each made when first used; for any thread.
 
-    What is heard and what is drawn are voices of these. Sources and programs have no state: all plucks share them.
+    Sound and pictures are those of these voices. Sources and programs have no state: all plucks share them.
     """
 
     def __init__(self, preset: Preset) -> None:
