@@ -76,7 +76,7 @@ class NoteOptions:
 
 @dataclass(frozen=True)
 class FileOptions:
-    """What of a sound is written, and how."""
+    """The part of a sound that is written, and the form of its file."""
 
     rate: Annotated[
         int | None,
