@@ -64,7 +64,7 @@ class NoteOptions:
         from engine.values.ear import Ear
 
         arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-        loaded = arguments.open_preset_to_render(preset, self.string, rate_hz, self.modes)
+        loaded = arguments.open_preset_of_string(preset, self.string, rate_hz, self.modes, to_render=True)
         info = loaded.info
         options.check_shortest(seconds, info.rate_hz)
         points = (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)

@@ -53,18 +53,18 @@ def sound_of(choices: Choices, preset: Path, struck: Struck | None = None) -> No
     return NoteSound(subject_of(choices, preset), choices.pluck, choices.seconds, choices.ear, struck=struck)
 
 
-def request_of(choices: Choices, library: Library, struck: Struck | None = None) -> RenderRequest | None:
-    """The chosen pluck, with the other presets that slots hold; or a blow on a drum, `struck`.
+def request_of(choices: Choices, library: Library) -> RenderRequest | None:
+    """The chosen pluck, with the other presets that slots hold.
 
     None where its preset is not in the library, and where drums are played: no string is plucked then.
     """
-    entry = library.find(choices.preset if struck is None else struck.patch.preset)
-    if entry is None or (choices.drums is not None and struck is None):
+    entry = library.find(choices.preset)
+    if entry is None or choices.drums is not None:
         return None
     others = [library.find(name) for name in dict.fromkeys(map(other_preset, (choices.a, choices.b)))]
     paths = tuple(other.path for other in others if other is not None)
     subject = subject_of(choices, entry.path)
-    return RenderRequest(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths, struck=struck)
+    return RenderRequest(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)
 
 
 def through_words(choices: Choices) -> tuple[str, ...]:
