@@ -206,6 +206,7 @@ class NoteExport:
     sound: NoteSound
     paths: Mapping[Source, Path]
     choices: ExportChoices
+    cancelled = "no file was written."
 
     @property
     def folder(self) -> Path:
@@ -217,9 +218,6 @@ class NoteExport:
         sound = replace(sound, seconds=choices.longest_s if choices.until_decayed else choices.seconds)
         preset = sound.load(settings.rate_hz)
         return "\n".join(_words(export_sounds(sound, preset, self.paths, settings, progress), preset))
-
-    def cancelled(self) -> str:
-        return "no file was written."
 
 
 def _words(reports: list[WavReport], preset: Preset) -> list[str]:

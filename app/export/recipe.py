@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -178,6 +178,7 @@ class SoundRecipe(Value):
         """
         info, ear = preset.info, sound.ear
         many = info.family is not None and sound.struck is None
+        gain_db = settings.difference_gain_db if source == DIFFERENCE else 0.0
         return cls(
             program=PROGRAM,
             version=program_version(),
@@ -188,16 +189,11 @@ class SoundRecipe(Value):
             listen_right=ear.points[1] if len(ear.points) > 1 else None,
             pickup=ear.pickup,
             seconds=sound.seconds,
-            decay_db=settings.decay_db,
             source=source,
-            difference_gain_db=settings.difference_gain_db if source == DIFFERENCE else 0.0,
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
             full_scale_m=FULL_SCALE_M,
-            rate_hz=settings.rate_hz or info.rate_hz,
-            bits=settings.bits,
-            normalise=settings.normalise,
-            fade_out_s=settings.fade_out_s,
+            **asdict(replace(settings, rate_hz=settings.rate_hz or info.rate_hz, difference_gain_db=gain_db)),
             string=info.string if many else None,
             modes=info.modes if many else None,
             struck=None if sound.struck is None else StruckKey.of(sound.struck),
