@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,10 +21,9 @@ from app.rendering.take import SOURCES, WINDOW_PERIODS, Listened, Sounding
 from engine.compare.relative import ErrorWindows
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
-from engine.strike import Strike
-from engine.values.ear import Ear
 
 if TYPE_CHECKING:
+    from app.rendering.note_sound import RenderRequest
     from engine.resonators.drum import DrumModes
     from engine.resonators.surface import Surface
 
@@ -33,33 +31,6 @@ MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points 
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
-
-
-@dataclass(frozen=True, eq=False)
-class BlowRequest:
-    """The motion and sound of a blow.
-
-    Attributes:
-        preset: of the model of many strings.
-        seconds: the duration.
-        ear: its points are directions: 0 and 1 lie along the head, on the left and on the right, 0.5 above it.
-    """
-
-    preset: Path
-    modes: DrumModes
-    strike: Strike
-    seconds: float
-    ear: Ear
-
-    def same_motion(self, other: object) -> bool:
-        """Return True if model and truth move alike: only listening points may differ."""
-        if not isinstance(other, BlowRequest):
-            return False
-        return self._motion == other._motion
-
-    @property
-    def _motion(self) -> tuple[object, ...]:
-        return self.preset, self.modes.drum, len(self.modes), self.strike, self.seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +116,8 @@ class BlowTake(Sounding):
     surface. The model was trained on no drum.
 
     Attributes:
+        request: its listening points are directions: 0 and 1 lie along the head, on the left and on the right, 0.5
+            above it.
         head: the drum's shapes on a grid.
         motions: by source.
     """
@@ -152,16 +125,17 @@ class BlowTake(Sounding):
     full_scale = FULL_SCALE_PA
     ready_frames = 0
 
-    def __init__(self, request: BlowRequest, head: Head) -> None:
-        self.request = request
-        self.head = head
+    def __init__(self, request: RenderRequest, modes: DrumModes) -> None:
+        self.request, self.modes = request, modes
+        self.head = head_of(modes)
         self.seconds = self.horizon_s = request.seconds
         self.rate_hz = RATE_HZ
         self.frames = int(request.seconds * RATE_HZ) + 2
         self.frames_hz = RATE_HZ
-        self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
-        self.partials_hz = np.asarray(request.modes.omega / math.tau)
-        omega, sigma = request.modes.omega[0], request.modes.sigma[0]
+        flashes = int(request.seconds * FLASH_HZ) + 1
+        self.motions = {name: ModalMotion(flashes, len(self.head.shapes)) for name in SOURCES}
+        self.partials_hz = np.asarray(modes.omega / math.tau)
+        omega, sigma = modes.omega[0], modes.sigma[0]
         self.fundamental_hz = math.sqrt(max(omega**2 - sigma**2, 1.0)) / math.tau
         window_s = WINDOW_PERIODS / self.fundamental_hz
         self.error_course = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
@@ -175,7 +149,7 @@ class BlowTake(Sounding):
     @property
     def scale(self) -> Array:
         """The factors (modes,) from amplitudes of the modes to those that `head` has shapes of."""
-        return self.request.modes.scale[: len(self.head.shapes)]
+        return self.modes.scale[: len(self.head.shapes)]
 
     def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:
         """Amplitudes (modes,) of `head`'s shapes as slow motion shows them at a time; None: not rendered yet.

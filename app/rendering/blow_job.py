@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, ModalMotion, head_of
+from app.instrument.drum_keys import DrumKeys, on_the_drum
+from app.rendering.blow import RATE_HZ, BlowTake, ModalMotion
 from app.rendering.rendering import Rendering
 from app.rendering.strobe import FLASH_HZ
+from app.rendering.subject import path_of
 from app.rendering.take import SOURCES, Listened, Signal
 from engine.presets import PresetError
 from engine.resonators.base import Array
@@ -19,7 +22,7 @@ BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
 TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
 
 
-class BlowJob(Rendering[BlowRequest, BlowTake]):
+class BlowJob(Rendering[BlowTake]):
     """The rendering of a blow of a preset of many strings."""
 
     def _continue(self, take: BlowTake) -> None:
@@ -30,7 +33,16 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
             self._listen(take)
 
     def _begin(self) -> BlowTake:
-        take = BlowTake(self.request, head_of(self.request.modes))
+        struck = self.request.struck
+        assert struck is not None
+        drum_key = DrumKeys(struck.patch, self.request.ear).of_key(struck.event.key)
+        if drum_key is None:
+            raise ValueError(f"{struck.patch.name} has no drum on key {struck.event.key}")
+        strike, place = drum_key.strike(struck.event.velocity, struck.patch.pluck.curve), struck.event.place
+        if place is not None:
+            strike = replace(strike, place=on_the_drum(drum_key.played, place))
+        self._modes, self._struck_drum = drum_key.modes, StruckDrum.by(strike, drum_key.modes)
+        take = BlowTake(self.request, drum_key.modes)
         take.listened = self._begin_signals()
         return take
 
@@ -40,17 +52,17 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
         points = request.ear.points
         self._movers = self._begin_movers()
         # amplitudes in m @ weights (modes, points) = pressure in Pa at 1 m
-        self._weights = np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in points], axis=1)
+        self._weights = np.stack([self._modes.radiated((2 * point - 1, 0.0)) for point in points], axis=1)
         return Listened(request.ear, {name: Signal(RATE_HZ, len(points), request.seconds) for name in SOURCES})
 
     def _begin_movers(self) -> dict[str, _Mover]:
-        request = self.request
-        struck_drum = StruckDrum.by(request.strike, request.modes)
+        path = path_of(self.request.preset)
         try:
-            play = model_player(self._load(request.preset).preset.model)
+            play = model_player(self._load(path).preset.model)
         except ValueError as error:
-            raise PresetError(f"{request.preset}: {error}") from error
-        return {"model": _Mover(play(struck_drum, RATE_HZ)), "truth": _Mover(true_motion(struck_drum, RATE_HZ))}
+            raise PresetError(f"{path}: {error}") from error
+        motions = {"model": play(self._struck_drum, RATE_HZ), "truth": true_motion(self._struck_drum, RATE_HZ)}
+        return {name: _Mover(motion) for name, motion in motions.items()}
 
     def _blocks(self, frames: int) -> dict[str, Array]:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
@@ -67,9 +79,9 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
         blocks = self._blocks(count)
         self._append(take.listened, blocks)
         moving = blocks["truth"].shape[1]
-        take.error_course.add(blocks["model"], blocks["truth"], take.request.modes.scale[:moving] ** 2)
+        take.error_course.add(blocks["model"], blocks["truth"], take.modes.scale[:moving] ** 2)
         for name, block in blocks.items():
-            self._movers[name].show(block, take.motions[name], take.request.modes.omega)
+            self._movers[name].show(block, take.motions[name], take.modes.omega)
         take.ready_frames = first + count
 
     def _listen(self, take: BlowTake) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.rendering.line import BLOCK_FRAMES, SourceLine
-from app.rendering.rendering import Rendering, RenderRequest
+from app.rendering.rendering import Rendering
 from app.rendering.strobe import Strobe
 from app.rendering.take import SOURCES, Listened, Take
 from app.shared.vocabulary import OTHER
@@ -13,7 +13,7 @@ from engine.values.ear import Ear
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 
 
-class PluckJob(Rendering[RenderRequest, Take]):
+class PluckJob(Rendering[Take]):
     """The rendering of a pluck; requests for one motion differ in listening points, slow motion or other presets."""
 
     _strobe: Strobe | None = None

@@ -1,4 +1,4 @@
-"""A motion that the worker renders, block by block: its request, and the frame of a pluck's and of a blow's job."""
+"""A motion that the worker renders, block by block: the frame of a pluck's and of a blow's job."""
 
 from __future__ import annotations
 
@@ -6,35 +6,12 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
-from app.rendering.blow import BlowRequest, BlowTake
-from app.rendering.note_sound import NoteSound
+from app.rendering.blow import BlowTake
+from app.rendering.note_sound import RenderRequest
 from app.rendering.subject import Loaded, Subject
 from app.rendering.take import Listened, Take
-
-
-@dataclass(frozen=True)
-class RenderRequest(NoteSound):
-    """The sound of a pluck, and how it is drawn.
-
-    Attributes:
-        speed: of slow motion; 1 is real time.
-        others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
-    """
-
-    speed: float = 1.0
-    others: tuple[Path, ...] = ()
-
-    def same_motion(self, other: object) -> bool:
-        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
-        return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
-            other.preset,
-            other.pluck,
-            other.seconds,
-        )
 
 
 class RenderListener(Protocol):
@@ -53,11 +30,10 @@ class RenderListener(Protocol):
         """Report that nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""
 
 
-Request = TypeVar("Request", RenderRequest, BlowRequest)
 Made = TypeVar("Made", Take, BlowTake)
 
 
-class Rendering(ABC, Generic[Request, Made]):
+class Rendering(ABC, Generic[Made]):
     """The rendering of a request; `advance` does the next block of it, and calls `listener` in its thread.
 
     Args:
@@ -69,9 +45,9 @@ class Rendering(ABC, Generic[Request, Made]):
     """
 
     def __init__(
-        self, request: Request, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
+        self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
-        self.request: Request = request
+        self.request = request
         self.take: Made | None = None
         self._load = load
         self._listener = listener
@@ -80,7 +56,7 @@ class Rendering(ABC, Generic[Request, Made]):
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
-    def ask_again(self, request: Request) -> None:
+    def ask_again(self, request: RenderRequest) -> None:
         """Take a request for the same motion: see `same_motion` for what may differ."""
         self.request = request
 

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-from app.rendering.blow import BlowRequest
 from app.rendering.job import PluckJob
-from app.rendering.rendering import RenderListener, RenderRequest
+from app.rendering.note_sound import RenderRequest
+from app.rendering.rendering import RenderListener
 from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
@@ -52,13 +52,13 @@ class RenderWorker:
         self._hurried = hurried
         self._sounds = sounds
         self._mailbox = threading.Condition()
-        self._request: RenderRequest | BlowRequest | None = None
+        self._request: RenderRequest | None = None
         self._closing = False
         self._helper = ThreadPoolExecutor(1, "render-helper", lower_priority, (Rank.RENDERING,))
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
-    def submit(self, request: RenderRequest | BlowRequest) -> None:
+    def submit(self, request: RenderRequest) -> None:
         """Replace a request that waits and abandon another motion being rendered. Any thread; return at once."""
         with self._mailbox:
             self._request = request
@@ -96,7 +96,7 @@ class RenderWorker:
                 request, self._request = self._request, None
             if request is not None:
                 if job is not None and request.same_motion(job.request):
-                    job.ask_again(request)  # type: ignore[arg-type]  # of the same kind
+                    job.ask_again(request)
                     job.announce()
                 else:
                     job = self._job(request)
@@ -113,8 +113,8 @@ class RenderWorker:
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 
-    def _job(self, request: RenderRequest | BlowRequest) -> PluckJob | BlowJob:
-        if isinstance(request, RenderRequest):
+    def _job(self, request: RenderRequest) -> PluckJob | BlowJob:
+        if request.struck is None:
             return PluckJob(request, self._load, self._listener, self._helper)
         from app.rendering.blow_job import BlowJob  # and torch
 
