@@ -32,7 +32,7 @@ class AheadSamples:
     """The samples of a note's voice, rendered ahead.
 
     Args:
-        motion: of which they are; freed with the last of them.
+        motion: of which they are; released with the last of them.
         from_s: where in its motion the note will begin.
 
     Attributes:
