@@ -1,16 +1,12 @@
 """The preparation of compiled code by using it once: it is compiled, or loaded. Run `python -m engine.warm`.
 
-It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
-does not depend on one another.
+It takes a minute where nothing has been compiled yet, and about a second where all is kept.
 """
 
 from __future__ import annotations
 
 import gc
-import os
-import subprocess
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +19,6 @@ from engine.kernels.constants import QUANTUM
 from engine.models._tension_law import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
-from engine.python_process import python_command, python_environment
 from engine.resonators.sine_transform import listening_weights, project
 from engine.values.drum import DrumParameters
 from engine.values.ear import Ear
@@ -64,18 +59,9 @@ def warm() -> None:
     if cache.is_whole():
         _sound(Voice(model_program(PRESET, RATE_HZ), INITIAL_M, EARS[0]))
     else:
-        with _beside("apart"):
-            voices()
-        apart()
+        for compile_part in (voices, models, responses, _drum, _loudness):
+            compile_part()
         cache.set_whole()
-
-
-def _beside(work: str) -> AbstractContextManager[object]:
-    """Start another process with a function of this module; what it leaves undone, this one does later."""
-    if cache.folder() is None or os.cpu_count() == 1:
-        return nullcontext()
-    code = f"import gc; gc.disable(); from engine import warm; warm.{work}()"
-    return subprocess.Popen(python_command("-c", code), env=python_environment())
 
 
 def voices() -> None:
@@ -86,14 +72,6 @@ def voices() -> None:
         voice.skip(QUANTUM / RATE_HZ, mixer)
         _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
-
-
-def apart() -> None:
-    """Compile what voices do without: models and the solver, responses, drums' modes, and loudness."""
-    models()
-    responses()
-    _drum()
-    _loudness()
 
 
 def responses() -> None:

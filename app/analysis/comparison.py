@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 
 from app.presets.library import PresetEntry
 from app.rendering.line import BLOCK_FRAMES
-from app.rendering.subject import StringOf, load_subject
+from app.rendering.note_sound import NoteSound
 from app.shared.worker import Cancelled, Job
 from engine.compare.relative import NULL_FLOOR_DB, ErrorSums
-from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
-from engine.values.string import StringParameters
 
 Floats = NDArray[np.floating]
+_Truths = dict[tuple[object, ...], Floats]  # modal amplitudes, by string and rate
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
@@ -36,6 +35,7 @@ class ComparedRow:
             the truth's.
         real_time: seconds of motion of the whole string that one core renders in a second.
         note: why there are no figures, or a remark on them.
+        sound: the pluck that they are of; None: no figures, or of an earlier pluck.
     """
 
     name: str
@@ -51,6 +51,7 @@ class ComparedRow:
     null_db: float | None = None
     real_time: float | None = None
     note: str = ""
+    sound: NoteSound | None = None
 
     @classmethod
     def of(cls, entry: PresetEntry) -> ComparedRow:
@@ -58,32 +59,21 @@ class ComparedRow:
         return cls(entry.name, entry.path.name, entry.title, entry.info.model, entry.info.rate_hz, entry.parameters)
 
 
-@dataclass(frozen=True)
-class Basis:
-    """The conditions that the presets are compared on.
+def compare(sounds: list[tuple[PresetEntry, NoteSound]], job: Job) -> None:
+    """Report a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why.
 
-    Attributes:
-        listen: the listening point, 0 … 1.
-        string: which string presets of many strings are plucked as; None: their own.
+    Args:
+        sounds: one pluck, of a string of each preset.
     """
-
-    pluck: Pluck
-    seconds: float
-    listen: float
-    string: StringParameters | None = None
-
-
-def compare(entries: list[PresetEntry], basis: Basis, job: Job) -> None:
-    """Report a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why."""
-    truths = _Truths(basis)
-    for done, entry in enumerate(entries):
+    truths: _Truths = {}
+    for done, (entry, sound) in enumerate(sounds):
         try:
-            row = _compare_one(entry, basis, truths, done / len(entries), 1 / len(entries), job)
+            row = _compare_one(entry, sound, truths, done / len(sounds), 1 / len(sounds), job)
         except Cancelled:
             raise
         except Exception as error:  # the other presets are still compared
-            row = replace(ComparedRow.of(entry), note=str(error) or type(error).__name__)
-        job.report((done + 1) / len(entries), so_far=row)
+            row = replace(ComparedRow.of(entry), sound=sound, note=str(error) or type(error).__name__)
+        job.report((done + 1) / len(sounds), so_far=row)
 
 
 def same_string(info: PresetInfo, other: PresetInfo) -> bool:
@@ -91,42 +81,33 @@ def same_string(info: PresetInfo, other: PresetInfo) -> bool:
     return (info.string, info.tension_modulated) == (other.string, other.tension_modulated)
 
 
-class _Truths:
-    """The true motion of the pluck as modal amplitudes, once for each string and rate."""
-
-    def __init__(self, basis: Basis) -> None:
-        self._basis = basis
-        self._known: dict[tuple[object, ...], Floats] = {}
-
-    def amplitudes(self, info: PresetInfo, job: Job) -> Floats:
-        """Return the amplitudes, float32 (frames, modes) in m, of the frames after the first."""
-        key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
-        if key not in self._known:
-            blocks = []
-            for block, _ in _frames(TruthSource(info), self._basis, info, job):
-                blocks.append(to_modes(block[0], info.modes).astype(np.float32))
-            self._known[key] = np.concatenate(blocks)
-        return self._known[key]
+def _true_amplitudes(truths: _Truths, plucked: NoteSound, info: PresetInfo, job: Job) -> Floats:
+    """The true motion, float32 (frames, modes) in m, of the frames after the first; once for each string and rate."""
+    key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
+    if key not in truths:
+        blocks = _frames(TruthSource(info), plucked, info, job)
+        truths[key] = np.concatenate([to_modes(block[0], info.modes).astype(np.float32) for block, _ in blocks])
+    return truths[key]
 
 
 def _compare_one(
-    entry: PresetEntry, basis: Basis, truths: _Truths, before: float, share: float, job: Job
+    entry: PresetEntry, plucked: NoteSound, truths: _Truths, before: float, share: float, job: Job
 ) -> ComparedRow:
-    preset = load_subject(entry.path if basis.string is None else StringOf(entry.path, basis.string))
+    preset = plucked.load()
     info = preset.info
     source = ModelSource(preset)
     job.check()
-    true = truths.amplitudes(info, job)
+    true = _true_amplitudes(truths, plucked, info, job)
     synthesis = synthesis_matrix(info.grid_points, info.modes).astype(np.float32)
-    ear = listening_weights(np.array([basis.listen]), info.grid_points).astype(np.float32)
+    ear = listening_weights(np.array(plucked.ear.points), info.grid_points).astype(np.float32)
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
     first = 0
     work_s = 0.0
     note = ""
     try:
-        source.advance(source.start(_initial(basis, info)), WARM_UP_FRAMES)
-        for predicted, spent_s in _frames(source, basis, info, job):
+        source.advance(source.start(_initial(plucked, info)), WARM_UP_FRAMES)
+        for predicted, spent_s in _frames(source, plucked, info, job):
             block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
             predicted = predicted.astype(np.float32)
             string.add(predicted, block, first)
@@ -145,20 +126,21 @@ def _compare_one(
     null_db = sound.total().null_depth_db
     return replace(
         ComparedRow.of(entry),
+        sound=plucked,
         mse=windows[0].rel_mse,
         mae=windows[0].rel_mae,
         past_mse=past.rel_mse if past else None,
         past_mae=past.rel_mae if past else None,
-        null_db=None if null_db == NULL_FLOOR_DB and basis.pluck.amplitude_mm == 0 else null_db,
+        null_db=None if null_db == NULL_FLOOR_DB and plucked.pluck.amplitude_mm == 0 else null_db,
         real_time=first / info.rate_hz / work_s if work_s > 0 else None,
         note=note,
     )
 
 
-def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> Iterator[tuple[Floats, float]]:
+def _frames(source: StringSource, plucked: NoteSound, info: PresetInfo, job: Job) -> Iterator[tuple[Floats, float]]:
     """Blocks (1, frames, grid_points) in m, and the processor seconds that each took."""
-    state = source.start(_initial(basis, info))
-    steps = max(1, round(basis.seconds * info.rate_hz))
+    state = source.start(_initial(plucked, info))
+    steps = max(1, round(plucked.seconds * info.rate_hz))
     for first in range(0, steps, FRAMES_AT_ONCE):
         started_s = time.thread_time()  # of this thread alone
         block, state = source.advance(state, min(FRAMES_AT_ONCE, steps - first))
@@ -166,5 +148,5 @@ def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> I
         job.check()
 
 
-def _initial(basis: Basis, info: PresetInfo) -> NDArray[np.float64]:
-    return project(basis.pluck.displacement(info.grid_points), info.modes)[None]
+def _initial(plucked: NoteSound, info: PresetInfo) -> NDArray[np.float64]:
+    return project(plucked.pluck.displacement(info.grid_points), info.modes)[None]

@@ -15,11 +15,17 @@ EXPECTED = (PresetError, RecipeError, Runaway, WriteError, ValueError)  # their 
 
 
 class ExportJob(Protocol):
-    """An export whose choices are made."""
+    """An export whose choices are made.
+
+    Attributes:
+        folder: where the files are written.
+        cancelled: the files that are left after it was cancelled, in words.
+    """
+
+    cancelled: str
 
     @property
-    def folder(self) -> Path:
-        """The folder where the files are written."""
+    def folder(self) -> Path: ...
 
     def run(self, progress: Progress) -> str:
         """Write the files and return the result in words, a line each. Any thread.
@@ -28,6 +34,3 @@ class ExportJob(Protocol):
             Cancelled: `progress` raised it.
             One of EXPECTED: it failed.
         """
-
-    def cancelled(self) -> str:
-        """The files that are left after it was cancelled, in words. Raises WriteError: what is there is damaged."""

@@ -67,9 +67,7 @@ def write_played(
         PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
-    patch = played.patch
-    source = played.source
-    recorded = played.recorded
+    patch, source, recorded, events = played.patch, played.source, played.recorded, played.events
     rate_hz = settings.rate_hz or RATE_HZ
     origin = InstrumentSound(
         program=PROGRAM,
@@ -84,19 +82,14 @@ def write_played(
         midi=name_text(midi),
         recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
     )
-    events, gain_db = played.events, played.difference_gain_db
     notes_s = (entry.time_s for entry in events if isinstance(entry.event, NoteOn | NoteOff))
     whole_s = max(notes_s, default=0.0) + TAIL_S if seconds is None else seconds
-
-    def advanced(done_s: float) -> None:
-        progress(min(0.99, done_s / whole_s))
-
     with whole_file(path) as file:
         sound = Recording(channels_played(patch, events))
-        for block in render_events(
-            patch, preset, events, rate_hz, source, seconds, advanced=advanced, difference_gain_db=gain_db
-        ):
+        gain_db = played.difference_gain_db
+        for block in render_events(patch, preset, events, rate_hz, source, seconds, difference_gain_db=gain_db):
             sound.append(block)
+            progress(min(0.99, len(sound) / rate_hz / whole_s))
         tags = {
             "title": name_text(f"{path.stem}: {patch.name}"),
             "software": f"{PROGRAM} {program_version()}",
@@ -123,6 +116,7 @@ class PlayedExport:
     preset: Path
     path: Path
     settings: WavSettings = DEFAULT
+    cancelled = "the MIDI file is kept."
 
     @property
     def folder(self) -> Path:
@@ -138,6 +132,3 @@ class PlayedExport:
         sound = source_words(played.source, played.difference_gain_db)
         level = f"peak {written.peak_db:.1f} dBFS"
         return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {sound}, {level}."
-
-    def cancelled(self) -> str:
-        return "the MIDI file is kept."

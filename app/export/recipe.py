@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.sound import LONGEST_S, check_sources
-from app.export.wav import DECAY_RANGE_DB, RATE_RANGE_HZ, WavSettings
+from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.instrument.bodies import body_digest
 from app.instrument.events import KEYS, NoteOn
 from app.patches.fields import Name, String
@@ -26,7 +26,7 @@ from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
 from app.shared.value import Value
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE, DIFFERENCE_GAIN_RANGE_DB, Bits, PlayedSource, Source
+from app.shared.vocabulary import DIFFERENCE, Bits, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.levels import FULL_SCALE_M
 from engine.plain_text import name_text, one_line
@@ -154,9 +154,9 @@ class SoundRecipe(Value):
     listen_right: float | None = Field(None, ge=0, le=1)
     pickup: Pickup = "displacement"
     seconds: float = Field(gt=0, le=LONGEST_S)
-    decay_db: float | None = Field(None, ge=DECAY_RANGE_DB[0], le=DECAY_RANGE_DB[1])
+    decay_db: float | None = None
     source: Source
-    difference_gain_db: float = Field(0.0, ge=DIFFERENCE_GAIN_RANGE_DB[0], le=DIFFERENCE_GAIN_RANGE_DB[1])
+    difference_gain_db: float = 0.0
     preset_rate_hz: int = Field(ge=1, le=HIGHEST_RATE_HZ)
     horizon_s: float
     full_scale_m: float
@@ -178,6 +178,7 @@ class SoundRecipe(Value):
         """
         info, ear = preset.info, sound.ear
         many = info.family is not None and sound.struck is None
+        gain_db = settings.difference_gain_db if source == DIFFERENCE else 0.0
         return cls(
             program=PROGRAM,
             version=program_version(),
@@ -188,20 +189,20 @@ class SoundRecipe(Value):
             listen_right=ear.points[1] if len(ear.points) > 1 else None,
             pickup=ear.pickup,
             seconds=sound.seconds,
-            decay_db=settings.decay_db,
             source=source,
-            difference_gain_db=settings.difference_gain_db if source == DIFFERENCE else 0.0,
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
             full_scale_m=FULL_SCALE_M,
-            rate_hz=settings.rate_hz or info.rate_hz,
-            bits=settings.bits,
-            normalise=settings.normalise,
-            fade_out_s=settings.fade_out_s,
+            **asdict(replace(settings, rate_hz=settings.rate_hz or info.rate_hz, difference_gain_db=gain_db)),
             string=info.string if many else None,
             modes=info.modes if many else None,
             struck=None if sound.struck is None else StruckKey.of(sound.struck),
         )
+
+    @model_validator(mode="after")
+    def _check_settings(self) -> SoundRecipe:
+        assert self.settings  # which checks their ranges
+        return self
 
     @property
     def settings(self) -> WavSettings:

@@ -211,7 +211,6 @@ def _struck_blocks(
         voice,
         seconds,
         limited=False,
-        advanced=lambda done_s: part(min(done_s / seconds, 1.0)),
         varied=False,
         dry=dry,
     ):
@@ -219,6 +218,7 @@ def _struck_blocks(
             raise Runaway(done / rate_hz)
         yield block
         done += len(block)
+        part(min(done / rate_hz / seconds, 1.0))
         loudest = float(np.abs(block).max(initial=0.0))
         peak = max(peak, loudest)
         quiet = quiet + len(block) if loudest < peak * 10 ** (-(until_db or np.inf) / 20) else 0

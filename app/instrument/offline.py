@@ -82,7 +82,6 @@ def render_events(
     source: str = "model",
     seconds: float | None = None,
     limited: bool = True,
-    advanced: Callable[[float], None] = lambda seconds: None,
     difference_gain_db: float = 0.0,
     varied: bool = True,
     dry: bool = False,
@@ -96,7 +95,6 @@ def render_events(
         seconds: its length; None: until all has fallen below SILENT_DB, a minute after the last note or release at
             most, whatever controllers follow.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
-        advanced: is called with the seconds rendered so far; may raise, to end it.
         varied: whether plucks vary from stroke to stroke, as the patch says; in a difference they never do.
         dry: without amplifier, body and room; the gains of the keys stay. A difference is always so.
 
@@ -116,7 +114,6 @@ def render_events(
             done += len(block)
             if done > delay:
                 yield block[max(0, delay - done + len(block)) :, :channels]
-            advanced(done / rate_hz)
 
     def play_until(frame: int, few: Sequence[TimedEvent]) -> Iterator[NDArray[np.float32]]:
         for timed_event in few:
@@ -183,7 +180,7 @@ def render_note(
     """Render a key held for `held_s`, (frames, channels), `seconds` long, without a limiter and without variation.
 
     Args:
-        advanced: as in `render_events`.
+        advanced: is called with the seconds rendered so far; may raise, to end it.
 
     Raises:
         ValueError: the key has no string, or an impossible one, or the sound is not finite.
@@ -191,9 +188,10 @@ def render_note(
     timed = [TimedEvent(0.0, NoteOn(key, velocity))]
     if held_s < seconds:
         timed.append(TimedEvent(held_s, NoteOff(key)))
-    blocks = list(
-        render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced, varied=False)
-    )
+    blocks: list[NDArray[np.float32]] = []
+    for block in render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, varied=False):
+        blocks.append(block)
+        advanced(sum(map(len, blocks)) / rate_hz)
     sound = np.concatenate(blocks)
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")

@@ -59,7 +59,7 @@ class AheadSamples:
 
     @property
     def _speed(self) -> float:
-        """As of the motion, 0 where it is not known."""
+        """The speed of the motion, 0 where it is not known."""
         return 0.0 if self._motion is None else self._motion.speed
 
     @property

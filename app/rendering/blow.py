@@ -12,8 +12,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,9 @@ from app.rendering.take import SOURCES, WINDOW_PERIODS, Listened, Sounding
 from engine.compare.relative import ErrorWindows
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
-from engine.strike import Strike
-from engine.values.ear import Ear
 
 if TYPE_CHECKING:
+    from app.rendering.note_sound import RenderRequest
     from engine.resonators.drum import DrumModes
     from engine.resonators.surface import Surface
 
@@ -36,35 +34,6 @@ MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
 FRAMES_OF_FLASH = RATE_HZ // FLASH_HZ
 TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
-
-
-@dataclass(frozen=True, eq=False)
-class BlowRequest:
-    """The motion and sound of a blow.
-
-    Attributes:
-        preset: of the model of many strings.
-        seconds: the duration.
-        ear: its points are directions: 0 and 1 lie along the head, on the left and on the right, 0.5 above it.
-    """
-
-    preset: Path
-    modes: DrumModes
-    strike: Strike
-    seconds: float
-    ear: Ear
-    speed: ClassVar = 1.0  # slow motion needs nothing rendered
-    others: ClassVar[tuple[Path, ...]] = ()
-
-    def same_motion(self, other: object) -> bool:
-        """Return True if model and truth move alike: only listening points may differ."""
-        if not isinstance(other, BlowRequest):
-            return False
-        return self._motion == other._motion
-
-    @property
-    def _motion(self) -> tuple[object, ...]:
-        return self.preset, self.modes.drum, len(self.modes), self.strike, self.seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +146,8 @@ class BlowTake(Sounding):
     surface. The model was trained on no drum.
 
     Attributes:
+        request: its listening points are directions: 0 and 1 lie along the head, on the left and on the right, 0.5
+            above it.
         head: the drum's shapes on a grid.
     """
 
@@ -184,17 +155,17 @@ class BlowTake(Sounding):
     pickup = "pressure"
     motions: Mapping[str, ModalMotion]
 
-    def __init__(self, request: BlowRequest, head: Head) -> None:
-        self.request = request
-        self.head = head
+    def __init__(self, request: RenderRequest, modes: DrumModes) -> None:
+        self.request, self.modes = request, modes
+        self.head = head_of(modes)
         self.seconds = self.horizon_s = request.seconds
         self.rate_hz = RATE_HZ
         self.frames = int(request.seconds * RATE_HZ) + 2
         self.frames_hz = RATE_HZ
-        omega = request.modes.omega[: len(head.shapes)]
+        omega = modes.omega[: len(self.head.shapes)]
         self.motions = {name: ModalMotion(request.seconds, omega) for name in SOURCES}
-        self.partials_hz = np.asarray(request.modes.omega / math.tau)
-        lowest = request.modes.omega[0] ** 2 - request.modes.sigma[0] ** 2
+        self.partials_hz = np.asarray(modes.omega / math.tau)
+        lowest = modes.omega[0] ** 2 - modes.sigma[0] ** 2
         self.fundamental_hz = math.sqrt(max(lowest, 1.0)) / math.tau
         window_s = WINDOW_PERIODS / self.fundamental_hz
         self.error_course = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
@@ -204,7 +175,7 @@ class BlowTake(Sounding):
     def measure(self) -> None:
         if self.ready_frames > self._measured:
             model, truth = (self.motions[name].block_m for name in SOURCES)
-            self.error_course.add(model, truth, self.request.modes.scale**2)
+            self.error_course.add(model, truth, self.modes.scale**2)
             self._measured = self.ready_frames
 
     @property
@@ -215,7 +186,7 @@ class BlowTake(Sounding):
     @property
     def scale(self) -> Array:
         """The factors (modes,) from amplitudes of the modes to those that `head` has shapes of."""
-        return self.request.modes.scale[: len(self.head.shapes)]
+        return self.modes.scale[: len(self.head.shapes)]
 
     def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:
         """Amplitudes (modes,) of `head`'s shapes as slow motion shows them at a time; None: not rendered yet.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, ModalMotion, head_of
+from app.instrument.drum_keys import DrumKeys, on_the_drum
+from app.rendering.blow import RATE_HZ, BlowTake, ModalMotion
+from app.rendering.note_sound import RenderRequest, Struck
 from app.rendering.strobe import Strobe
-from app.rendering.subject import Loaded
+from app.rendering.subject import Loaded, path_of
 from app.rendering.take import Signal
 from engine.presets import PresetError
 from engine.values.ear import Ear
@@ -19,18 +22,25 @@ from training.family.motion import Blocks, model_player, true_motion
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
 
 
-def begin_blow(request: BlowRequest, loaded: Loaded) -> tuple[BlowTake, dict[str, DrumLine]]:
+def begin_blow(request: RenderRequest, struck: Struck, loaded: Loaded) -> tuple[BlowTake, dict[str, DrumLine]]:
     """A take of a blow and the lines of its sources.
 
     Raises:
         PresetError: the preset is of one string.
+        ValueError: no drum is on the key.
     """
-    take = BlowTake(request, head_of(request.modes))
-    struck_drum = StruckDrum.by(request.strike, request.modes)
+    drum_key = DrumKeys(struck.patch, request.ear).of_key(struck.event.key)
+    if drum_key is None:
+        raise ValueError(f"{struck.patch.name} has no drum on key {struck.event.key}")
+    strike, place = drum_key.strike(struck.event.velocity, struck.patch.pluck.curve), struck.event.place
+    if place is not None:
+        strike = replace(strike, place=on_the_drum(drum_key.played, place))
+    struck_drum = StruckDrum.by(strike, drum_key.modes)
     try:
         play = model_player(loaded.preset.model)
     except ValueError as error:
-        raise PresetError(f"{request.preset}: {error}") from error
+        raise PresetError(f"{path_of(request.preset)}: {error}") from error
+    take = BlowTake(request, drum_key.modes)
     players = {"model": play, "truth": true_motion}
     begin = {name: partial(player, struck_drum, RATE_HZ) for name, player in players.items()}
     return take, {name: DrumLine(take, begin[name], take.motions[name]) for name in begin}
@@ -52,7 +62,7 @@ class DrumLine:
         self.motion = motion
         self.frames = take.frames
         self.first_frames = self.block_frames = BLOCK_FRAMES
-        self._request = take.request
+        self._take = take
         self._begin = begin
         self._motion_blocks = self._signal_blocks = begin()  # the same where signal and motion begin together
 
@@ -72,9 +82,9 @@ class DrumLine:
         if self.done > 1:
             self._signal_blocks = self._begin()
         # amplitudes in m @ weights (modes, points) = pressure in Pa at 1 m
-        radiated = self._request.modes.radiated
+        radiated = self._take.modes.radiated
         self._weights = np.stack([radiated((2 * point - 1, 0.0)) for point in ear.points], axis=1)
-        self._signal = Signal(RATE_HZ, len(ear.points), self._request.seconds)
+        self._signal = Signal(RATE_HZ, len(ear.points), self._take.seconds)
         self._signal.append(np.zeros((1, len(ear.points)), np.float32))
         return self._signal
 

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
-from app.rendering.blow import BlowRequest, BlowTake
+from app.rendering.blow import BlowTake
 from app.rendering.line import SourceLine
-from app.rendering.rendering import RenderRequest
+from app.rendering.note_sound import RenderRequest
 from app.rendering.strobe import Strobe
-from app.rendering.subject import Loaded, Subject
+from app.rendering.subject import Loaded, Subject, path_of
 from app.rendering.take import SOURCES, Listened, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
@@ -40,7 +40,7 @@ class RenderJob:
 
     def __init__(
         self,
-        request: RenderRequest | BlowRequest,
+        request: RenderRequest,
         load: Callable[[Subject], Loaded],
         say: Callable[..., None],
         helper: Executor,
@@ -56,7 +56,7 @@ class RenderJob:
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
-    def ask_again(self, request: RenderRequest | BlowRequest) -> None:
+    def ask_again(self, request: RenderRequest) -> None:
         """Take a request for the same motion: see `same_motion` for what may differ."""
         self.request = request
 
@@ -112,15 +112,15 @@ class RenderJob:
             self._say("finished", take)
 
     def _begin(self) -> Take | BlowTake:
-        request, loaded = self.request, self._load(self.request.preset)
+        request = self.request
         take: Take | BlowTake
         lines: Mapping[str, SourceLine | DrumLine]
-        if isinstance(request, BlowRequest):
+        if request.struck is not None:
             from app.rendering.drum_line import begin_blow  # and torch
 
-            take, lines = begin_blow(request, loaded)
+            take, lines = begin_blow(request, request.struck, self._load(path_of(request.preset)))
         else:
-            take, lines = _begin_pluck(request, loaded)
+            take, lines = _begin_pluck(request, self._load(request.preset))
         self._lines.update(lines)
         take.listened = self._listened(request.ear)
         return take

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from app.instrument.events import NoteOn
 from app.patches.drums import Drums
@@ -82,3 +83,26 @@ class NoteSound:
             point_words = "heard at the bridge"
         kind = ", magnetic pick-up" if self.ear.pickup == "velocity" else ""
         return f"{title}{string_words}: {pluck_words}, {point_words}{kind}{remark}"
+
+
+@dataclass(frozen=True)
+class RenderRequest(NoteSound):
+    """The sound of a pluck or of a blow on a drum, and how it is drawn.
+
+    Attributes:
+        speed: of a string's slow motion; 1 is real time.
+        others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
+    """
+
+    speed: float = 1.0
+    others: tuple[Path, ...] = ()
+
+    def same_motion(self, other: RenderRequest | None) -> bool:
+        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
+        return other is not None and self._motion == other._motion
+
+    @property
+    def _motion(self) -> tuple[object, ...]:
+        if self.struck is not None:
+            return path_of(self.preset), self.struck, self.seconds
+        return self.preset, self.pluck, self.seconds

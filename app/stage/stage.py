@@ -18,7 +18,7 @@ from app.instrument.strings import KeyString, Strings, on_string
 from app.patches.patch import Patch, StringSet
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
-from app.rendering import BlowRequest, BlowTake, RenderRequest, Take
+from app.rendering import BlowTake, RenderRequest, Take
 from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import OBSERVED, Choices, with_one_pickup
@@ -27,7 +27,6 @@ from engine.pluck import Pluck
 from engine.values.string import StringParameters
 
 Note = PluckVoices | KeyNote
-Request = RenderRequest | BlowRequest
 Key = tuple[int, int | None]  # of an instrument, and its string of the set, as in `Strings.of_key`
 
 
@@ -61,7 +60,7 @@ class Turned:
 class Asked:
     """The motion that is to be shown is another one; None: there is none."""
 
-    request: Request | None
+    request: RenderRequest | None
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ class Stage:
     key: Key | None = None
     note: Note | None = None
     known: bool = True
-    request: Request | None = None
+    request: RenderRequest | None = None
     take: Take | BlowTake | None = None
     ready: bool = False
     complete: bool = False
@@ -182,15 +181,14 @@ class Stage:
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     @property
-    def blow(self) -> BlowRequest | None:
+    def blow(self) -> RenderRequest | None:
         """The motion of the latest blow on the drums that are played, as it is heard now; None: there is none."""
         request, note, patch = self.request, self.note, self.choices.patch
-        if not (isinstance(request, BlowRequest) and isinstance(note, KeyNote) and patch is not None):
+        if request is None or request.struck is None or not isinstance(note, KeyNote) or patch is None:
             return None
         if note.patch.name != patch.name:
             return None
-        heard = replace(request, seconds=self.choices.seconds, ear=self.choices.ear)
-        return request if (heard.seconds, heard.ear) == (request.seconds, request.ear) else heard
+        return replace(request, seconds=self.choices.seconds, ear=self.choices.ear)
 
     @property
     def note_played(self) -> Note | None:
@@ -274,17 +272,16 @@ def _begun(stage: Stage, note: Note) -> Stage:
 def _struck(stage: Stage, note: KeyNote) -> Stage:
     """The stage that asks for the motion of a blow."""
     keys, choices, event = note.player.keys, stage.choices, note.event
-    drum_key = keys.of_key(event.key) if isinstance(keys, DrumKeys) else None
-    if drum_key is None:
+    if not isinstance(keys, DrumKeys) or keys.of_key(event.key) is None:
         return stage
-    strike = drum_key.strike(event.velocity, note.patch.pluck.curve)
-    strike = strike if event.place is None else replace(strike, place=event.place)
-    return _asked(stage, BlowRequest(note.path, drum_key.modes, strike, choices.seconds, choices.ear))
+    struck = Struck(note.patch, event)
+    return _asked(stage, RenderRequest(note.path, choices.pluck, choices.seconds, choices.ear, struck=struck))
 
 
-def _asked(stage: Stage, request: Request | None) -> Stage:
+def _asked(stage: Stage, request: RenderRequest | None) -> Stage:
     """The stage that asks for a motion; of a string after one of a drum, it shows none until then."""
-    if type(request) is not type(stage.request):
+    struck, struck_before = (asked and asked.struck is not None for asked in (request, stage.request))
+    if struck != struck_before:
         stage = replace(stage, take=None, ready=False, lead=None, parked_s=0.0)
     ready = stage.ready and request is not None and request.same_motion(stage.request)
     return replace(stage, request=request, ready=ready)
@@ -299,9 +296,9 @@ def _rendered(stage: Stage, event: Rendered) -> Stage:
     return replace(stage, take=event.take, ready=True, complete=event.complete, lead=None, parked_s=parked_s)
 
 
-def _is_of(note: Note, request: Request) -> bool:
+def _is_of(note: Note, request: RenderRequest) -> bool:
     """Return True if a note is of the pluck, or of a blow as the one, whose motion is asked for."""
-    if isinstance(request, BlowRequest):
+    if request.struck is not None:
         return isinstance(note, KeyNote) and note.of_drum
     return note.request is not None and (note.request.preset, note.request.pluck) == (request.preset, request.pluck)
 

@@ -22,7 +22,7 @@ from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
-from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
+from app.rendering import BlowTake, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
 from app.session.choices import OBSERVED
 from app.session.listener import Listener
@@ -190,7 +190,7 @@ class Performance(QObject):
     def _ask(self) -> None:
         """Ask for the motion that is to be shown; where there is none, nothing is."""
         request = self._session.stage.request
-        plucked = request if isinstance(request, RenderRequest) else None
+        plucked = request if request is not None and request.struck is None else None
         self.notes.choose(plucked)
         if plucked is not None:
             self.notes.prepare(plucked.preset, *plucked.others)
@@ -345,7 +345,7 @@ class Performance(QObject):
         request, entry = self._session.stage.request, self.entry
         if isinstance(take, BlowTake):
             return take.request.same_motion(request)
-        if not isinstance(request, RenderRequest) or entry is None:
+        if request is None or request.struck is not None or entry is None:
             return False
         string = string_of(request.preset) or entry.info.string
         chosen = entry.name, string, request.pluck, request.seconds

@@ -92,7 +92,7 @@ def _errors(name: str, samples: NDArray[np.float64], rate_hz: int, quick: bool) 
         return error_to_signal(learned.render(t[first:]), truth[first:])
 
     errors = errors_of(truth, fit_note(note, series).render(t), note.rate_hz, note.noise_power)
-    found: list[float | None] = [errors.esr, errors.late_esr, errors.distance_db]
+    found: list[float | None] = [errors.esr, errors.esr_from_50_ms, errors.log_spectral_distance_db]
     if not quick:
         found += [error(linear(poles_a_partial=count)) for count in (1, 2)]
         if len(truth) > 1.3 * HALF_S * note.rate_hz:

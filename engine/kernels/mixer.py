@@ -1,7 +1,7 @@
 """The sum of all voices, and the function that a sound device calls for it.
 
 `call` is a PortAudio callback: it takes up new voices, renders quanta, and hands them over, in compiled code, in the
-device's own thread and without the interpreter. `render` does the same where there is no device.
+device's own thread and without the interpreter. Where there is no device Python calls it.
 """
 
 from __future__ import annotations

@@ -5,6 +5,9 @@ They are compiled for other systems too (`app.export.plugin.objects`), so nothin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numba import carray, types
 
@@ -15,37 +18,11 @@ from engine.kernels.memory import mixer_at as record_of_mixer
 from engine.kernels.memory import pointer
 from engine.kernels.playing import events
 
-ADDRESS = COUNT = types.int64
-RENDER = types.void(ADDRESS, COUNT, ADDRESS)
-BEGIN = types.void(ADDRESS)
-PLAY = SOUND = SYMPATHISE = KIT_BEGIN = types.void(ADDRESS, ADDRESS)
-KIT_FOLLOW = types.void(ADDRESS, COUNT, types.float64)
-KIT_PREPARE = types.void(ADDRESS, ADDRESS, ADDRESS)
-MEASURE = types.void(ADDRESS, types.float64, types.float64, types.float64, ADDRESS)
-PREPARE = types.void(ADDRESS, ADDRESS, types.float64, types.float64, types.float64, ADDRESS, ADDRESS)
-WEIGH = types.void(ADDRESS, types.float64, types.float64, ADDRESS)
-MIX = types.void(ADDRESS, ADDRESS, ADDRESS, COUNT, COUNT)
-BEGIN_CONVOLVER = types.void(ADDRESS, types.float64, COUNT)
-DRIVE = types.void(ADDRESS, types.float64, types.float64, types.float64)
-
 
 @kernel
 def render(mixer_at: int, frames: int, out_at: int) -> None:
     """The next frames of a mixer, float32 (frames, 2)."""
     mixer.render(record_of_mixer(mixer_at), frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
-
-
-begin = events.begin
-play = events.play
-sound = contact.sound
-sympathise = sympathy.sympathise
-kit_begin = kit.begin
-kit_follow = kit.follow
-kit_prepare = kit.prepare
-measure = prepared.measure
-prepare = prepared.prepare
-weigh = prepared.weigh
-mix = prepared.mix
 
 
 @kernel
@@ -58,3 +35,22 @@ def begin_convolver(convolver_at: int, rate_hz: float, frames: int) -> None:
 def drive(mixer_at: int, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer."""
     amplifier.drive(record_of_mixer(mixer_at), drive_db, tone_db, level_db)
+
+
+ADDRESS, COUNT, REAL = types.int64, types.int64, types.float64
+ENTRIES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {  # the kernel of each, and its arguments
+    "render": (render, (ADDRESS, COUNT, ADDRESS)),
+    "begin": (events.begin, (ADDRESS,)),
+    "play": (events.play, (ADDRESS, ADDRESS)),
+    "sound": (contact.sound, (ADDRESS, ADDRESS)),
+    "sympathise": (sympathy.sympathise, (ADDRESS, ADDRESS)),
+    "kit_begin": (kit.begin, (ADDRESS, ADDRESS)),
+    "kit_follow": (kit.follow, (ADDRESS, COUNT, REAL)),
+    "kit_prepare": (kit.prepare, (ADDRESS, ADDRESS, ADDRESS)),
+    "measure": (prepared.measure, (ADDRESS, REAL, REAL, REAL, ADDRESS)),
+    "prepare": (prepared.prepare, (ADDRESS, ADDRESS, REAL, REAL, REAL, ADDRESS, ADDRESS)),
+    "weigh": (prepared.weigh, (ADDRESS, REAL, REAL, ADDRESS)),
+    "mix": (prepared.mix, (ADDRESS, ADDRESS, ADDRESS, COUNT, COUNT)),
+    "begin_convolver": (begin_convolver, (ADDRESS, REAL, COUNT)),
+    "drive": (drive, (ADDRESS, REAL, REAL, REAL)),
+}

@@ -18,13 +18,12 @@ frequencies as points; widths are even.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from engine.kernels.compiled import COMPILED, HALF, ZERO, tanh
+from engine.kernels.compiled import HALF, ZERO, kernel, tanh
 from engine.models._fno_transform import Array, Pair
 
 
-@njit(**COMPILED)
+@kernel
 def advance_fgru(
     hidden: Array,
     frames: Array,
@@ -62,7 +61,7 @@ def advance_fgru(
         _read(hidden, out, frames[step])
 
 
-@njit(**COMPILED)
+@kernel
 def advance_frnn(
     hidden: Array,
     frames: Array,
@@ -98,7 +97,7 @@ def advance_frnn(
         _read(hidden, out, frames[step])
 
 
-@njit(**COMPILED)
+@kernel
 def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> None:
     """The spectrum of a field, by its symmetric and its antisymmetric half."""
     points, width = field.shape
@@ -111,7 +110,7 @@ def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> No
     np.dot(forward[1], folded[1], spectrum[1])
 
 
-@njit(**COMPILED)
+@kernel
 def _convolve(
     spectrum: Array, weights: Array, bias: Array, inverse: Array, product: Array, folded: Array, field: Array
 ) -> None:
@@ -139,7 +138,7 @@ def _convolve(
             field[points - t, w] = bias[points - t, w] + folded[0, t, w] - folded[1, t, w]
 
 
-@njit(**COMPILED)
+@kernel
 def _read(hidden: Array, out: Pair, frame: Array) -> None:
     """The displacement of every point."""
     weights, biases = out

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from engine.kernels.compiled import COMPILED, HALF, ONE, tanh
+from engine.kernels.compiled import HALF, ONE, kernel, tanh
 
 _CUBIC, _ROOT = np.float32(0.044715), np.float32(np.sqrt(2 / np.pi))
 
 
-@njit(**COMPILED)
+@kernel
 def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> None:
     """x_k = λ x_{k-1} + v_k step by step in float64, in place.
 
@@ -34,7 +33,7 @@ def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> No
         state[row, :, 1] = im
 
 
-@njit(**COMPILED)
+@kernel
 def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shift: np.ndarray) -> None:
     """GELU(outputs + scale · frames + shift), in place in `outputs`; all float32, (rows, features) or (features,)."""
     rows, features = outputs.shape
@@ -45,7 +44,7 @@ def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shi
             y[f] = HALF * x * (ONE + tanh(_ROOT * x * (ONE + _CUBIC * x * x)))
 
 
-@njit(**COMPILED)
+@kernel
 def add_gated(frames: np.ndarray, gates: np.ndarray) -> None:
     """Add the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
     rows, features = frames.shape

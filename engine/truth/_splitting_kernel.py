@@ -7,16 +7,15 @@ point operations: the call of a tensor operation alone costs fifty times that.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from engine.kernels.compiled import COMPILED
+from engine.kernels.compiled import kernel
 from engine.kernels.modes import rest_silent, turn
 
 Array = NDArray[np.float64]
 
 
-@njit(**COMPILED)
+@kernel
 def advance(
     q: Array,
     v: Array,

@@ -9,7 +9,7 @@ import itertools
 import math
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -170,7 +170,7 @@ class CompiledPlayer(KernelMemory):
         self.record = record = record_of(memory, PLAYER)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
-        self._backlog: deque[tuple[object, ...]] = deque()  # for which the ring has no room
+        self._backlog: deque[NDArray[np.void]] = deque()  # for which the ring has no room
         self._tables: deque[Table] = deque()  # which the kernel may be reading, or will
         self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
@@ -206,25 +206,21 @@ class CompiledPlayer(KernelMemory):
             struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
             string: of a note: on which of a set it is played, from the highest, 0; None: channel or key choose.
         """
-        row, modes = (0, 0) if struck is None else (int(struck.ctypes.data), len(struck))
+        event = {"kind": kind, "channel": channel, "key": key, "value": value, "frame": frame, "struck_s": struck_s}
+        if by_hand is not None:
+            event |= {"position": by_hand.position, "amplitude_mm": by_hand.amplitude_mm, "width": by_hand.width}
+            event["shape"] = SHAPES.index(by_hand.shape)
+        if string is not None:
+            event["string"] = string + 1
         with self._lock:
             number = next(self._ids)
-            id = note if kind in (of.TUNE, of.CHOKE, of.CANCEL) else number
+            event["id"] = note if kind in (of.TUNE, of.CHOKE, of.CANCEL) else number
             if struck is not None:
+                event |= {"struck": struck.ctypes.data, "struck_modes": len(struck)}
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at = 0.0
-            mm = 0.0
-            width = 0.0
-            shape = 0
-            if by_hand is not None:
-                at = by_hand.position
-                mm = by_hand.amplitude_mm
-                width = by_hand.width
-                shape = SHAPES.index(by_hand.shape)
-            head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
-            self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
+            self._push(event)
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
@@ -233,10 +229,14 @@ class CompiledPlayer(KernelMemory):
             self._tables.append(table)
             while self._tables[0].serial < int(self.record["serial"]):
                 self._tables.popleft()
-            self._push((frame, of.TABLE, 0, 0, 0.0, 0, 0.0, 0.0, table.address, *(0,) * (len(EVENT.names or ()) - 9)))
+            self._push({"kind": of.TABLE, "table": table.address, "frame": frame})
 
-    def _push(self, record: tuple[object, ...]) -> None:
-        self._backlog.append(record)
+    def _push(self, values: Mapping[str, float]) -> None:
+        """Hand over an event with these values, the others 0. Under the lock."""
+        event = np.zeros((), EVENT)
+        for name, value in values.items():
+            event[name] = value
+        self._backlog.append(event)
         self._flush()
 
     def _flush(self) -> None:

@@ -77,9 +77,8 @@ def voice_ends_s(info: PresetInfo) -> float:
     It is inf where its string has no losses.
 
     The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
-    a
-    hum of its own. Nothing it has learned makes it end. Latents that share a tension need no such end: their
-    energy is held below that of the slowest mode.
+    a hum of its own. Nothing it has learned makes it end. Latents that share a tension need no such end: their energy
+    is held below that of the slowest mode.
     """
     return max(info.horizon_s, info.resonator.falls_s(STRING_SILENT_DB))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.export.files import WavReport, export_sounds
+from app.export.note import WavReport, export_sounds
 from app.export.sound import Mixed, Samples, render_voices
 from app.export.wav import WavSettings
 from app.rendering.note_sound import NoteSound

@@ -102,13 +102,14 @@ def evaluate(
     check_range("--past", past, 0, LONGEST_PAST_S, "s")
     loaded = open_preset_of_string(preset, string, rate, modes)
     if on is not None:
-        loaded = _on(loaded, on)
+        loaded, configuration = _on(loaded, on)
+    else:
+        configuration = _data_of(loaded)
     info = loaded.info
     if info.family is not None and on is None:
         fresh = fresh or FEWEST_PLUCKS
     if 0 < past * info.rate_hz < 1:
         raise typer.BadParameter(f"must hold a sample of {info.rate_hz} Hz, not {past:g} s", param_hint="--past")
-    configuration = _data_of(loaded, on)
     splits: tuple[str, ...] = ("validation", "test") if split == "both" else (split,)
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
@@ -314,8 +315,8 @@ def _sound(errors: RelativeError, distance: SpectralDistance) -> dict[str, float
     }
 
 
-def _on(preset: Preset, run: str) -> Preset:
-    """A preset of many strings with the string, rate, modes and horizon of a run's data."""
+def _on(preset: Preset, run: str) -> tuple[Preset, DatasetConfiguration]:
+    """A preset of many strings with the string, rate, modes and horizon of a run's data; and these data."""
     from engine.presets import of_string
     from training.cell import load
 
@@ -324,18 +325,15 @@ def _on(preset: Preset, run: str) -> Preset:
     described = of_string(replace(preset, info=reported), data.string, data.rate_hz, data.modes)
     # the errors that it reports are those of the family
     info = replace(described.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
-    return replace(described, info=replace(info, horizon_steps=data.steps))
+    return replace(described, info=replace(info, horizon_steps=data.steps)), data
 
 
-def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set of a preset, or of a run; of a string of many, its plucks are as hard as the family's."""
-    from training.cell import load
+def _data_of(preset: Preset) -> DatasetConfiguration:
+    """The data set of a preset; of a string of many, its plucks are as hard as the family's."""
     from training.configuration import DatasetConfiguration
     from training.run import data_of
 
     info = preset.info
-    if on is not None:
-        return load(on).data
     if info.family is not None:
         return DatasetConfiguration(
             initial="pluck",

@@ -102,7 +102,7 @@ def _text_loss(
     latents: Tensor,
     predicted: Tensor,
 ) -> tuple[Tensor, Tensor]:
-    """The loss of the paper's text, of the frames `found`: encoding on the first frame, consistency of latents."""
+    """The loss of the paper's text: encoding on the first frame, consistency of latents."""
     loss, prediction = _prediction(predicted, batch.target, recipe)
     loss = loss + functional.mse_loss(model.decode(origin), batch.initial)
     if recipe.consistency_weight:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -18,12 +18,23 @@ from training.start import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT, STARTS
 if TYPE_CHECKING:
     from training.fitting.pursuit import LatentFit
 
-    Made = tuple[StringModel[Any], LatentFit | None]  # what the encoder shall learn first, if anything
 
+def begin(configuration: TrainingConfiguration, dataset: Dataset) -> tuple[StringModel[Any], LatentFit | None]:
+    """The untrained model of a run, by its start, and what its encoder shall learn first, if anything."""
+    start, steps = configuration.start, configuration.steps
+    if start == LEAST_SQUARES:
+        truth = dataset.split("train")[:, : steps + 1] @ dataset.synthesis.float()
+        sizes = read_model_configuration("dmd", configuration.model_configuration, "model_configuration")
+        return DMD.fit(truth, sizes), None
+    if start == PHASES:
+        return _from_phases(configuration, dataset), None
+    model = new_model(configuration, dataset.scale_m)
+    if start not in (PURSUIT, BLIND_PURSUIT):
+        return model, None
+    from training.fitting.pursuit import pursue  # and SciPy, which other starts do without
 
-def begin(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    """The untrained model of a run and its data set, by the run's start."""
-    return _MAKERS.get(configuration.start, _own)(configuration, dataset)
+    generator = torch.Generator().manual_seed(configuration.recipe.seed)
+    return model, pursue(model, dataset, steps, generator, start == BLIND_PURSUIT)
 
 
 def new_model(
@@ -33,7 +44,7 @@ def new_model(
 
     Args:
         scale_m: its data set's.
-        found: sizes that its data have set.
+        counts: sizes that its data have set.
     """
     data = configuration.data
     model = build_model(configuration.model, {**configuration.model_configuration, **(counts or {})})
@@ -49,25 +60,7 @@ def new_model(
     return model
 
 
-def _own(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    return new_model(configuration, dataset.scale_m), None
-
-
-def _least_squares(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    truth = dataset.split("train")[:, : configuration.steps + 1] @ dataset.synthesis.float()
-    sizes = read_model_configuration("dmd", configuration.model_configuration, "model_configuration")
-    return DMD.fit(truth, sizes), None
-
-
-def _pursued(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    from training.fitting.pursuit import pursue  # and SciPy, which other starts do without
-
-    model = new_model(configuration, dataset.scale_m)
-    generator = torch.Generator().manual_seed(configuration.recipe.seed)
-    return model, pursue(model, dataset, configuration.steps, generator, configuration.start == BLIND_PURSUIT)
-
-
-def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
+def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> StringModel[Any]:
     from training.fitting.modes import found_modes
     from training.fitting.phases import STORES, WIRED
 
@@ -79,13 +72,4 @@ def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> Made
     counts = None if counted else {"state_size": len(modes.shapes)}
     model = new_model(configuration, dataset.scale_m, counts)
     store(model, modes, configuration.recipe.seed)
-    return model, None
-
-
-_MAKERS: dict[str, Callable[[TrainingConfiguration, Dataset], Made]] = {
-    LEAST_SQUARES: _least_squares,
-    PURSUIT: _pursued,
-    BLIND_PURSUIT: _pursued,
-    PHASES: _from_phases,
-}
-assert set(_MAKERS) == set(STARTS)
+    return model

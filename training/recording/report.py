@@ -6,7 +6,7 @@ All are of the note as `render NAME out.wav --as-recorded` gives it, without any
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy import fft, signal
@@ -30,16 +30,17 @@ class FitErrors:
     """The errors of one sound against another.
 
     Attributes:
-        esr, late_esr: error-to-signal ratio after one gain and one delay, from 8 ms and from 50 ms after the onset.
-        distance_db: log spectral distance.
+        esr, esr_from_50_ms: error-to-signal ratio after one gain and one delay, else from 8 ms after the onset.
         stft: multi-resolution STFT: spectral convergence plus mean absolute log magnitude.
+        noise_esr: of the recording's noise.
         gain_db, delay_s: that were applied.
     """
 
     esr: float
-    late_esr: float
-    distance_db: float
+    esr_from_50_ms: float
+    log_spectral_distance_db: float
     stft: float
+    noise_esr: float
     gain_db: float
     delay_s: float
 
@@ -80,7 +81,6 @@ class FitReport:
     """The report on one learned note."""
 
     errors: FitErrors
-    noise_esr: float
     bands: tuple[Band, ...]
     partials: tuple[PartialReport, ...]
 
@@ -90,8 +90,7 @@ def report_of(note: Note, learned: LearnedNote, physics: LearnedPhysics) -> FitR
     truth = note.fitted()
     model = learned.render(np.arange(len(truth)) / note.rate_hz)
     sounds = truth, model, note.rate_hz, note.noise_power
-    noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
-    return FitReport(errors_of(*sounds), noise, bands_of(*sounds), partials_in(learned, physics))
+    return FitReport(errors_of(*sounds), bands_of(*sounds), partials_in(learned, physics))
 
 
 def partials_in(learned: LearnedNote, physics: LearnedPhysics) -> tuple[PartialReport, ...]:
@@ -132,6 +131,7 @@ def errors_of(truth: Array, model: Array, rate_hz: int, noise_power: float = 0.0
         error_to_signal(moved[late:], truth[late:]),
         log_spectral_distance(truth, moved, noise_power),
         float(convergence[0] + math.log(10) / 20 * log_db[0]),
+        noise_power * len(truth) / max(float(truth @ truth), 1e-30),
         20 * math.log10(max(abs(gain), 1e-9)),
         delay,
     )
@@ -192,14 +192,4 @@ def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
 
 def figures(report: FitReport) -> dict[str, float]:
     """The report's main numbers, by name."""
-    e = report.errors
-    return {
-        "esr": e.esr,
-        "esr_from_50_ms": e.late_esr,
-        "log_spectral_distance_db": e.distance_db,
-        "stft": e.stft,
-        "noise_esr": report.noise_esr,
-        "gain_db": e.gain_db,
-        "delay_s": e.delay_s,
-        "fit_s": FIT_LASTS_S,
-    }
+    return {**asdict(report.errors), "fit_s": FIT_LASTS_S}

@@ -39,10 +39,10 @@ def as_text(learned: Learned) -> list[str]:
     lines = [
         f"{learned.source.name}: {physics.f0_hz:.2f} Hz, inharmonicity {physics.stiffness:.2e}, "
         f"{len(physics.partials)} partials, glide {1200 * math.log2(1 + physics.rise):.0f} cents",
-        f"  error-to-signal ratio {errors.esr:.4f} (from 50 ms {errors.late_esr:.4f}), "
-        f"noise {learned.report.noise_esr:.1e}",
+        f"  error-to-signal ratio {errors.esr:.4f} (from 50 ms {errors.esr_from_50_ms:.4f}), "
+        f"noise {errors.noise_esr:.1e}",
         f"  {learned.verdict.words}",
-        f"  log spectral distance {errors.distance_db:.1f} dB, STFT {errors.stft:.2f}",
+        f"  log spectral distance {errors.log_spectral_distance_db:.1f} dB, STFT {errors.stft:.2f}",
     ]
     bands = [f"{band.hz:g} Hz {band.recorded_t60_s:.2f}/{band.learned_t60_s:.2f}" for band in learned.report.bands]
     lines.append(f"  decay by 60 dB in s, recorded/learned: {', '.join(bands) or 'no octave decays by 12 dB'}")

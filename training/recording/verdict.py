@@ -70,7 +70,7 @@ def verdict_of(note: Note, series: PartialSeries, learned: LearnedNote, report: 
     esr = report.errors.esr
     near, energy = float(np.mean(loud)) if loud else 0.0, float(sound @ sound) / whole
     reasons = []
-    if esr > max(linear_esr, GOOD_ESR) or esr > MOST_ESR + min(report.noise_esr, MOST_NOISE_ESR):
+    if esr > max(linear_esr, GOOD_ESR) or esr > MOST_ESR + min(report.errors.noise_esr, MOST_NOISE_ESR):
         reasons.append("what was learned is not the recording")
     if len(loud) < LEAST_LOUD or near < LEAST_NEAR or energy < LEAST_ENERGY:
         reasons.append("its loud partials are not those of one string")

@@ -57,29 +57,27 @@ def own_lines(section: Section) -> list[TableLine]:
 def _lines(section: Section, metric: str) -> list[list[str]]:
     table = []
     for model in section.models:
-        name = (section.string, MODEL_NAMES[model])
-        lines = [line for line in own_lines(section) if line.model == model]
-        for line in lines:
-            counts = sorted({len(entry.done) for entry in section.lines[line].values()})
-            seeds = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-            table.append([*name, given(line), seeds, *(_cell(section, line, column, metric) for column in COLUMNS)])
-        if not lines:
-            table.append([*name, NONE, "0", *(_not_run(section, model, column, metric) for column in COLUMNS)])
+        lines: list[TableLine | None] = [line for line in own_lines(section) if line.model == model]
+        for line in lines or [None]:
+            head = [section.string, MODEL_NAMES[model], given(line) if line else NONE, _seeds(section, line)]
+            table.append([*head, *(_cell(section, model, line, column, metric) for column in COLUMNS)])
     return table
 
 
-def _not_run(section: Section, model: str, column: DatasetColumn, metric: str) -> str:
+def _seeds(section: Section, line: TableLine | None) -> str:
+    counts = sorted({len(entry.done) for entry in section.lines[line].values()}) if line else [0]
+    return str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+
+
+def _cell(section: Section, model: str, line: TableLine | None, column: DatasetColumn, metric: str) -> str:
     paper = section.paper(model, column, metric)
-    return f"{NOT_RUN} ({paper.mean:.4f})" if paper else NOT_RUN
-
-
-def _cell(section: Section, line: TableLine, column: DatasetColumn, metric: str) -> str:
-    entry = section.lines[line].get(column)
+    if line is None and paper is not None:
+        return f"{NOT_RUN} ({paper.mean:.4f})"
+    entry = section.lines[line].get(column) if line else None
     if entry is None:
         return NOT_RUN
-    parts, ours = [], entry.figure(metric)
-    if ours is not None:
-        parts.append(_against(ours, section.paper(line.model, column, metric)))
+    ours = entry.figure(metric)
+    parts = [] if ours is None else [_against(ours, paper)]
     for rows, words in ((entry.diverged, "diverged"), (entry.failed, "failed")):
         if rows:
             parts.append(f"{len(rows)} {words}")

@@ -26,6 +26,7 @@ class PluginExport:
     form: str
     target: str
     path: Path
+    cancelled = "nothing was written."
 
     @property
     def folder(self) -> Path:
@@ -59,6 +60,3 @@ class PluginExport:
         if path.parent == install_folder(self.form, self.target):
             return f"Built {path}. Hosts find it at their next scan."
         return f"Built {path}. Hosts look in {install_folder(self.form, self.target)}."
-
-    def cancelled(self) -> str:
-        return "nothing was written."

@@ -122,7 +122,7 @@ def layout_header(version: str) -> str:
 
 
 def _entry(name: str) -> str:
-    arguments = (_ARGUMENTS[kind] for kind in getattr(plugin, name.upper()).args)
+    arguments = (_ARGUMENTS[kind] for kind in plugin.ENTRIES[name][1])
     return f"OF({', '.join(('number', name, *arguments))})"
 
 

@@ -50,7 +50,7 @@ def text(part: str) -> str:
     """LLVM code of all entries of a part together, as Numba has it for the processor of its settings."""
     write_code_alone()
     import llvmlite.binding as llvm
-    from numba import njit
+    from numba import njit, types
 
     from engine.kernels import compiled
 
@@ -68,7 +68,8 @@ def text(part: str) -> str:
     seen = set[int]()
     defined = set[str]()
     for name in PARTS[part]:
-        entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
+        kernel, arguments = plugin.ENTRIES[name]
+        entry = njit(types.void(*arguments), **compiled.COMPILED)(kernel.py_func)
         overload = entry.overloads[entry.signatures[0]]
         for library in libraries(overload.library, seen):
             module = library._final_module

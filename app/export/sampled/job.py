@@ -185,6 +185,7 @@ class SampledExport:
     plan: SampledPlan
     out: Path
     preset: Path
+    cancelled = "nothing was written."
 
     @property
     def folder(self) -> Path:
@@ -202,6 +203,3 @@ class SampledExport:
         lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
         lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]
         return "\n".join(lines)
-
-    def cancelled(self) -> str:
-        return "nothing was written."

@@ -202,10 +202,7 @@ class ExportDialog(GrowingDialog):
 
     def _show_cancelled(self) -> None:
         assert self._job is not None
-        try:
-            self._end(f"Cancelled; {self._job.cancelled()}")
-        except WriteError as error:
-            self._end(str(error), failed=True)
+        self._end(f"Cancelled; {self._job.cancelled}")
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:

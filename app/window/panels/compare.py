@@ -6,19 +6,22 @@ The chosen preset comes first, then those in the slots, then the others. Presets
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
-from app.analysis.comparison import Basis, ComparedRow, compare, same_string
+from app.analysis.comparison import ComparedRow, compare, same_string
 from app.presets import words
 from app.presets.library import Library, PresetEntry
-from app.session.slots import other_preset
+from app.rendering.note_sound import NoteSound
+from app.session.slots import other_preset, sound_of
 from app.stage.session import Session
 from app.views.controls.parts import tool_button
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import ComputedPanel, Moment
+from engine.values.ear import Ear
 
 
 def percent(value: float) -> str:
@@ -74,7 +77,7 @@ class ComparePanel(ComputedPanel):
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self._names: list[str] | None = None  # chosen by the user; None: those of the present string
-        self._rows: dict[str, tuple[Basis | None, ComparedRow]] = {}  # None: of an earlier pluck
+        self._rows: dict[str, ComparedRow] = {}
         self._menu = QMenu(self)
         self._actions: dict[str, QAction] = {}
         presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
@@ -119,11 +122,15 @@ class ComparePanel(ComputedPanel):
             action.toggled.connect(lambda on, name=entry.name: self._toggle(name, on))
             self._actions[entry.name] = action
 
-    @property
-    def _basis(self) -> Basis:
+    def _sound(self, entry: PresetEntry) -> NoteSound:
+        """The present pluck of a preset's string, at one point."""
         choices = self.session.choices
-        string = choices.string
-        return Basis(choices.pluck, choices.seconds, choices.listen, string)
+        return replace(sound_of(choices, entry.path), ear=Ear((choices.listen,)))
+
+    def _row(self, entry: PresetEntry) -> tuple[ComparedRow, bool]:
+        """The row of a preset as far as it is known, and True if it is of the present pluck."""
+        row = self._rows.get(entry.name) or ComparedRow.of(entry)
+        return row, row.sound == self._sound(entry)
 
     @property
     def _entries(self) -> list[PresetEntry]:
@@ -136,19 +143,18 @@ class ComparePanel(ComputedPanel):
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
     def _wanted(self) -> object:
-        return (self._basis, *(entry.name for entry in self._entries))
+        return [self._sound(entry) for entry in self._entries]
 
     def _clear(self) -> None:
         self._set_computing(None)
 
     def _begin(self) -> None:
         """Compute the rows that are not of the present pluck."""
-        basis = self._basis
-        missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != basis]
-        missing.sort(key=lambda entry: self._urgency(entry.name))
+        entries = sorted(self._entries, key=lambda entry: self._urgency(entry.name))
+        missing = [(entry, self._sound(entry)) for entry in entries if not self._row(entry)[1]]
         if missing:
             self._set_computing(0.0)
-            self.compute(lambda job: compare(missing, basis, job))
+            self.compute(lambda job: compare(missing, job))
         self._show()
 
     def _urgency(self, name: str) -> int:
@@ -159,7 +165,7 @@ class ComparePanel(ComputedPanel):
     def _show_progress(self, share: float, _: str, row: ComparedRow | None) -> None:
         self._set_computing(share)
         if row is not None:
-            self._rows[row.name] = (self._basis, row)
+            self._rows[row.name] = row
             self._show()
 
     def _set_computing(self, share: float | None) -> None:
@@ -177,10 +183,10 @@ class ComparePanel(ComputedPanel):
             self.background.cancel()
             self._set_computing(None)
         else:
-            done = {name for name, (basis, row) in self._rows.items() if basis == self._basis and row.mae is not None}
-            if all(entry.name in done for entry in self._entries):
-                done = set()
-            self._rows = {n: (basis if n in done else None, row) for n, (basis, row) in self._rows.items()}
+            shown_rows = [self._row(entry) for entry in self._entries]
+            undone = [row for row, fresh in shown_rows if not fresh or row.mae is None]
+            for row in undone or [row for row, _ in shown_rows]:
+                self._rows[row.name] = replace(row, sound=None)
             self._begin()
 
     def _toggle(self, name: str, on: bool) -> None:
@@ -194,27 +200,23 @@ class ComparePanel(ComputedPanel):
 
     def _show(self) -> None:
         entries = self._entries
-        basis = self._basis
         present = self.session.choices.preset
         names = {entry.name for entry in entries}
         for name, action in self._actions.items():
             with QSignalBlocker(action):
                 action.setChecked(name in names)
-        rows = []
-        for entry in entries:
-            computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
-            rows.append((row, computed == basis))
-        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in rows])
+        rows = [self._row(entry) for entry in entries]
+        self.table.show_rows([_table_row(row, fresh, row.name == present) for row, fresh in rows])
         count, fresh = len(entries), sum(of_this for _, of_this in rows)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
         former = any(row.mae is not None and not of_this for row, of_this in rows)
         self._words.rest(
-            f"{done} preset{'s' if count != 1 else ''} on this pluck, {basis.seconds:g} s"
+            f"{done} preset{'s' if count != 1 else ''} on this pluck, {self.session.choices.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
         )
 
 
-def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
+def _table_row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
     """The row of the table; `fresh`: of the present pluck; `present`: of the chosen preset."""
     tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
     return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

@@ -88,7 +88,7 @@ class DrumPanel(StagePanel):
         """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""
         if (shown_drum := self._drum) is None:
             return False
-        drum, view_drum = blow.request.modes.drum, shown_drum.drum
+        drum, view_drum = blow.modes.drum, shown_drum.drum
         alike = math.isclose(drum.width_m * view_drum.length_m, view_drum.width_m * drum.length_m, rel_tol=1e-6)
         return alike and drum.shape == view_drum.shape
 

@@ -12,15 +12,21 @@ import pytest
 import torch
 
 from app.analysis import comparison
-from app.analysis.comparison import Basis, ComparedRow, compare, same_string
+from app.analysis.comparison import ComparedRow, compare, same_string
 from app.presets.library import PresetEntry, list_presets
+from app.rendering.note_sound import NoteSound
 from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights, project
 from engine.sources import ModelSource, TruthSource
+from engine.values.ear import Ear
 
-TRIAL = Basis(Pluck(0.35, 4.0), 0.3, 0.37)
+PLUCK, LISTEN = Pluck(0.35, 4.0), 0.37
+
+
+def plucked(entries: list[PresetEntry]) -> list[tuple[PresetEntry, NoteSound]]:
+    return [(entry, NoteSound(entry.path, PLUCK, 0.3, Ear((LISTEN,)))) for entry in entries]
 
 
 @pytest.fixture
@@ -31,10 +37,10 @@ def entries(small_preset: Path, tmp_path: Path) -> list[PresetEntry]:
 
 
 def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: Any) -> None:
-    compare(entries[:1], TRIAL, job)
+    compare(plucked(entries[:1]), job)
     (row,) = job.results
     preset = load_preset(entries[0].path)
-    initial = project(TRIAL.pluck.displacement(101), 10)[None]
+    initial = project(PLUCK.displacement(101), 10)[None]
     model, truth = (
         source.advance(source.start(initial), 1200)[0][0]
         for source in (ModelSource(preset), TruthSource(preset.info))
@@ -46,7 +52,7 @@ def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: An
     ):
         assert mae == pytest.approx(float(np.abs(error[part]).sum() / np.abs(truth[part]).sum()), rel=1e-3)
         assert mse == pytest.approx(float((error[part] ** 2).sum() / (truth[part] ** 2).sum()), rel=1e-3)
-    ear = listening_weights(np.array([TRIAL.listen]), 101)
+    ear = listening_weights(np.array([LISTEN]), 101)
     heard = ((error @ ear) ** 2).sum() / ((truth @ ear) ** 2).sum()
     assert row.null_db == pytest.approx(10 * math.log10(heard), abs=0.01)
     assert row.real_time > 0
@@ -59,14 +65,14 @@ def test_one_truth_for_presets_of_one_string_and_rate(
 ) -> None:
     made = []
     monkeypatch.setattr(comparison, "TruthSource", lambda info: made.append(info) or TruthSource(info))
-    compare(entries, TRIAL, job)
+    compare(plucked(entries), job)
     assert [row.name for row in job.results] == ["first", "second"]
     assert len(made) == 1
 
 
 def test_a_bad_preset_is_a_row_and_the_next_one_follows(entries: list[PresetEntry], job: Any) -> None:
     entries[0].path.write_bytes(b"damaged")
-    compare(entries, TRIAL, job)
+    compare(plucked(entries), job)
     bad, good = job.results
     assert "first.safetensors" in bad.note
     assert bad.mae is None
@@ -78,7 +84,7 @@ def test_a_model_that_runs_away_has_infinite_errors_and_says_when(entries: list[
     with torch.no_grad():
         preset.model.decoder.bias.fill_(1e6)  # type: ignore[operator,union-attr]
     save_preset(entries[0].path, preset.info, preset.model)
-    compare(entries[:1], TRIAL, job)
+    compare(plucked(entries[:1]), job)
     (row,) = job.results
     assert "diverges" in row.note
     assert row.mae == row.past_mae == float("inf")
@@ -87,7 +93,7 @@ def test_a_model_that_runs_away_has_infinite_errors_and_says_when(entries: list[
 def test_it_stops_between_blocks(entries: list[PresetEntry], job: Any) -> None:
     job.cancel_after = 1
     with pytest.raises(Cancelled):
-        compare(entries, TRIAL, job)
+        compare(plucked(entries), job)
     assert job.results == []
 
 

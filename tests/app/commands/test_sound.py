@@ -15,7 +15,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from app.export.files import default_file_name
+from app.export.note import default_file_name
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES

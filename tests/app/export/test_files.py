@@ -12,7 +12,7 @@ import pytest
 import soundfile
 
 from app.export import sound
-from app.export.files import (
+from app.export.note import (
     default_file_name,
     export_sounds,
 )
@@ -159,7 +159,7 @@ def test_samples_that_are_not_finite_are_refused(
     plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken = Voices({"model": np.array([[np.inf]])})
-    monkeypatch.setattr("app.export.files.render_voices", lambda *_, **__: broken)
+    monkeypatch.setattr("app.export.note.render_voices", lambda *_, **__: broken)
     with pytest.raises(WriteError, match=r"a\.wav: .*not finite"):
         export_sound(plucked, tmp_path / "a.wav")
     assert list(tmp_path.iterdir()) == []

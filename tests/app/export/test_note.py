@@ -11,13 +11,15 @@ import soundfile
 
 from app.export.choices import ExportChoices
 from app.export.note import HeardNote, NoteExport, musical_name
-from app.export.recipe import read_recipe
+from app.export.recipe import SoundRecipe, read_recipe
 from app.export.sound import compared_sounds
+from app.export.wav import WavSettings
 from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.rendering.note_sound import NoteSound, Struck
+from app.rendering.subject import StringOf
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.sources import ModelSource
@@ -58,6 +60,40 @@ def test_the_recipe_renders_it_again(tmp_path: Path, source: str) -> None:
     recipe = read_recipe(first)
     export_sound(recipe.sound(PRESET, first), again, recipe.source, recipe.settings)
     assert first.read_bytes() == again.read_bytes()
+
+
+RECIPES = {
+    "string": '{"format":1,"program":"Learned Strings","version":"0.2.0","preset":"studio_any_string",'
+    '"preset_sha256":"c2","pluck":{"position":0.3,"amplitude_mm":2.0,"shape":"rounded","width":0.1},"listen":0.37,"listen_right":null,'
+    '"pickup":"bridge","seconds":0.3,"decay_db":null,"source":"model","difference_gain_db":0.0,"preset_rate_hz":48000,'
+    '"horizon_s":0.5,"full_scale_m":0.01,"rate_hz":44100,"bits":"24","normalise":false,"fade_out_s":0.01,"string":'
+    '{"length_m":0.648,"area_m2":5.0671e-8,"second_moment_m4":2.0432e-16,"density_kg_m3":7850.0,"youngs_modulus_pa":'
+    '220000000000.0,"damping_d1_kg_m_s":0.00039498,"damping_d3_kg_m_s":2.679e-6,"tension_n":72.592},"modes":12,'
+    '"through":null,"struck":null}',
+    "key": '{"format":1,"program":"Learned Strings","version":"0.2.0","preset":"studio_any_string",'
+    '"preset_sha256":"c2","pluck":{"position":0.4,"amplitude_mm":4.0,"shape":"gaussian","width":0.06},"listen":0.1,"listen_right":0.6,'
+    '"pickup":"velocity","seconds":9.0,"decay_db":60.0,"source":"difference","difference_gain_db":20.0,'
+    '"preset_rate_hz":48000,"horizon_s":0.5,"full_scale_m":0.01,"rate_hz":48000,"bits":"16","normalise":true,'
+    '"fade_out_s":0.05,"string":null,"modes":null,"through":null,"struck":{"instrument":"Classical guitar",'
+    '"instrument_sha256":"7d","key":52,"velocity":90,"channel":16,"place":null,"string":1,"pluck":{"position":0.2,'
+    '"amplitude_mm":2.0,"shape":"gaussian","width":0.06}}}',
+}
+
+
+def test_recipes_of_earlier_files_are_read() -> None:
+    """Texts that version 0.2.0 wrote."""
+    many = SHIPPED / "studio_any_string.safetensors"
+    recipe = SoundRecipe.model_validate_json(RECIPES["string"])
+    sound = recipe.sound(many, Path("a.wav"))
+    assert isinstance(sound.preset, StringOf) and sound.preset.string.tension_n == 72.592
+    assert (sound.load().info.modes, sound.load().info.rate_hz) == (12, 48_000)
+    assert (sound.pluck, sound.ear, sound.seconds) == (Pluck(0.3, 2.0, "rounded", 0.1), Ear((0.37,), "bridge"), 0.3)
+    assert recipe.settings == WavSettings("24", 44_100, fade_out_s=0.01)
+    recipe = SoundRecipe.model_validate_json(RECIPES["key"])
+    sound = recipe.sound(many, Path("a.wav"))
+    assert sound.struck == Struck(GUITAR, NoteOn(52, 90, 16, string=1, pluck=Pluck(0.2, 2.0)))
+    assert (sound.preset, sound.ear, sound.seconds) == (many, Ear((0.1, 0.6), "velocity"), 9.0)
+    assert recipe.settings == WavSettings("16", 48_000, True, 0.05, 60.0, 20.0)
 
 
 def test_a_key_can_be_written_without_its_instrument(tmp_path: Path) -> None:

@@ -242,7 +242,7 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(
     assert np.abs(truth).max() > 0 and np.abs(model - truth).max() < 1e-4 * np.abs(truth).max()
     toms.wait(lambda: "Error of this blow" in toms.window.error_label.text())
     take = whole(toms)
-    assert take.request.strike.place == note.event.place
+    assert take.request.struck.event.place == note.event.place
     dry = toms.patch.model_copy(update={"room": Room(mix=0.0)})
     preset = load_preset(SHIPPED / "studio_any_string.safetensors")
     played = render_events(dry, preset, [TimedEvent(0.0, note.event)], blow.RATE_HZ, "truth", seconds=0.3)

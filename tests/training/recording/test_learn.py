@@ -26,7 +26,7 @@ def recorded_of(learned: Learned) -> RecordedString:
 
 def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -> None:
     errors = learned.report.errors
-    assert errors.esr < 2e-3 and errors.distance_db < 4
+    assert errors.esr < 2e-3 and errors.log_spectral_distance_db < 4
     assert errors.esr < 0.5 * learned.verdict.linear_esr
 
 

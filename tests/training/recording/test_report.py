@@ -32,9 +32,9 @@ def test_errors_ignore_one_gain_and_one_delay_and_nothing_else(frames: float) ->
 
     truth = sound(40.0)
     errors = errors_of(truth, 0.5 * sound(40.0 + frames), RATE_HZ)
-    assert errors.esr < 1e-3 and errors.distance_db < 1
+    assert errors.esr < 1e-3 and errors.log_spectral_distance_db < 1
     assert errors.delay_s == pytest.approx(-frames / RATE_HZ, abs=2e-6)
     assert errors.gain_db == pytest.approx(20 * math.log10(2), abs=0.05)
     noise = 0.1 * float(np.std(truth)) * np.random.default_rng(0).standard_normal(len(truth))
     assert errors_of(truth, truth + noise, RATE_HZ).esr == pytest.approx(0.01, rel=0.1)
-    assert errors_of(truth, truth, RATE_HZ).distance_db == 0
+    assert errors_of(truth, truth, RATE_HZ).log_spectral_distance_db == 0

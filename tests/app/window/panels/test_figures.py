@@ -250,11 +250,11 @@ def test_a_pluck_that_comes_back_while_it_is_compared_is_computed(
     lab.wait(lambda: computed(panel) == {"first", "second"})
     begun, held, compare = list[object](), Event(), compare_module.compare
 
-    def slow(missing: Any, basis: Any, job: Any) -> object:
-        begun.append(basis)
+    def slow(missing: Any, job: Any) -> object:
+        begun.append(missing)
         while not held.wait(0.01):
             job.check()
-        return compare(missing, basis, job)
+        return compare(missing, job)
 
     monkeypatch.setattr(compare_module, "compare", slow)
     lab.change(position=0.6)
