@@ -73,7 +73,7 @@ DRUMS_PLAYED = (
 
 @dataclass
 class Duty:
-    """A task that the window's timer does from time to time."""
+    """A task of the window's timer, done from time to time."""
 
     every_s: float
     do: Callable[[], object]
