@@ -71,14 +71,13 @@ from app.views.dialogs import (
     export_pages,
     help_dialog,
     learn_dialog,
-    midi_dialog,
 )
 from app.views.instrument import patch_card
 from app.views.plots import figures_table, kept_plot, legend, plots, pointed_plot, time_plot
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
-BASES = {"ChoicesForm", "ExportPage", "GrowingDialog", "Playable", "StageView"}
+BASES = {"ExportPage", "Form", "Playable", "StageView", "WorkDialog"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
@@ -200,7 +199,6 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
         [("F1", "Help")], [("A view", "All")], Path("log"), "About"
     ),
     learn_dialog.LearnDialog: learn,
-    midi_dialog.MidiDialog: lambda: midi_dialog.MidiDialog({"position": "position"}, {"knobs.decay": "decay"}),
 }
 
 

@@ -65,8 +65,8 @@ def dialog(
 
 def choose(dialog: ExportDialog, form: str, system: str) -> None:
     page = dialog.plugin
-    page.form.setCurrentIndex(page.form.findData(form))
-    page.system.setCurrentIndex(page.system.findData(system))
+    page["form"].setCurrentIndex(page["form"].findData(form))
+    page["system"].setCurrentIndex(page["system"].findData(system))
 
 
 def test_it_suggests_the_place_where_hosts_look(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
