@@ -15,7 +15,8 @@ from functools import cache
 from types import ModuleType
 from typing import Any, Protocol
 
-from app.audio.problems import no_device, not_started, portaudio_missing, refused, vanished
+from app.audio.choices import DeviceChoice
+from app.audio.problems import ProblemKind, problem, refused
 from engine.voices.mixer import Mixer
 
 SMALLEST_BLOCK = 64  # frames
@@ -28,9 +29,13 @@ class AudioDevice:
 
     name: str
     host_api: str
-    default_rate_hz: int = 0  # 0 in a saved choice that has not been looked up yet
+    default_rate_hz: int
     channels: int = 2
     is_default: bool = False
+
+    @property
+    def choice(self) -> DeviceChoice:
+        return DeviceChoice(name=self.name, host_api=self.host_api)
 
 
 class RawStream(Protocol):
@@ -62,7 +67,7 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     return [device for _, device in _list(rescan)]
 
 
-def find(device: AudioDevice | None, rescan: bool = False) -> AudioDevice:
+def find(device: DeviceChoice | None, rescan: bool = False) -> AudioDevice:
     """The output as PortAudio lists it now, by name and host API; for None the system's default, else the first.
 
     Raises:
@@ -84,7 +89,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
 
     sounddevice = _sounddevice()
     with _lock:
-        index, _ = _find(device)
+        index, _ = _find(device.choice)
         ffi, channels = sounddevice._ffi, min(device.channels, 2)
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
@@ -120,11 +125,13 @@ _lock = threading.RLock()  # PortAudio does not allow listing and opening from t
 _streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started again
 
 
-def _find(device: AudioDevice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
+def _find(device: DeviceChoice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
     for index, found in _list(rescan):
-        if device is None or (found.name, found.host_api) == (device.name, device.host_api):
+        if device in (None, found.choice):
             return index, found
-    raise vanished(device.name, f"{device.host_api} lists no output of this name.") if device else no_device()
+    if device is None:
+        raise problem(ProblemKind.NO_DEVICE)
+    raise problem(ProblemKind.VANISHED, device.name, f"{device.host_api} lists no output of this name.")
 
 
 def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
@@ -139,7 +146,7 @@ def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
             entries: list[Mapping[str, Any]] = list(sounddevice.query_devices())
             default = sounddevice.default.device["output"]  # -1 if there is none
         except sounddevice.PortAudioError as error:
-            raise no_device(str(error)) from error
+            raise problem(ProblemKind.NO_DEVICE, detail=str(error)) from error
     listed = [
         (
             index,
@@ -161,9 +168,9 @@ def _sounddevice() -> ModuleType:
     try:
         import sounddevice
     except (ImportError, OSError) as error:
-        raise portaudio_missing(str(error)) from error
+        raise problem(ProblemKind.PORTAUDIO_MISSING, detail=str(error)) from error
     except Exception as error:  # importing the module starts PortAudio, which fails with an exception of its own
-        raise not_started(str(error)) from error
+        raise problem(ProblemKind.NOT_STARTED, detail=str(error)) from error
     _silence_alsa()
     module: ModuleType = sounddevice
     return module

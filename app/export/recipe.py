@@ -22,7 +22,7 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.levels import FULL_SCALE_M
-from engine.plain_text import name_text, one_line
+from engine.plain_text import LineError, name_text
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.schema import explained, parse_json
@@ -32,11 +32,8 @@ from engine.values.ear import Pickup
 REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source")
 
 
-class RecipeError(Exception):
+class RecipeError(LineError):
     """A file has no usable recipe. The message, one line, names the file, what is wrong and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 class NoRecipe(RecipeError):

@@ -32,7 +32,7 @@ from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
 from engine.kernels.midi import RESET, VOLUME
-from engine.plain_text import one_line
+from engine.plain_text import LineError
 from engine.read_file import UnusableFile, read_bounded
 
 LARGEST_BYTES = 4 * 2**20
@@ -46,11 +46,8 @@ MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 DRUMS = 9  # General MIDI's channel 10
 
 
-class MidiFileError(ValueError):
+class MidiFileError(LineError, ValueError):
     """A MIDI file cannot be read. The message names file, fault and remedy, in one line."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)

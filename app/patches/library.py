@@ -16,7 +16,7 @@ from app.patches.patch import CATEGORIES, Patch
 from app.shared.user_files import make_folder, read_all
 from engine import bounds
 from engine.folders import user_folder
-from engine.plain_text import name_text, one_line
+from engine.plain_text import LineError, name_text, one_line
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, explained, parse_json
@@ -26,11 +26,8 @@ SUFFIX = ".json"
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # on Windows
 
 
-class PatchError(ValueError):
+class PatchError(LineError, ValueError):
     """A patch cannot be used or saved. The message names file, field and remedy, in one line."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)

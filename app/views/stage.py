@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import (
@@ -101,6 +101,10 @@ class StageView(QWidget):
         points = {"left": left, "right": right}
         self._listening = {side: position for side, position in points.items() if position is not None}
         self.update()
+
+    def show_frame(self, frame: Any) -> None:
+        """Show a moment of the motion; None: at rest."""
+        raise NotImplementedError
 
     # Gestures
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.audio.devices import AudioDevice, output_devices
+from app.audio.choices import DeviceChoice, SoundChoice
+from app.audio.devices import output_devices
 from app.audio.problems import AudioProblem, ProblemKind
 from app.audio.sound import Sound, SoundStatus
 from app.presets.words import rate_word
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from app.playing.notes import Notes
     from app.rendering import Take
 
-# of the device's buffer, which is nearly all that sound waits for
-LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
 FREQUENT, FREQUENT_WITHIN_S = 3, 10.0  # gaps that are worth a word
 FREQUENT_GAPS = (
     "The sound has gaps. A longer buffer prevents them: Audio …, or Ctrl+comma. So does closing other programs."
@@ -60,15 +58,8 @@ class AudioControl(QObject):
 
     def open(self, rescan: bool = False) -> None:
         """Open the output as chosen. Return at once; `show` sees what became of it."""
-        device, sound = self._wish
         self._changes += 1
-        self.output.open(
-            AudioDevice(device.name, device.host_api) if device else None,
-            LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
-            sound.rate_hz,
-            sound.buffer if isinstance(sound.buffer, int) else 0,
-            rescan,
-        )
+        self.output.open(*self._wish, rescan)
 
     def report(self, problem: AudioProblem) -> None:
         """Show a fault of the output as a notice, with what plays on; an internal one stays, for its report."""
@@ -140,7 +131,7 @@ class AudioControl(QObject):
         except AudioProblem:
             devices, choices = [], None
         else:
-            choices = [DeviceChoice(name=device.name, host_api=device.host_api) for device in devices]
+            choices = [device.choice for device in devices]
         if self._dialog is not None and (first or choices != self._listed):
             self._dialog.show_devices(choices or [], self._wish[0])
         self._listed = choices

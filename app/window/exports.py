@@ -8,10 +8,8 @@ from typing import Any
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
-from app.export.choices import ExportChoices
 from app.export.note import ExportedPluck, HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
-from app.export.sampled.choices import SampledChoices
 from app.export.struck import Struck
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
@@ -20,7 +18,7 @@ from app.presets.words import shape_word
 from app.session.choices import Choices, Session
 from app.session.slots import other_preset
 from app.views.dialogs.export_dialog import ExportDialog
-from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
+from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind, Remembered
 from app.window.instruments import Instruments
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
@@ -42,7 +40,7 @@ class Exports(QObject):
         library: Library,
         recordings: Recordings,
         instruments: Instruments,
-        choices: tuple[ExportChoices, SampledChoices],
+        choices: Remembered,
     ) -> None:
         super().__init__(window)
         self._session = session
@@ -57,9 +55,9 @@ class Exports(QObject):
         window.installEventFilter(self)
 
     @property
-    def choices(self) -> tuple[ExportChoices, SampledChoices]:
+    def choices(self) -> Remembered:
         """The dialog's choices, to be saved."""
-        return self._choices if self.dialog is None else (self.dialog.choices(), self.dialog.sampled_choices())
+        return self._choices if self.dialog is None else self.dialog.choices()
 
     def open(self, kind: Kind) -> None:
         """Open the dialog at a page, or bring it to the front."""
@@ -68,7 +66,7 @@ class Exports(QObject):
             self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
-            self.dialog = ExportDialog(*self._choices, self._window)
+            self.dialog = ExportDialog(self._choices, self._window)
             self.dialog.finished.connect(self._end_dialog)
             self.dialog.exported.connect(self._forget_saved)
             self.dialog.ended.connect(self.ended)

@@ -118,8 +118,6 @@ class PatchDesk(BrowserDesk):
         )
         panel.knobs.changed.connect(self.change)
         panel.knobs.figure_asked.connect(self.turn_to)
-        bar.previous_asked.connect(lambda: self.step(-1))
-        bar.next_asked.connect(lambda: self.step(1))
         bar.save_asked.connect(self.save)
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)

@@ -38,7 +38,7 @@ MAKER = "Learned Strings"
 MOST_NOTES = 40
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 NOISE_BYTES = 8  # of a frame
-SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, whole=True, words=SOURCES)
+SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, words=SOURCES)
 DRUM_PARAMETERS = (
     "knobs.decay",
     "knobs.brightness_decay",

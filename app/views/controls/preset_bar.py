@@ -7,35 +7,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout
 
-from app.views.controls.choosers import FilterButton, NameButton
+from app.views.controls.choosers import ChoiceBar
 from app.views.controls.elided_label import ElidedLabel
-from app.views.controls.parts import NO_MARGINS, filled, tool_button
+from app.views.controls.parts import NO_MARGINS, filled
 
 if TYPE_CHECKING:
     from app.presets.library import PresetEntry
 
 
-class PresetBar(QWidget):
+class PresetBar(ChoiceBar):
     """The bar of presets; `card`, the line of facts, is placed by the window."""
 
-    browse_asked = Signal()
-    step_asked = Signal(int)
-    all_asked = Signal()  # clear the browser's filter
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        tip = "Previous preset in the browser's list (Page up)"
-        previous = tool_button("◀", "Previous preset", tip, "narrow", lambda: self.step_asked.emit(-1))
-        tip = "Next preset in the browser's list (Page down)"
-        following = tool_button("▶", "Next preset", tip, "narrow", lambda: self.step_asked.emit(1))
-        tip = "Browse the presets (Ctrl+P)"
-        self.name = NameButton("Reading presets …", tip, self.browse_asked, narrowest=100, widest=560)
-        self.filtered = FilterButton("presets", self.all_asked)
+    def __init__(self) -> None:
+        super().__init__("preset", "Reading presets …", (" (Page up)", " (Page down)", " (Ctrl+P)"))
+        self.name.setMinimumWidth(100)
+        self.name.setMaximumWidth(560)
         self.card = ElidedLabel(objectName="faint")
-        row = filled(QHBoxLayout(self), previous, self.name, following, self.filtered, None, spacing=6)
+        row = filled(QHBoxLayout(self), self.previous, self.name, self.following, self.filtered, None, spacing=6)
         row.setContentsMargins(NO_MARGINS)
         row.setStretchFactor(self.name, 1000)  # takes the room first, up to its maximum width
 
@@ -46,8 +36,6 @@ class PresetBar(QWidget):
             preset_summary,
         )
 
-        title = entry.title if entry else "No preset found"
-        self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
-        self.name.setAccessibleName(f"Preset: {title}")
+        self.show_name(entry.title if entry else "No preset found", "★  " if favourite else "")
         self.card.say(*(preset_summary(entry) if entry else [""]))
         self.card.setToolTip(preset_card(entry) if entry else "")

@@ -12,9 +12,7 @@ from PySide6.QtCore import Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QHBoxLayout, QTabBar, QVBoxLayout, QWidget
 
-from app.export.choices import ExportChoices
 from app.export.job import EXPECTED, ExportJob
-from app.export.sampled.choices import SampledChoices
 from app.views.controls.parts import filled, push_button, show_kind
 from app.views.dialogs.export_pages import (
     PAGES,
@@ -23,6 +21,7 @@ from app.views.dialogs.export_pages import (
     NotePage,
     PerformancePage,
     PluginPage,
+    Remembered,
     SamplerPage,
     WavForm,
 )
@@ -47,7 +46,8 @@ class ExportDialog(WorkDialog):
     exported = Signal(object)  # the job that has ended well
     ended = Signal(bool)  # a job, well or not; the dialog shows its result by then
 
-    def __init__(self, export: ExportChoices, sampled: SampledChoices, parent: QWidget | None = None) -> None:
+    def __init__(self, remembered: Remembered, parent: QWidget | None = None) -> None:
+        export, sampled = remembered
         super().__init__("Export", 680, "export", EXPECTED, parent)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
@@ -95,12 +95,9 @@ class ExportDialog(WorkDialog):
         """The job under way."""
         return self._job if self.background.busy else None
 
-    def choices(self) -> ExportChoices:
-        """The choices of notes and performances, to be remembered."""
-        return self.note.choices()
-
-    def sampled_choices(self) -> SampledChoices:
-        return self.sampler.choices()
+    def choices(self) -> Remembered:
+        """The choices of all pages, to be remembered."""
+        return self.note.choices(), self.sampler.choices()
 
     def open_at(self, kind: Kind) -> None:
         """Show a page, unless an export is under way, and bring the dialog to the front."""

@@ -41,6 +41,7 @@ SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
 RATES_HZ = (44_100, 48_000, 96_000)
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
+Remembered = tuple[ExportChoices, SampledChoices]  # choices from one dialog to the next
 PLUGIN_NAMES = {"clap": "CLAP", "vst3": "VST3", "lv2": "LV2"}
 SYSTEM_NAMES = {
     "linux-x64": "Linux",

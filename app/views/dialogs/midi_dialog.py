@@ -74,6 +74,7 @@ class MidiDialog(QDialog):
         parts = form, self._problem, faint("CONTROLLERS"), scrolled(rows), last
         column = filled(QVBoxLayout(self), *parts, spacing=12, margins=QMargins(18, 16, 18, 16))
         column.setStretch(3, 1)
+        self.show_inputs([], "", "")
 
     def _build_rows(self) -> QGridLayout:
         grid = QGridLayout()

@@ -26,9 +26,7 @@ from app.views.background import Background
 from app.views.controls.parts import lay_out_alone, words_label
 from app.views.controls.plain import Label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.drum.view import DrumView
 from app.views.stage import StageView
-from app.views.string.view import StringView
 
 Location = Literal["stage", "left", "right"]
 LEAST_HEIGHT = 84  # pixels
@@ -261,7 +259,7 @@ class ComputedPanel(Panel):
 class StagePanel(Panel):
     """The picture of the string or the drum, above the decks; in Play of the audible source alone."""
 
-    view: StringView | DrumView
+    view: StageView
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:

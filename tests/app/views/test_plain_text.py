@@ -67,7 +67,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
+    dialog = ExportDialog((export, SampledChoices(folder=str(tmp_path / EVIL))))
     patch = read_patch(SHIPPED / "classical_guitar.json")
     note = heard_note(Choices(single=entry.name), Library([entry]), None)
     dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})

@@ -119,9 +119,9 @@ def test_playing_is_recorded_as_it_is_heard_and_a_dropped_recording_changes_noth
     assert guitar.choices == before and not own_bodies().exists(), "it is neither a recipe nor a body"
     record(guitar)
     wav = dialog_of(guitar).wav
-    choose(wav.rate, 44_100)
-    choose(wav.bits, "16")
-    wav.normalise.setChecked(True)
+    choose(wav["rate_hz"], 44_100)
+    choose(wav["bits"], "16")
+    wav["normalise"].setChecked(True)
     save(guitar, tmp_path / "cd.wav")
     info = soundfile.info(tmp_path / "cd.wav")
     assert (info.samplerate, info.subtype) == (44_100, "PCM_16")

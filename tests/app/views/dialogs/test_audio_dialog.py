@@ -16,7 +16,7 @@ from tests.app.gestures import named, reported
 
 LOUD, SOFT = DeviceChoice(name="Loud", host_api="ALSA"), DeviceChoice(name="Soft", host_api="JACK")
 GAPS = {"1.2 s: device": Gap(1.2, "device", 1.0), "5.6 s: runaway": Gap(5.6, "runaway", 1.0)}
-PLAYING = SoundStatus(AudioDevice("Loud", "ALSA"), 48_000, 0.012, tuple(GAPS.values()), 0.254)
+PLAYING = SoundStatus(AudioDevice("Loud", "ALSA", 48_000), 48_000, 0.012, tuple(GAPS.values()), 0.254)
 SILENT = SoundStatus(problem="It is in use by another program.")
 
 

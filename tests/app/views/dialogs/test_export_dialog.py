@@ -55,7 +55,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
 
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
-        dialog = ExportDialog(ExportChoices.model_validate(settings), SampledChoices())
+        dialog = ExportDialog((ExportChoices.model_validate(settings), SampledChoices()))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         dialog.show_subjects({"note": note(heard or {})})
@@ -154,10 +154,10 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
     dialog.note["source"].setCurrentIndex(dialog.note["source"].findData("difference"))
     dialog.note["difference_gain_db"].setValue(30)
     assert "difference.wav" in dialog.note.file.edit.text()
-    choices = dialog.choices()
+    choices, _ = dialog.choices()
     assert (choices.source, choices.folder, choices.seconds) == ("difference", str(tmp_path), 0.5)
     assert choices.difference_gain_db == 30
-    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices() == choices
+    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices()[0] == choices
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices().model_dump(), {"instrument": GUITAR})
+    again = made(dialog.choices()[0].model_dump(), {"instrument": GUITAR})
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 

@@ -53,7 +53,7 @@ def dialog(
     monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
     monkeypatch.setattr("app.export.plugin.image.image_of", lambda patch, preset: patch.name)
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
-    made = ExportDialog(ExportChoices(), SampledChoices())
+    made = ExportDialog((ExportChoices(), SampledChoices()))
     qtbot.addWidget(made)
     preset = list_presets(preset_folder)[0][0]
     made.show_subjects({"plugin": HeardInstrument(find_patch("Classical guitar").patch, preset)})

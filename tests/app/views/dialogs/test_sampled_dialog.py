@@ -81,7 +81,7 @@ def made(
 
     def make(**choices: object) -> ExportDialog:
         remembered = SampledChoices.model_validate({"folder": str(folder), **SMALL, **choices})
-        dialog = ExportDialog(ExportChoices(), remembered)
+        dialog = ExportDialog((ExportChoices(), remembered))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         show(dialog, patch, preset)
@@ -311,15 +311,15 @@ def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
         box.setCurrentIndex(box.findData(data))
     form["every"].setValue(2)
     form["dry"].setChecked(True)
-    choices = dialog.sampled_choices()
+    choices = dialog.choices()[1]
     assert choices == SampledChoices(
         folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
     )
-    assert made(**choices.model_dump()).sampled_choices() == choices
+    assert made(**choices.model_dump()).choices()[1] == choices
     whole = made(keys=None)
     assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == patch.range
-    assert whole.sampled_choices().keys is None
-    assert made(keys=(0, 127)).sampled_choices().keys is None  # not of this patch
+    assert whole.choices()[1].keys is None
+    assert made(keys=(0, 127)).choices()[1].keys is None  # not of this patch
 
 
 def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
@@ -330,7 +330,7 @@ def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
     show(dialog, other, preset)
     assert dialog.sampler.file.path == folder / "Concert_harp.sfz"
     assert dialog.sampler.what.text().startswith("Concert harp")
-    assert dialog.sampled_choices().keys == (60, 62)
+    assert dialog.choices()[1].keys == (60, 62)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *words: (str(folder / "mine"), words[-1]))
     dialog.sampler.file.browse()
     assert dialog.sampler.file.path == folder / "mine.sfz"
