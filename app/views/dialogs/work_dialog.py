@@ -37,7 +37,8 @@ class WorkDialog(QDialog):
         self.setWindowTitle(title)
         self.setMinimumWidth(width)
         self.state = label("faint", selectable=True)
-        self.bar = QProgressBar(maximum=1000, visible=False)
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.hide()
         self.bar.setAccessibleName("Progress")
         self._began_s = 0.0
         self._then: Callable[[Any], None] = lambda result: None
