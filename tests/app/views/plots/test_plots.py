@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
-from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.stage.session import Session
 from app.views import theme
 from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow

@@ -9,9 +9,9 @@ import pytest
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch
 from app.patches.tuning import TuningChoice
-from app.session.history import RECORDED
-from app.session.step_words import SEVERAL, step_words
 from app.shared.parameters import OF_PATCHES
+from app.stage.session import RECORDED
+from app.stage.step_words import SEVERAL, step_words
 
 
 @pytest.fixture(scope="module")
