@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from engine import bounds
 from engine.plain_text import LineError
-from engine.read_file import UnusableFile, read_bounded
+from engine.whole_file import UnusableFile, read_bounded
 
 T = TypeVar("T")
 # A dotted key, plain or quoted parts. Possessive: each character is looked at once or twice, whatever the text holds.

@@ -23,7 +23,7 @@ from app.shared.vocabulary import Source
 from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import Preset
-from engine.result_file import WriteError, explain, whole_file
+from engine.whole_file import WriteError, explain, result_file
 
 LONGEST_NAME = 150  # characters of a preset's name in a file's name
 DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
@@ -112,7 +112,7 @@ def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
 
 @contextmanager
 def _open_whole(path: Path) -> Iterator[BinaryIO]:
-    with _explain_errors(path), whole_file(path) as file:
+    with _explain_errors(path), result_file(path) as file:
         yield file
 
 

@@ -19,7 +19,7 @@ from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.shared.worker import Progress
 from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
-from engine.result_file import whole_file
+from engine.whole_file import result_file
 
 RATE_HZ = 48_000
 TAIL_S = 6.0  # a guess at how long it rings after the last note, for progress
@@ -91,7 +91,7 @@ def write_played(
     def advanced(done_s: float) -> None:
         progress(min(0.99, done_s / whole_s))
 
-    with whole_file(path) as file:
+    with result_file(path) as file:
         sound = Recording(channels_played(patch, events))
         for block in render_events(
             patch, preset, events, rate_hz, source, seconds, advanced=advanced, difference_gain_db=gain_db
@@ -131,7 +131,7 @@ class PlayedExport:
     def run(self, progress: Progress) -> str:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
-        with whole_file(midi_file) as file:
+        with result_file(midi_file) as file:
             file.write(midi_bytes(played.events, played.patch))
         preset = load_preset(self.preset)
         written = write_played(sound_file, played, preset, midi_file.name, self.settings, progress=progress)

@@ -33,7 +33,7 @@ from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
 from engine.kernels.midi import RESET, VOLUME
 from engine.plain_text import LineError
-from engine.read_file import UnusableFile, read_bounded
+from engine.whole_file import UnusableFile, read_bounded
 
 LARGEST_BYTES = 4 * 2**20
 MOST_EVENTS = 400_000  # an hour of 50 notes a second, with releases

@@ -17,9 +17,8 @@ from app.shared.user_files import make_folder, read_all
 from engine import bounds
 from engine.folders import user_folder
 from engine.plain_text import LineError, name_text, one_line
-from engine.read_file import read_bounded
-from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, explained, parse_json
+from engine.whole_file import WriteError, explain, read_bounded, result_file
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
 SUFFIX = ".json"
@@ -149,7 +148,7 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     if replace is None and path.exists():
         raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     make_folder(path.parent)
-    with whole_file(path) as file:
+    with result_file(path) as file:
         file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
     return PatchEntry(path, patch)
 

@@ -13,8 +13,8 @@ from app.patches.fields import HIGHEST_KEY, ScalaText, parameter
 from app.patches.scala import Keymap, equal_steps, parse_keymap, parse_scale
 from app.shared.value import Value
 from engine.plain_text import one_line
-from engine.read_file import UnusableFile, read_bounded
 from engine.schema import explained
+from engine.whole_file import UnusableFile, read_bounded
 
 A4_KEY, MIDDLE_KEY = 69, 60
 SCALA_FILES = (".scl", ".kbm")

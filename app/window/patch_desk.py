@@ -54,8 +54,8 @@ from app.window.recordings import Recordings
 from app.window.song import SongPlayer
 from engine.kernels.midi import HARMONICS, LEGATO, PORTAMENTO, SLIDE_TIME, STRUM, TREMOLO
 from engine.plain_text import one_line
-from engine.result_file import WriteError
 from engine.schema import explained
+from engine.whole_file import WriteError
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04

@@ -52,6 +52,7 @@ class Form(QWidget):
         self._controls: dict[str, Any] = {}
         self.rows = QFormLayout(self)
         self.rows.setContentsMargins(NO_MARGINS)
+        self.rows.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
 
     def __getitem__(self, field: str) -> Any:
         return self._controls[field]

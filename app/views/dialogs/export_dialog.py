@@ -27,7 +27,7 @@ from app.views.dialogs.export_pages import (
 )
 from app.views.dialogs.question import ask
 from app.views.dialogs.work_dialog import WorkDialog
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step

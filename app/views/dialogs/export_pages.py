@@ -31,7 +31,7 @@ from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
 from app.views.controls.form import FilePicker, Form, check_box
 from app.views.controls.number_box import NoteBox
 from app.views.controls.parts import faint, label
-from engine.result_file import WriteError, explain
+from engine.whole_file import WriteError, explain
 
 Kind = Literal["note", "performance", "sampler", "plugin"]
 SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (

@@ -21,7 +21,7 @@ from app.views.dialogs.question import ask
 from app.views.dialogs.work_dialog import WorkDialog
 from engine.plain_text import name_text
 from engine.presets import PresetError
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 if TYPE_CHECKING:
     from app.instrument.learned import Reasons
