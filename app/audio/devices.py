@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 from app.audio.choices import DeviceChoice
 from app.audio.problems import ProblemKind, problem, refused
@@ -38,22 +38,6 @@ class AudioDevice:
         return DeviceChoice(name=self.name, host_api=self.host_api)
 
 
-class RawStream(Protocol):
-    """The part of `sounddevice`'s streams that is used here."""
-
-    @property
-    def active(self) -> bool: ...
-    @property
-    def latency(self) -> float: ...
-    @property
-    def time(self) -> float: ...
-    @property
-    def cpu_load(self) -> float: ...
-    def start(self) -> None: ...
-    def abort(self) -> None: ...
-    def close(self) -> None: ...
-
-
 def output_devices(rescan: bool = False) -> list[AudioDevice]:
     """All sound outputs, the system's default first.
 
@@ -76,8 +60,8 @@ def find(device: DeviceChoice | None, rescan: bool = False) -> AudioDevice:
     return _find(device, rescan)[1]
 
 
-def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
-    """Open, but do not start, a float32 stream at `device.default_rate_hz`, of two channels at most.
+def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> Any:
+    """Open, but do not start, one of `sounddevice`'s streams, at `device.default_rate_hz`, of two channels at most.
 
     The device calls the compiled mixer in its own thread, without the Python interpreter. Its buffer is `buffer_s`,
     or the latency that the device calls low where that is longer.
@@ -95,7 +79,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
         try:
             # The private base class is the only one that takes a compiled callback; rtmixer uses it as well.
-            stream: RawStream = sounddevice._StreamBase(
+            stream = sounddevice._StreamBase(
                 kind="output",
                 samplerate=device.default_rate_hz,
                 blocksize=frames,
@@ -112,7 +96,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
     return stream
 
 
-def close_device(stream: RawStream) -> None:
+def close_device(stream: Any) -> None:
     """Stop at once and free the device; errors of a device that cannot be stopped are ignored."""
     with _lock:
         for end in (stream.abort, stream.close):
@@ -122,7 +106,7 @@ def close_device(stream: RawStream) -> None:
 
 
 _lock = threading.RLock()  # PortAudio does not allow listing and opening from two threads
-_streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started again
+_streams: set[Any] = set()  # open ones: while there are any, PortAudio must not be started again
 
 
 def _find(device: DeviceChoice | None, rescan: bool = False) -> tuple[int, AudioDevice]:

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 from app.instrument.events import ControlChange, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.midi import MidiChoices, turns_of
-from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
+from app.playing.midi_backend import MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 from app.views.dialogs.midi_dialog import MidiDialog
 
@@ -43,7 +43,7 @@ class MidiControl(QObject):
         handle: Callable[[Event], object],
         play_note: Callable[[NoteOn, str], None],
         parent: QObject | None = None,
-        load: Callable[[], Backend] = load_backend,
+        load: Callable[[], RtMidi] = load_backend,
     ) -> None:
         super().__init__(parent)
         self.choices = choices
