@@ -69,10 +69,6 @@ class _Wish:
     sound: SoundChoice = field(default_factory=SoundChoice)
     rescan: bool = False
 
-    def at_its_rate(self, device: AudioDevice) -> AudioDevice:
-        """The device with the wanted rate, or, for 0, with its own."""
-        return replace(device, default_rate_hz=self.sound.rate_hz or device.default_rate_hz)
-
 
 class Sound:
     """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
@@ -255,7 +251,8 @@ class Sound:
     def _find_device(self, wish: _Wish, rescan: bool) -> AudioDevice:
         """The device that is wished for. Raises AudioProblem: there is none now, or it cannot be looked for."""
         try:
-            return wish.at_its_rate(self._look_up(wish.device, rescan))
+            device = self._look_up(wish.device, rescan)
+            return replace(device, default_rate_hz=wish.sound.rate_hz or device.default_rate_hz)
         except AudioProblem:
             raise
         except Exception as error:

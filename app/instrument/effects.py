@@ -12,22 +12,16 @@ from app.instrument.bodies import own_impulse
 from app.patches.patch import BodyChoice, Patch
 from engine.effects import BODIES, Body, Effects
 from engine.effects.body import curves_of
-from engine.values.effects import Amp, Room
 
 
 def effects_of(patch: Patch) -> Effects | None:
     """Amplifier, body and room of a patch; None: it has none of them.
 
-    A body that cannot be used is left out: see `body_problem`.
+    A body that cannot be used is left out: see `body_problem`. The level, behind the amplifier, changes no drive.
     """
-    return effects_from(patch.body, patch.room, patch.amp, patch.level_db)
-
-
-def effects_from(chosen: BodyChoice, room: Room, amp: Amp, level_db: float) -> Effects | None:
-    """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
-    effects = Effects(_body(chosen)[0], room if room.mix > 0 else None)
-    if amp.drive_db > 0:
-        return replace(effects, amp=amp, level_db=level_db)
+    effects = Effects(_body(patch.body)[0], patch.room if patch.room.mix > 0 else None)
+    if patch.amp.drive_db > 0:
+        return replace(effects, amp=patch.amp, level_db=patch.level_db)
     return None if effects == Effects() else effects
 
 

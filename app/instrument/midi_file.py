@@ -241,7 +241,9 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:
         for channel in of:
-            track.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
+            member = patch.mode == "mpe" and channel not in (0, KEYS)
+            semitones = MEMBER_SEMITONES if member else patch.bend_semitones
+            track.extend(TimedEvent(time_s, event) for event in bend_range(semitones, channel))
 
     set_ranges(0.0, channels)
     for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
@@ -260,11 +262,6 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
             set_ranges(time_s, [event.channel])
             track.append(TimedEvent(time_s, ControlChange(VOLUME, USUAL_VOLUME, event.channel)))
     return track
-
-
-def _bend_semitones(patch: Patch, channel: int) -> float:
-    member = patch.mode == "mpe" and channel not in (0, KEYS)
-    return MEMBER_SEMITONES if member else patch.bend_semitones
 
 
 def message_of(event: Event) -> list[int]:
