@@ -1,12 +1,18 @@
-"""A bar that chooses from a browser's list: previous, the chosen name, next, and the filter while there is one."""
+"""Bars that choose from a browser's list: previous, the chosen name, next, and the filter while there is one."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QPushButton, QSizePolicy, QToolButton
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QToolButton
 
-from app.views.controls.parts import Handler, tool_button
+from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.parts import NO_MARGINS, Handler, filled, tool_button
+
+if TYPE_CHECKING:
+    from app.presets.library import PresetEntry
 
 PADDING = 26  # of the style sheet, with the borders
 
@@ -92,3 +98,27 @@ class ChoiceBar(QFrame):
         """Show the chosen name behind a mark; `state`: what that means, for a screen reader."""
         self.name.setText(f"{mark}{name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"{self._what}: {name}{state}")
+
+
+class PresetBar(ChoiceBar):
+    """The bar of presets; `card`, the line of facts, is placed by the window."""
+
+    def __init__(self) -> None:
+        super().__init__("preset", "Reading presets …", (" (Page up)", " (Page down)", " (Ctrl+P)"))
+        self.name.setMinimumWidth(100)
+        self.name.setMaximumWidth(560)
+        self.card = ElidedLabel(objectName="faint")
+        row = filled(QHBoxLayout(self), self.previous, self.name, self.following, self.filtered, None, spacing=6)
+        row.setContentsMargins(NO_MARGINS)
+        row.setStretchFactor(self.name, 1000)  # takes the room first, up to its maximum width
+
+    def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
+        """Show the chosen preset; None: there is no preset."""
+        from app.views.dialogs.preset_card import (  # brings the engine, which the first paint does not wait for
+            preset_card,
+            preset_summary,
+        )
+
+        self.show_name(entry.title if entry else "No preset found", "★  " if favourite else "")
+        self.card.say(*(preset_summary(entry) if entry else [""]))
+        self.card.setToolTip(preset_card(entry) if entry else "")

@@ -18,10 +18,10 @@ from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
+from app.views.controls.choosers import PresetBar
 from app.views.controls.elided_label import Readout
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.preset_bar import PresetBar
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
