@@ -1,4 +1,4 @@
-"""Long work with progress and cancelling.
+"""A thread of its own for long work, with progress and cancelling; the latest work alone is done.
 
 Work is a function of a `Job`. It calls `Job.report` a few times a second, which ends it where it is not wanted any
 more.
@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from typing import Any, Protocol
+
+from app.shared.thread_priority import Rank, lower_priority
 
 BREATH_S = 0.001  # between pieces of a job, so that other threads get their turn
 LOOK_AGAIN_S = 0.02  # while a job rests
@@ -89,3 +92,83 @@ class Job:
 
 
 Work = Callable[[Job], Any]
+
+
+class Worker:
+    """A worker that does one job at a time, the latest; its thread starts with the first.
+
+    Args:
+        name: of the thread.
+        say: see `Job`. Signals are "progressed" (share, text, result so far). One ends each job: "finished" (the
+            result), "failed" (message, details) or "cancelled".
+        expected: errors whose message is for the user; of any other the details have the traceback.
+        rests: see `Job`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        say: Callable[..., None],
+        expected: tuple[type[Exception], ...] = (),
+        rests: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._name = name
+        self._say = say
+        self._expected = expected
+        self._rests = rests
+        self._mailbox = threading.Condition()
+        self._next: tuple[Job, Work] | None = None
+        self._job: Job | None = None  # the latest
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def start(self, work: Work) -> Job:
+        """Do `work` as soon as the job under way has given up."""
+        self.cancel()
+        job = Job(self._say, self._rests)
+        with self._mailbox:
+            self._job, self._next = job, (job, work)
+            self._mailbox.notify()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
+        return job
+
+    def cancel(self) -> None:
+        """Ask the job under way to end; one that waits is not begun."""
+        if self._job is not None:
+            self._job.cancel()
+
+    def close(self, seconds: float | None = 10.0, *, cancel: bool = True) -> None:
+        """End the thread, waiting so long for it (None: as long as it takes); may be called again.
+
+        `cancel`: whether a job under way is cancelled, and not waited for to its end.
+        """
+        if cancel:
+            self.cancel()
+        with self._mailbox:
+            self._closing = True
+            self._mailbox.notify()
+        if self._thread is not None:
+            self._thread.join(seconds)
+
+    def _run(self) -> None:
+        lower_priority(Rank.BACKGROUND)
+        while True:
+            with self._mailbox:
+                self._mailbox.wait_for(lambda: self._next is not None or self._closing)
+                if self._next is None:
+                    return
+                (job, work), self._next = self._next, None
+            try:
+                job.wait()
+                result = work(job)
+                self._say(job, "finished", result)
+            except Cancelled:
+                self._say(job, "cancelled")
+            except self._expected as error:
+                self._say(job, "failed", str(error), "")
+            except Exception as error:  # shown to the user; the thread continues
+                self._say(job, "failed", f"Computing failed: {error}", traceback.format_exc())
+            result = None
+            del job, work  # they may hold a take
