@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
-from engine.sources import ModelSource, Runaway
+from engine.sources import ModelSource, Runaway, SourceState
 from engine.values.ear import Ear
 from engine.voices.mixer import Mixer
 from engine.voices.program import Program
@@ -22,16 +20,8 @@ from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
-AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # of a block of samples that are rendered ahead, at first and later
+FIRST_FRAMES, MODEL_FRAMES = 256, 1024  # of a block of a model's frames, at first and later
 FILLING = 0.9  # share of the work that these samples are
-
-
-class SampleSource(Protocol):
-    """The methods of `ModelSource` that samples need."""
-
-    def start(self, displacement_m: Array) -> Any: ...
-
-    def advance(self, state: Any, steps: int, readout: Array) -> tuple[NDArray[np.floating[Any]], Any]: ...
 
 
 class OfflineVoice:
@@ -60,42 +50,31 @@ class OfflineVoice:
         return block[:, : self.channels]
 
 
-class ModelSamples:
-    """The samples of a voice that is not compiled: its model renders them block by block, for ears and files alike.
+class ModelFrames:
+    """The frames of a model, block by block from the release on: the same for pictures, ears and files."""
 
-    Attributes:
-        done: samples that the voice was given.
-    """
+    def __init__(self, source: ModelSource, initial_m: Array) -> None:
+        self._source, self._initial_m = source, initial_m
+        self._state: SourceState | None = None
+        self._done = 0
 
-    def __init__(self, voice: Voice, source: SampleSource, initial_m: Array) -> None:
-        self.voice, self._source, self._initial_m = voice, source, initial_m
-        self._weights = voice.program.grid_weights(voice.ear)
-        self._state: Any = None
-        self.done = 0
+    def advance(self, most: int) -> NDArray[np.float32]:
+        """The next frames, `most` at most, (frames, grid_points) in m.
 
-    def advance(self) -> NDArray[np.float32]:
-        """Give the voice its next block, and return that (frames, points).
-
-        Two short ones let it begin soon: the first prepares the model, the second shows its speed.
+        Two short blocks let a voice begin soon: the first prepares the model, the second shows its speed.
 
         Raises:
-            Runaway: the output stopped being a string's; the voice ends before.
+            Runaway: the output stopped being a string's.
         """
         if self._state is None:
             self._state = self._source.start(self._initial_m[None])
-            block = (self._initial_m @ self._weights)[None]
+            frames = self._initial_m[None]
         else:
-            steps = min(AHEAD_FIRST if self.done < 2 * AHEAD_FIRST else AHEAD_FRAMES, self.voice.room)
-            try:
-                frames, self._state = self._source.advance(self._state, steps, self._weights)
-            except Runaway:
-                self.voice.end_here()
-                raise
-            block = frames[0].astype(np.float64)
-        samples = (block / FULL_SCALE_M).astype(np.float32)
-        self.voice.append(samples)
-        self.done += len(samples)
-        return samples
+            steps = FIRST_FRAMES if self._done < 2 * FIRST_FRAMES else MODEL_FRAMES
+            motion, self._state = self._source.advance(self._state, min(steps, most))
+            frames = motion[0]
+        self._done += len(frames)
+        return frames.astype(np.float32)
 
 
 def render_voice(
@@ -141,9 +120,9 @@ def voice_blocks(
     offline = OfflineVoice(voice)
     if program.rendered:
         assert source is not None
-        samples, total = ModelSamples(voice, source, initial_m), voice.room
+        model, total = ModelFrames(source, initial_m), voice.room
         while voice.room:
-            samples.advance()
+            voice.append(voice.sense(model.advance(voice.room)))
             advanced(FILLING * (1 - voice.room / total))
     frames = max(1, round(seconds * program.rate_hz))
     loudest_db = -math.inf

@@ -81,7 +81,6 @@ class Voice(KernelMemory):
         if n:
             self.rows[0], self.rows[1] = program.start(displacement_m)
         self._samples: NDArray[np.float32] | None = None
-        self._source_rate_hz = source_rate_hz
         if program.resonator is not None:
             record["moving"] = n
             self.rows[at.OMEGA_SQUARED : at.FOLLOWING] = resonator_rows(program.resonator)
@@ -93,6 +92,8 @@ class Voice(KernelMemory):
             seconds = min(seconds, program.ends_s + END_FADE_S + SPARE_S)
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
+            if program.grid_points:
+                self._senses = (program.grid_weights(ear) / FULL_SCALE_M).astype(np.float32)
             record["samples"], record["length"] = self._samples.ctypes.data, length
         if program.grid_points:
             self._set_weights(0, ear)
@@ -186,11 +187,6 @@ class Voice(KernelMemory):
             self.record["ends_in"] = fade
 
     @property
-    def waits(self) -> bool:
-        """Return True if it has not begun."""
-        return bool(self.record["state"] == at.WAITING)
-
-    @property
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 until then."""
         return max(0, int(self.record["began_frame"]))
@@ -216,6 +212,10 @@ class Voice(KernelMemory):
         self.ear = ear
         return True
 
+    def sense(self, frames_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The samples (frames, points) of full scale that a rendered voice has of a motion (frames, grid_points)."""
+        return np.einsum("fg,gp->fp", frames_m, self._senses)
+
     def append(self, samples: NDArray[np.floating]) -> None:
         """Append samples that a rendered voice reads, (frames, points) of full scale at its own rate."""
         assert self._samples is not None
@@ -223,12 +223,6 @@ class Voice(KernelMemory):
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
         self.publish("ready", ready + count)
-
-    def level_of_samples(self, seconds: float) -> float:
-        """Root mean square of what a rendered voice was given for its first seconds."""
-        assert self._samples is not None
-        frames = min(int(self.record["ready"]), round(seconds * self._source_rate_hz))
-        return math.sqrt(float(np.square(self._samples[:frames], dtype=np.float64).mean())) if frames else 0.0
 
     @property
     def room(self) -> int:

@@ -19,7 +19,6 @@ from app.playing.midi import MidiChoices
 from app.playing.midi_backend import MidiUnavailable
 from app.playing.midi_port import MidiInput, same_device
 from app.views.dialogs.midi_dialog import MidiDialog
-from app.window import midi_control
 from app.window.midi_control import MidiControl
 from app.window.settings import load_settings
 from tests.app.window.driver import CONTROL, KEY, LEFT, Window, choose, find
@@ -116,7 +115,6 @@ class Desk:
 
 @pytest.fixture
 def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Desk]]:
-    monkeypatch.setattr(midi_control, "LOOK_MS", 5)
     made: list[Desk] = []
 
     def make(names: tuple[str, ...] = (KEYS, PADS), **choices: Any) -> Desk:
@@ -215,12 +213,13 @@ def test_an_input_that_comes_and_goes_is_reported_shown_and_remembered(
     assert "not connected" in keys.said[0] and box.currentText() == "No MIDI input found"
     for names, words, shown in (([KEYS, PADS], f"{KEYS} is connected again", KEYS), ([PADS], "disconnected", "None")):
         keys.backend.names = names
+        keys.midi.look()
         qtbot.waitUntil(lambda words=words: words in keys.said[-1])
         qtbot.waitUntil(lambda shown=shown: box.currentText() == shown)
     assert keys.midi.choices.port == "Keys:Keys 9:0"
     keys.dialog.port_chosen.emit("Strings")  # a wrong choice is not waited for
     before, keys.backend.names = len(keys.said), ["Strings"]
-    qtbot.wait(20)
+    keys.midi.look()
     assert len(keys.said) == before
 
 

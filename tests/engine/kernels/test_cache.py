@@ -72,10 +72,10 @@ def test_all_is_compiled_once_by_two_processes(whole: bool, monkeypatch: pytest.
     monkeypatch.setattr("engine.kernels.cache.is_whole", lambda: whole)
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     monkeypatch.setattr("subprocess.Popen", Beside(done))
-    for name in ("engine.warm.models", "engine.warm.unheard", "engine.warm.voices", "engine.kernels.cache.set_whole"):
+    for name in ("engine.warm.apart", "engine.warm.voices", "engine.kernels.cache.set_whole"):
         monkeypatch.setattr(name, lambda name=name: done.append(name.rpartition(".")[2]))
     warm.warm()
-    assert done == ([] if whole else ["playing", "models", "unheard", "waited", "voices", "set_whole"])
+    assert done == ([] if whole else ["apart", "voices", "waited", "apart", "set_whole"])
 
 
 class Beside:
@@ -96,4 +96,4 @@ class Beside:
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:
     warm.voices()
-    warm.models()
+    warm.apart()
