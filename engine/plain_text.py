@@ -29,6 +29,13 @@ def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
     return f"{line[: most - end - 3].rstrip()} … {line[-end:].lstrip()}"
 
 
+class LineError(Exception):
+    """An error whose message is one line, whatever is quoted in it."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
 def name_text(name: str) -> str:
     """A file's name as text that can be written anywhere: bytes of it that are no characters become "�"."""
     return "".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in name)

@@ -19,8 +19,8 @@ from typing import Any, TypeVar, get_args, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from engine import bounds
-from engine.plain_text import one_line
-from engine.read_file import UnusableFile, read_bounded
+from engine.plain_text import LineError
+from engine.whole_file import UnusableFile, read_bounded
 
 T = TypeVar("T")
 # A dotted key, plain or quoted parts. Possessive: each character is looked at once or twice, whatever the text holds.
@@ -32,11 +32,8 @@ _LONG_KEY = re.compile(
 _adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
 
 
-class SchemaError(ValueError):
+class SchemaError(LineError, ValueError):
     """Data that does not fit its description. The message is one line, whatever the data holds."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 def parse_json(text: str | bytes, where: str, most_bytes: int = bounds.LARGEST_TEXT_BYTES) -> Any:

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from engine.bounds import brief
-from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read
-from engine.whole_file import naming, whole_file
+from engine.whole_file import UnusableFile, naming, read_bounded, whole_file
 
 T = TypeVar("T")
 

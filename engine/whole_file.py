@@ -1,18 +1,59 @@
-"""Files and folders that are written whole or not at all, and what killed processes have left of them."""
+"""Files that are read whole, up to a size, and written whole or not at all; and what killed processes have left."""
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import re
 import shutil
+import stat
 import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # a pipe would keep us waiting
+REMEDIES = {
+    errno.ENOSPC: "free some space, or choose another disk",
+    errno.EDQUOT: "free some space, or choose another disk",
+    errno.EFBIG: "choose another disk, or a shorter result",
+    errno.EACCES: "choose a folder that you may write to",
+    errno.EPERM: "choose a folder that you may write to",
+    errno.EROFS: "choose a folder that you may write to",
+    errno.ENOENT: "make the folder first, or choose another",
+    errno.ENOTDIR: "choose another folder",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
 ENDING = ".unfinished"
+
+
+class UnusableFile(OSError):
+    """A file that is there and must not be read: not ordinary, or larger than any of ours. `strerror` says which."""
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """All bytes of a file of at most `most_bytes`.
+
+    Raises:
+        UnusableFile: it is larger, or a folder, a pipe or a device.
+        OSError: it cannot be read.
+    """
+    try:
+        descriptor = os.open(path, _FLAGS)
+    except ValueError:  # of a null character
+        raise UnusableFile(errno.EINVAL, "no file can have this name", str(path)) from None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise UnusableFile(errno.EINVAL, "not an ordinary file", str(path))
+    with os.fdopen(descriptor, "rb") as file:
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        most = f"{most_bytes // 2**20} MiB" if most_bytes >= 2**20 else f"{most_bytes // 2**10} KiB"
+        raise UnusableFile(errno.EFBIG, f"larger than the {most} that it may have", str(path))
+    return data
 
 
 @contextmanager
@@ -131,3 +172,37 @@ def is_alive(process: int) -> bool:
     import psutil  # only where something was left
 
     return bool(psutil.pid_exists(process))
+
+
+class WriteError(Exception):
+    """A file could not be written. The message names the path, what happened and the remedy."""
+
+
+@contextmanager
+def result_file(path: Path) -> Iterator[BinaryIO]:
+    """A file that a user asked for, open beside `path`, as `whole_file`.
+
+    Raises:
+        WriteError: for every OSError within the block: at its beginning where the folder cannot be written to, later
+            where the disk is full.
+    """
+    try:
+        target = replaceable(path)
+        with whole_file(target) as unfinished, unfinished.open("w+b") as file:
+            yield file
+    except OSError as error:
+        raise WriteError(explain(path, error)) from error
+
+
+def replaceable(path: Path) -> Path:
+    """The file that a path names, through links. Raises WriteError where it is a folder or a device."""
+    target = path.resolve()
+    if target.exists() and not target.is_file():
+        raise WriteError(f"{path}: not a file that can be replaced; choose another name")
+    return target
+
+
+def explain(path: Path, error: OSError) -> str:
+    """The error in one line: the path, the system's words and what to do."""
+    remedy = REMEDIES.get(error.errno or 0, "choose another place")
+    return f"{path}: cannot be written ({error.strerror or error}); {remedy}"

@@ -13,9 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
-from app.audio.problems import no_device, not_started, portaudio_missing, refused, vanished
+from app.audio.choices import DeviceChoice
+from app.audio.problems import ProblemKind, problem, refused
 from engine.voices.mixer import Mixer
 
 SMALLEST_BLOCK = 64  # frames
@@ -28,25 +29,13 @@ class AudioDevice:
 
     name: str
     host_api: str
-    default_rate_hz: int = 0  # 0 in a saved choice that has not been looked up yet
+    default_rate_hz: int
     channels: int = 2
     is_default: bool = False
 
-
-class RawStream(Protocol):
-    """The part of `sounddevice`'s streams that is used here."""
-
     @property
-    def active(self) -> bool: ...
-    @property
-    def latency(self) -> float: ...
-    @property
-    def time(self) -> float: ...
-    @property
-    def cpu_load(self) -> float: ...
-    def start(self) -> None: ...
-    def abort(self) -> None: ...
-    def close(self) -> None: ...
+    def choice(self) -> DeviceChoice:
+        return DeviceChoice(name=self.name, host_api=self.host_api)
 
 
 def output_devices(rescan: bool = False) -> list[AudioDevice]:
@@ -62,7 +51,7 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     return [device for _, device in _list(rescan)]
 
 
-def find(device: AudioDevice | None, rescan: bool = False) -> AudioDevice:
+def find(device: DeviceChoice | None, rescan: bool = False) -> AudioDevice:
     """The output as PortAudio lists it now, by name and host API; for None the system's default, else the first.
 
     Raises:
@@ -71,8 +60,8 @@ def find(device: AudioDevice | None, rescan: bool = False) -> AudioDevice:
     return _find(device, rescan)[1]
 
 
-def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
-    """Open, but do not start, a float32 stream at `device.default_rate_hz`, of two channels at most.
+def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> Any:
+    """Open, but do not start, one of `sounddevice`'s streams, at `device.default_rate_hz`, of two channels at most.
 
     The device calls the compiled mixer in its own thread, without the Python interpreter. Its buffer is `buffer_s`,
     or the latency that the device calls low where that is longer.
@@ -84,13 +73,13 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
 
     sounddevice = _sounddevice()
     with _lock:
-        index, _ = _find(device)
+        index, _ = _find(device.choice)
         ffi, channels = sounddevice._ffi, min(device.channels, 2)
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
         try:
             # The private base class is the only one that takes a compiled callback; rtmixer uses it as well.
-            stream: RawStream = sounddevice._StreamBase(
+            stream = sounddevice._StreamBase(
                 kind="output",
                 samplerate=device.default_rate_hz,
                 blocksize=frames,
@@ -107,7 +96,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
     return stream
 
 
-def close_device(stream: RawStream) -> None:
+def close_device(stream: Any) -> None:
     """Stop at once and free the device; errors of a device that cannot be stopped are ignored."""
     with _lock:
         for end in (stream.abort, stream.close):
@@ -117,14 +106,16 @@ def close_device(stream: RawStream) -> None:
 
 
 _lock = threading.RLock()  # PortAudio does not allow listing and opening from two threads
-_streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started again
+_streams: set[Any] = set()  # open ones: while there are any, PortAudio must not be started again
 
 
-def _find(device: AudioDevice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
+def _find(device: DeviceChoice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
     for index, found in _list(rescan):
-        if device is None or (found.name, found.host_api) == (device.name, device.host_api):
+        if device in (None, found.choice):
             return index, found
-    raise vanished(device.name, f"{device.host_api} lists no output of this name.") if device else no_device()
+    if device is None:
+        raise problem(ProblemKind.NO_DEVICE)
+    raise problem(ProblemKind.VANISHED, device.name, f"{device.host_api} lists no output of this name.")
 
 
 def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
@@ -139,7 +130,7 @@ def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
             entries: list[Mapping[str, Any]] = list(sounddevice.query_devices())
             default = sounddevice.default.device["output"]  # -1 if there is none
         except sounddevice.PortAudioError as error:
-            raise no_device(str(error)) from error
+            raise problem(ProblemKind.NO_DEVICE, detail=str(error)) from error
     listed = [
         (
             index,
@@ -161,9 +152,9 @@ def _sounddevice() -> ModuleType:
     try:
         import sounddevice
     except (ImportError, OSError) as error:
-        raise portaudio_missing(str(error)) from error
+        raise problem(ProblemKind.PORTAUDIO_MISSING, detail=str(error)) from error
     except Exception as error:  # importing the module starts PortAudio, which fails with an exception of its own
-        raise not_started(str(error)) from error
+        raise problem(ProblemKind.NOT_STARTED, detail=str(error)) from error
     _silence_alsa()
     module: ModuleType = sounddevice
     return module

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.audio.sound_file import UnreadableSound, open_sound
 from engine import bounds
 from engine.effects import Impulse
-from engine.plain_text import one_line
+from engine.plain_text import LineError
 
 FORMATS = ("WAV", "FLAC", "AIFF")
 SILENT_SHARE = 0.01  # of the peak: below it a response has not begun
@@ -18,11 +18,8 @@ LEAD_S = 0.001  # kept before its onset
 LONGEST_FILE_S = 30.0  # of a response, its noise included; a longer file is another sound
 
 
-class ImpulseError(Exception):
+class ImpulseError(LineError):
     """A file cannot be used as an impulse response. The message, one line, names it, what is wrong and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 def read_impulse(path: Path) -> Impulse:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.audio.sound_file import UnreadableSound, open_sound
-from engine.plain_text import one_line
+from engine.plain_text import LineError
 
 RATES_HZ = (8_000, 384_000)
 NOTE_LENGTHS_S = SHORTEST_S, LONGEST_S = 0.15, 60.0
@@ -20,11 +20,8 @@ LARGEST_BYTES = 512 * 2**20
 LARGEST_SAMPLE = 2.0**15  # in full scales: of whole numbers of 16 bits in a file of floating point
 
 
-class NoteFileError(Exception):
+class NoteFileError(LineError):
     """A file cannot be read as a recording. The message, one line, names it, what is wrong and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,63 @@
 
 from __future__ import annotations
 
-import traceback
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class ProblemKind(StrEnum):
     PORTAUDIO_MISSING = "portaudio_missing"
+    NOT_STARTED = "not_started"
     NO_DEVICE = "no_device"
     BUSY = "busy"
     RATE_REFUSED = "rate_refused"
     STALLED = "stalled"
     VANISHED = "vanished"
-    OTHER = "other"
+    NOT_OPENED = "not_opened"
+    UNEXPECTED = "unexpected"  # of a device that was looked for or opened: no known fault
     INTERNAL = "internal"
+
+
+_OUTPUT, _ANOTHER = "The sound output “{device}”", "choose another output in the audio settings."
+_WORDS: dict[ProblemKind, tuple[str, str]] = {  # what happened, and the remedy
+    ProblemKind.PORTAUDIO_MISSING: (
+        "No sound: the PortAudio library was not found.",
+        "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
+    ),
+    ProblemKind.NOT_STARTED: (
+        "The computer's sound system could not be started.",
+        "Check the system's sound settings and start the app again.",
+    ),
+    ProblemKind.NO_DEVICE: (
+        "No audio output was found.",
+        "Connect loudspeakers or headphones and choose them in the audio settings.",
+    ),
+    ProblemKind.BUSY: (
+        f"{_OUTPUT} is in use by another program.",
+        "Close that program and try again, or choose another output.",
+    ),
+    ProblemKind.RATE_REFUSED: (
+        f"{_OUTPUT} refuses {{rate_hz}} Hz.",
+        "Set another sample rate for it in the system's sound settings, or choose another output.",
+    ),
+    ProblemKind.STALLED: (
+        f"{_OUTPUT} stopped. The computer may be too busy.",
+        "The app keeps trying. If it does not recover, choose a larger buffer or another output in Audio.",
+    ),
+    ProblemKind.VANISHED: (
+        f"{_OUTPUT} was not found: it is disconnected, or the computer is too busy.",
+        "The app keeps trying. Connect it again, or choose another one in the audio settings.",
+    ),
+    ProblemKind.NOT_OPENED: (f"{_OUTPUT} could not be opened.", f"Try again, or {_ANOTHER}"),
+    ProblemKind.UNEXPECTED: (
+        f"{_OUTPUT} could not be opened because of an internal error.",
+        "The app keeps trying. Choose another output in the audio settings, and please report the details.",
+    ),
+    ProblemKind.INTERNAL: (
+        "An internal error occurred while the sound was supervised. Playback continues.",
+        "Please report the details.",
+    ),
+}
 
 
 @dataclass(eq=False)
@@ -34,86 +77,25 @@ class AudioProblem(Exception):
         return f"{self.message} {self.remedy}"
 
 
-def portaudio_missing(detail: str) -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.PORTAUDIO_MISSING,
-        "No sound: the PortAudio library was not found.",
-        "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
-        detail,
-    )
+def problem(kind: ProblemKind, device: str = "", detail: str = "", rate_hz: int = 0) -> AudioProblem:
+    """The problem of a kind; `device`: the name of the output, and the rate that it was to have."""
+    message, remedy = _WORDS[kind]
+    return AudioProblem(kind, message.format(device=device, rate_hz=rate_hz), remedy, detail)
 
 
-def not_started(detail: str) -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.OTHER,
-        "The computer's sound system could not be started.",
-        "Check the system's sound settings and start the app again.",
-        detail,
-    )
-
-
-def no_device(detail: str = "") -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.NO_DEVICE,
-        "No audio output was found.",
-        "Connect loudspeakers or headphones and choose them in the audio settings.",
-        detail,
-    )
-
-
-def stalled(device_name: str) -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.STALLED,
-        f"The sound output “{device_name}” stopped. The computer may be too busy.",
-        "The app keeps trying. If it does not recover, choose a larger buffer or another output in Audio.",
-    )
-
-
-def internal(detail: str) -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.INTERNAL,
-        "An internal error occurred while the sound was supervised. Playback continues.",
-        "Please report the details.",
-        detail,
-    )
-
-
-def unexpected(error: Exception, device_name: str) -> AudioProblem:
-    """Return the problem of a device that was looked for or opened, where that is no known fault."""
-    return AudioProblem(
-        ProblemKind.OTHER,
-        f"The sound output “{device_name}” could not be opened because of an internal error.",
-        "The app keeps trying. Choose another output in the audio settings, and please report the details.",
-        "".join(traceback.format_exception(error)),
-    )
-
-
-def vanished(device_name: str, detail: str = "") -> AudioProblem:
-    return AudioProblem(
-        ProblemKind.VANISHED,
-        f"The sound output “{device_name}” was not found: it is disconnected, or the computer is too busy.",
-        "The app keeps trying. Connect it again, or choose another one in the audio settings.",
-        detail,
-    )
-
-
-def refused(error: Exception, device_name: str, rate_hz: int) -> AudioProblem:
+def refused(error: Exception, device: str, rate_hz: int) -> AudioProblem:
     """Return why a device did not open or start, from PortAudio's error code and text."""
-    output = f"The sound output “{device_name}”"
-    detail = str(error)
     text = str(error).lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)
+    kind = ProblemKind.NOT_OPENED
     # PortAudio reports many errors of drivers as "unanticipated host error", hence the search in the text.
     if code == _PA_INVALID_SAMPLE_RATE or "sample rate" in text:
-        remedy = "Set another sample rate for it in the system's sound settings, or choose another output."
-        return AudioProblem(ProblemKind.RATE_REFUSED, f"{output} refuses {rate_hz} Hz.", remedy, detail)
-    if code == _PA_INVALID_DEVICE or any(word in text for word in _VANISHED_WORDS):
-        return vanished(device_name, detail)
-    if code == _PA_DEVICE_UNAVAILABLE or any(word in text for word in _BUSY_WORDS):
-        remedy = "Close that program and try again, or choose another output."
-        return AudioProblem(ProblemKind.BUSY, f"{output} is in use by another program.", remedy, detail)
-    remedy = "Try again, or choose another output in the audio settings."
-    return AudioProblem(ProblemKind.OTHER, f"{output} could not be opened.", remedy, detail)
+        kind = ProblemKind.RATE_REFUSED
+    elif code == _PA_INVALID_DEVICE or any(word in text for word in _VANISHED_WORDS):
+        kind = ProblemKind.VANISHED
+    elif code == _PA_DEVICE_UNAVAILABLE or any(word in text for word in _BUSY_WORDS):
+        kind = ProblemKind.BUSY
+    return problem(kind, device, str(error), rate_hz)
 
 
 _PA_INVALID_SAMPLE_RATE = -9997

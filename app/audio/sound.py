@@ -12,27 +12,29 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from queue import SimpleQueue
 
+from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
-from app.audio.problems import AudioProblem, ProblemKind, internal, stalled, unexpected, vanished
+from app.audio.problems import AudioProblem, ProblemKind, problem
 from app.shared.log import faultless, log_fault
 from engine.effects import Effects
 from engine.voices.mixer import Gap, Mixer
 
 DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
-BUFFER_S = 0.012
 TRY_AGAIN_S = 0.5  # between two looks for a device that vanished; one takes 25 ms of a processor
 LOOK_EVERY_S = 0.05  # the caretaker's period
 RESTART_AFTER = 20  # looks at the output that failed, 1 s: it is opened again then
 MOST_FAULTS = 20  # different internal ones that are reported
 MOST_GAPS = 200  # kept; older ones are dropped
 JOIN_TIMEOUT_S = 5.0
+# of a device that is not there yet
+MAY_COME = (ProblemKind.VANISHED, ProblemKind.NOT_STARTED, ProblemKind.NOT_OPENED, ProblemKind.UNEXPECTED)
 
-LookUp = Callable[[AudioDevice | None, bool], AudioDevice]
+LookUp = Callable[[DeviceChoice | None, bool], AudioDevice]
 Open = Callable[[AudioDevice, float, Mixer], Output]
 
 
@@ -63,18 +65,9 @@ class SoundStatus:
 class _Wish:
     """The arguments of a call of `Sound.open`."""
 
-    device: AudioDevice | None = None
-    buffer_s: float = BUFFER_S
-    rate_hz: int = 0
-    buffer_frames: int = 0
+    device: DeviceChoice | None = None
+    sound: SoundChoice = field(default_factory=SoundChoice)
     rescan: bool = False
-
-    def at_its_rate(self, device: AudioDevice) -> AudioDevice:
-        """The device with the wanted rate, or, for 0, with its own."""
-        return replace(device, default_rate_hz=self.rate_hz) if self.rate_hz else device
-
-    def buffer_s_at(self, rate_hz: int) -> float:
-        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
 
 
 class Sound:
@@ -116,12 +109,7 @@ class Sound:
         self._caretaker.start()
 
     def open(
-        self,
-        device: AudioDevice | None = None,
-        buffer_s: float = BUFFER_S,
-        rate_hz: int = 0,
-        buffer_frames: int = 0,
-        rescan: bool = False,
+        self, device: DeviceChoice | None = None, sound: SoundChoice | None = None, rescan: bool = False
     ) -> None:
         """Ask the caretaker thread to open another device, or the present one in another way.
 
@@ -129,13 +117,11 @@ class Sound:
         ringing where rate and channels stay; otherwise there is a new mixer, and notes that ring need new voices.
 
         Args:
-            device: known by name and host API; None for the system's default.
-            buffer_s: the length of the device's buffer: longer is safer, shorter has less latency.
-            rate_hz: 0 for the device's own.
-            buffer_frames: the buffer in frames at that rate, instead of `buffer_s`; 0 for `buffer_s`.
+            device: None for the system's default.
+            sound: how it is opened; None: as is usual.
             rescan: looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
-        self._wishes.put(_Wish(device, buffer_s, rate_hz, buffer_frames, rescan))
+        self._wishes.put(_Wish(device, sound or SoundChoice(), rescan))
         self._woken.set()
 
     @property
@@ -219,7 +205,9 @@ class Sound:
             where = "".join(traceback.format_tb(error.__traceback__))
             if where not in self._faults and len(self._faults) < MOST_FAULTS:
                 self._faults.add(where)
-                self._on_problem(internal(log_fault(error, "while the sound was supervised")))
+                self._on_problem(
+                    problem(ProblemKind.INTERNAL, detail=log_fault(error, "while the sound was supervised"))
+                )
             return False
 
     def _restart(self) -> None:
@@ -227,7 +215,7 @@ class Sound:
         device = self._output.device
         if device is not None:
             self._be_silent()
-            self._lose(replace(self._wish, device=self._wish.device or device))
+            self._lose(replace(self._wish, device=self._wish.device or device.choice))
 
     def _free_ended(self) -> None:
         self.mixer.forget_ended()
@@ -256,18 +244,19 @@ class Sound:
         except AudioProblem as error:
             if before is not None and present is not None:
                 self._reopen(present, before)
-            elif error.kind in (ProblemKind.VANISHED, ProblemKind.OTHER):  # it may come yet
+            elif error.kind in MAY_COME:  # it may come yet
                 self._lose(wish)
             self._report(error)
 
     def _find_device(self, wish: _Wish, rescan: bool) -> AudioDevice:
         """The device that is wished for. Raises AudioProblem: there is none now, or it cannot be looked for."""
         try:
-            return wish.at_its_rate(self._look_up(wish.device, rescan))
+            device = self._look_up(wish.device, rescan)
+            return replace(device, default_rate_hz=wish.sound.rate_hz or device.default_rate_hz)
         except AudioProblem:
             raise
         except Exception as error:
-            raise unexpected(error, wish.device.name if wish.device else "default") from error
+            raise _unexpected(error, wish.device.name if wish.device else "default") from error
 
     def _open_device(self, device: AudioDevice, wish: _Wish) -> None:
         """Open a device, with the present mixer where rate and channels stay, else with a new one.
@@ -282,12 +271,12 @@ class Sound:
             self._set_up(mixer)  # or its first frames would be loud
         self._close()
         try:
-            self._output = self._open_output(device, wish.buffer_s_at(rate_hz), mixer)
+            self._output = self._open_output(device, wish.sound.buffer_s(rate_hz), mixer)
         except Exception as error:
             self._output = ClockOutput(self.mixer)
             if isinstance(error, AudioProblem):
                 raise
-            raise unexpected(error, device.name) from error
+            raise _unexpected(error, device.name) from error
         self.mixer = mixer
         self._wish = wish
         self._stalled = False
@@ -323,11 +312,11 @@ class Sound:
         if output.device is not None and output.lost():
             if not self._resume(output.device):
                 self._be_silent()
-                self._lose(replace(self._wish, device=self._wish.device or output.device))
-                self._report(vanished(output.device.name))
+                self._lose(replace(self._wish, device=self._wish.device or output.device.choice))
+                self._report(problem(ProblemKind.VANISHED, output.device.name))
         elif output.stalled() and not self._stalled and output.device is not None:
             self._stalled = True
-            self._report(stalled(output.device.name))
+            self._report(problem(ProblemKind.STALLED, output.device.name))
         elif self._stalled and not output.stalled():
             self._stalled = False
             self._status = replace(self._status, problem=None)
@@ -371,3 +360,7 @@ class Sound:
             load=output.load(),
             changes_done=self._changes_done,
         )
+
+
+def _unexpected(error: Exception, device: str) -> AudioProblem:
+    return problem(ProblemKind.UNEXPECTED, device, "".join(traceback.format_exception(error)))

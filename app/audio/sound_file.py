@@ -103,7 +103,7 @@ def _splice(file: BinaryIO, end: int) -> _Spliced:
         bits = (int.from_bytes(head[20:22]) >> 4) % 32 + 1
         if len(head) == _FLAC_HEAD and bits not in _FLAC_BITS:
             raise UnreadableSound(f"it is FLAC of {bits} bits, not of 8, 16 or 24")
-        if not _flac_frames(head):
+        if not int.from_bytes(head[21:26]) & _FLAC_FRAMES:  # it states no length, as where it was written to a pipe
             return _Spliced(
                 _with_frame_count(head, file, start, end), file, start + len(head), end - start - len(head)
             )
@@ -112,11 +112,6 @@ def _splice(file: BinaryIO, end: int) -> _Spliced:
     if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
         return _Spliced(b"", file, start, end - start)
     raise UnreadableSound(f"it is no {KINDS} file" if end else "it is empty")
-
-
-def _flac_frames(head: bytes) -> int:
-    """The number of frames that a FLAC file states; 0: none, as where it was written to a pipe."""
-    return int.from_bytes(head[21:26]) & _FLAC_FRAMES
 
 
 def _with_frame_count(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:

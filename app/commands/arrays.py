@@ -12,7 +12,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from engine.plain_text import one_line
-from engine.result_file import whole_file
+from engine.whole_file import result_file
 from training.cli.console import Failure, ProgressReport
 
 Array = NDArray[np.floating]
@@ -87,7 +87,7 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
         WriteError: the file cannot be written.
     """
     done = 0
-    with whole_file(path) as file:
+    with result_file(path) as file:
         npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         for block in blocks:
             if not np.isfinite(block).all():

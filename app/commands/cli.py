@@ -18,7 +18,7 @@ import typer
 
 from app.commands import drums, info, learn, listing, motion, play, plugin, render, sampled
 from app.shared.thread_priority import wait_asleep
-from engine.result_file import explain
+from engine.whole_file import explain
 from training.cli import evaluation, family, sweep, tables, training
 from training.cli.console import say, use_any_output
 

@@ -187,14 +187,14 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
     from app.export.wav import WavSettings, write_wav
     from engine.folders import usable_files
     from engine.presets import find_preset, read_info
-    from engine.result_file import whole_file
+    from engine.whole_file import result_file
 
     info = read_info(find_preset(preset, usable_files()))
     if info.recorded is None:
         raise Failure(f"{preset}: was not learned from a recording; leave out --as-recorded, or choose one that was")
     note = info.recorded.note
     tags = {"title": info.title, "comment": f"as recorded in {info.recorded.file}, SHA-256 {info.recorded.digest}"}
-    with whole_file(out) as file:
+    with result_file(out) as file:
         level = write_wav(file, note.sound(), note.rate_hz, WavSettings(bits, fade_out_s=0.0), tags)
     print(f"{out}: {note.frames} frames at {note.rate_hz} Hz, peak {level.peak_db:.1f} dBFS")
 

@@ -8,8 +8,8 @@ from typing import Protocol
 from app.export.recipe import RecipeError
 from app.shared.worker import Progress
 from engine.presets import PresetError
-from engine.result_file import WriteError
 from engine.sources import Runaway
+from engine.whole_file import WriteError
 
 EXPECTED = (PresetError, RecipeError, Runaway, WriteError, ValueError)  # their messages are for the user
 

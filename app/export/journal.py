@@ -36,8 +36,8 @@ from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PlayedSource
 from engine import bounds
 from engine.plain_text import one_line
-from engine.read_file import read_bounded
 from engine.schema import SchemaError, parse_json
+from engine.whole_file import read_bounded
 
 FOLDER_VARIABLE = "LEARNED_STRINGS_RECORDINGS"
 SUFFIX = ".recording"

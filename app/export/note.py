@@ -27,7 +27,7 @@ from app.shared.worker import Progress
 from engine.plain_text import duration
 from engine.pluck import Pluck
 from engine.presets import Preset
-from engine.result_file import WriteError, explain, whole_file
+from engine.whole_file import WriteError, explain, result_file
 
 LONGEST_PRESET = 150  # characters of a preset's name in a file's name
 LONGEST_NAME = 80  # characters of an instrument's name
@@ -118,7 +118,7 @@ def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
 
 @contextmanager
 def _open_whole(path: Path) -> Iterator[BinaryIO]:
-    with _explain_errors(path), whole_file(path) as file:
+    with _explain_errors(path), result_file(path) as file:
         yield file
 
 

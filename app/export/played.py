@@ -19,7 +19,7 @@ from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.shared.worker import Progress
 from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
-from engine.result_file import whole_file
+from engine.whole_file import result_file
 
 RATE_HZ = 48_000
 TAIL_S = 6.0  # a guess at how long it rings after the last note, for progress
@@ -84,7 +84,7 @@ def write_played(
     )
     notes_s = (entry.time_s for entry in events if isinstance(entry.event, NoteOn | NoteOff))
     whole_s = max(notes_s, default=0.0) + TAIL_S if seconds is None else seconds
-    with whole_file(path) as file:
+    with result_file(path) as file:
         sound = Recording(channels_played(patch, events))
         gain_db = played.difference_gain_db
         for block in render_events(patch, preset, events, rate_hz, source, seconds, difference_gain_db=gain_db):
@@ -125,7 +125,7 @@ class PlayedExport:
     def run(self, progress: Progress) -> str:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
-        with whole_file(midi_file) as file:
+        with result_file(midi_file) as file:
             file.write(midi_bytes(played.events, played.patch))
         preset = load_preset(self.preset)
         written = write_played(sound_file, played, preset, midi_file.name, self.settings, progress=progress)

@@ -29,7 +29,7 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.levels import FULL_SCALE_M
-from engine.plain_text import name_text, one_line
+from engine.plain_text import LineError, name_text
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, preset_digest
 from engine.schema import explained, parse_json
@@ -38,11 +38,8 @@ from engine.values.ear import Ear, Pickup
 Side = Annotated[float, Field(ge=-1, le=1)]
 
 
-class RecipeError(Exception):
+class RecipeError(LineError):
     """A file has no usable recipe. The message, one line, names the file, what is wrong and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 class NoRecipe(RecipeError):

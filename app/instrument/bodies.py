@@ -19,7 +19,7 @@ from app.shared.user_files import install
 from engine.bounds import LARGEST_IMPULSE_BYTES
 from engine.effects import BODIES, Impulse
 from engine.folders import user_folder
-from engine.read_file import read_bounded
+from engine.whole_file import read_bounded
 
 ENDINGS = (".wav", ".wave", ".bwf", ".flac", ".aif", ".aiff", ".aifc")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)

@@ -17,10 +17,10 @@ from engine.effects.body import curves_of
 def effects_of(patch: Patch) -> Effects | None:
     """Amplifier, body and room of a patch; None: it has none of them.
 
-    A body that cannot be used is left out: see `body_problem`.
+    A body that cannot be used is left out: see `body_problem`. The level, behind the amplifier, changes no drive.
     """
     effects = Effects(_body(patch.body)[0], patch.room if patch.room.mix > 0 else None)
-    if patch.amp.drive_db > 0:  # the level is behind it, and changes no drive
+    if patch.amp.drive_db > 0:
         return replace(effects, amp=patch.amp, level_db=patch.level_db)
     return None if effects == Effects() else effects
 

@@ -30,8 +30,8 @@ from engine.effects.responses import resampled
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
 from engine.presets import load_preset
-from engine.result_file import whole_file
 from engine.schema import explained
+from engine.whole_file import result_file
 from training.recording.fit import FREE_POLES
 from training.recording.learn import Learned, combined, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
@@ -178,7 +178,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     encoded = io.BytesIO()  # libsndfile cannot pass on the error of a full disk
     soundfile.write(encoded, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
     with _all_or_none(body, preset, report):
-        with whole_file(body) as file:
+        with result_file(body) as file:
             file.write(encoded.getvalue())
         attack = attack_of(patch, first.note, recorded.note)  # through the body
         if attack is not None:
@@ -186,7 +186,7 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
         write_preset(preset, name, first.strung, recorded)
         if attack is not None:
             patch = with_attack(patch, load_preset(preset), first.note, first.physics.f0_hz, attack[1])
-        with whole_file(report) as file:
+        with result_file(report) as file:
             file.write(json.dumps([as_data(recording) for recording in learned], indent=2).encode())
         return Kept(preset, save_patch(patch).path, body, report)
 

@@ -32,8 +32,8 @@ from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
 from engine.kernels.midi import RESET, VOLUME
-from engine.plain_text import one_line
-from engine.read_file import UnusableFile, read_bounded
+from engine.plain_text import LineError
+from engine.whole_file import UnusableFile, read_bounded
 
 LARGEST_BYTES = 4 * 2**20
 MOST_EVENTS = 400_000  # an hour of 50 notes a second, with releases
@@ -46,11 +46,8 @@ MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 DRUMS = 9  # General MIDI's channel 10
 
 
-class MidiFileError(ValueError):
+class MidiFileError(LineError, ValueError):
     """A MIDI file cannot be read. The message names file, fault and remedy, in one line."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)
@@ -244,7 +241,9 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:
         for channel in of:
-            track.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
+            member = patch.mode == "mpe" and channel not in (0, KEYS)
+            semitones = MEMBER_SEMITONES if member else patch.bend_semitones
+            track.extend(TimedEvent(time_s, event) for event in bend_range(semitones, channel))
 
     set_ranges(0.0, channels)
     for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
@@ -263,11 +262,6 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
             set_ranges(time_s, [event.channel])
             track.append(TimedEvent(time_s, ControlChange(VOLUME, USUAL_VOLUME, event.channel)))
     return track
-
-
-def _bend_semitones(patch: Patch, channel: int) -> float:
-    member = patch.mode == "mpe" and channel not in (0, KEYS)
-    return MEMBER_SEMITONES if member else patch.bend_semitones
 
 
 def message_of(event: Event) -> list[int]:

@@ -16,21 +16,17 @@ from app.patches.patch import CATEGORIES, Patch
 from app.shared.user_files import make_folder, read_all
 from engine import bounds
 from engine.folders import user_folder
-from engine.plain_text import name_text, one_line
-from engine.read_file import read_bounded
-from engine.result_file import WriteError, explain, whole_file
+from engine.plain_text import LineError, name_text, one_line
 from engine.schema import SchemaError, explained, parse_json
+from engine.whole_file import WriteError, explain, read_bounded, result_file
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
 SUFFIX = ".json"
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # on Windows
 
 
-class PatchError(ValueError):
+class PatchError(LineError, ValueError):
     """A patch cannot be used or saved. The message names file, field and remedy, in one line."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)
@@ -152,7 +148,7 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     if replace is None and path.exists():
         raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     make_folder(path.parent)
-    with whole_file(path) as file:
+    with result_file(path) as file:
         file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
     return PatchEntry(path, patch)
 

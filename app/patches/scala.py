@@ -78,9 +78,7 @@ class Keymap:
         return None if degree is None else degree + repeats * (self.octave or len(scale.octaves))
 
 
-def equal_steps() -> Scale:
-    """Twelve equal steps to the octave."""
-    return Scale(tuple(step / 12 for step in range(1, 13)))
+EQUAL_STEPS = Scale(tuple(step / 12 for step in range(1, 13)))  # twelve to the octave
 
 
 def parse_scale(text: str) -> Scale:

@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import model_validator
 
 from app.patches.fields import HIGHEST_KEY, ScalaText, parameter
-from app.patches.scala import Keymap, equal_steps, parse_keymap, parse_scale
+from app.patches.scala import EQUAL_STEPS, Keymap, parse_keymap, parse_scale
 from app.shared.value import Value
 from engine.plain_text import one_line
-from engine.read_file import UnusableFile, read_bounded
 from engine.schema import explained
+from engine.whole_file import UnusableFile, read_bounded
 
 A4_KEY, MIDDLE_KEY = 69, 60
 SCALA_FILES = (".scl", ".kbm")
@@ -114,7 +114,7 @@ def read_scala(path: Path) -> str:
 
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
     remedy = "give the text of a Scala file, or none"
-    scale, mapping = equal_steps(), Keymap(0, HIGHEST_KEY, MIDDLE_KEY, A4_KEY, choice.a4_hz, 0, ())
+    scale, mapping = EQUAL_STEPS, Keymap(0, HIGHEST_KEY, MIDDLE_KEY, A4_KEY, choice.a4_hz, 0, ())
     try:
         field = "scale"
         if choice.scale.strip():

@@ -46,7 +46,7 @@ def load_backend() -> RtMidi:
 
 
 class RtMidi:
-    """A system for MIDI: ALSA, JACK, CoreMIDI or Windows'.
+    """A system for MIDI: ALSA, JACK, CoreMIDI or Windows'. Its methods raise OSError where it does not answer.
 
     Args:
         library: the package `supriya_midi`.

@@ -6,10 +6,13 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from app.instrument.events import Event, TimedEvent, channels_in, release_all
 from engine.voices import Mixer
+
+if TYPE_CHECKING:
+    from app.playing.notes import Notes
 
 AHEAD_S = 0.05  # lead of a handed-over event, besides the device's buffer: so late the thread may be
 LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
@@ -35,22 +38,11 @@ class Due:
         return self.frame if mixer is self.mixer else 0
 
 
-class Clock(Protocol):
-    """The clock that events are timed by: the frames that a device has taken."""
-
-    @property
-    def mixer(self) -> Mixer:
-        """The present one."""
-
-    @property
-    def buffer_s(self) -> float:
-        """The seconds that the device takes at once."""
-
-
 class Playback:
     """A player of one list of events at a time.
 
     Args:
+        clock: whose mixer has the frames that a device has taken.
         handle: plays an event when it is due, or, for None, at once; called in the playback's thread.
         cancel: ends what was handed over and is not due yet; called there as well.
         ended: is called when the last event was played, or it was stopped; in the playback's thread.
@@ -59,7 +51,7 @@ class Playback:
     def __init__(
         self,
         handle: Callable[[Event, Due | None], object],
-        clock: Clock,
+        clock: Notes,
         cancel: Callable[[], None],
         ended: Callable[[], None] = lambda: None,
     ) -> None:
@@ -117,7 +109,7 @@ class Playback:
 class _Beginning:
     """The frame at which a list of events begins; if there is another mixer, it continues in that one."""
 
-    def __init__(self, clock: Clock, ahead_s: float) -> None:
+    def __init__(self, clock: Notes, ahead_s: float) -> None:
         self._clock, self._mixer = clock, clock.mixer
         self._frame = self._mixer.frames + round(ahead_s * self._mixer.rate_hz)
         self._began_s = time.monotonic() + ahead_s

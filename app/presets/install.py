@@ -9,8 +9,8 @@ from app.shared.user_files import install
 from engine.bounds import LARGEST_PRESET_BYTES
 from engine.plain_text import name_text
 from engine.presets import PresetError, load_preset
-from engine.read_file import read_bounded
 from engine.sources import ModelSource
+from engine.whole_file import read_bounded
 
 SUFFIX = ".safetensors"
 

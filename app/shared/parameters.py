@@ -82,7 +82,7 @@ class Parameter:
         name: in a sentence or a list; empty: the label.
         wheel: its value at the modulation wheel's end; None: `wheel_factor` times its own value.
         figure_unit: unit of the physical figure that its knob shows, see `app.instrument.facts`; None: none.
-        whole: whether it is an integer.
+        whole: whether it is an integer, as one with words.
         words: for the integers from its lowest on; empty: they are shown as numbers.
 
     Raises:
@@ -110,6 +110,7 @@ class Parameter:
             if value is not None and value != self.clamped(value):
                 raise ValueError(f"{self.id}: {what} {value:g} is not within {self.limits[0]:g} … {self.limits[1]:g}")
         object.__setattr__(self, "name", self.name or self.label)
+        object.__setattr__(self, "whole", self.whole or bool(self.words))
         object.__setattr__(self, "tip", TIPS.get(self.id, ""))
 
     @property
@@ -245,6 +246,11 @@ def _knob(
     return Parameter(id, label, limits, 1.0, TIMES, group, "wheel", name, wheel_factor=wheel_factor, figure_unit=unit)
 
 
+def _width(part: str, label: str, default: float, velocity: str) -> Parameter:
+    id, name = f"pluck.{part}", f"width ({velocity} velocity)"
+    return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, "wheel", name, wheel=0.02)
+
+
 MULTIPLIER = (0.05, 20.0)
 AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
 STROKES = "down", "up", "both"
@@ -265,20 +271,8 @@ _OF_PATCHES = (
     Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
     Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", wheel=1.0),
     Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", wheel=0.5),
-    Parameter(
-        "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
-    ),
-    Parameter(
-        "pluck.width_hard",
-        "hard width",
-        WIDTH_RANGE,
-        0.06,
-        WIDTH,
-        PLUCK,
-        "wheel",
-        "width (high velocity)",
-        wheel=0.02,
-    ),
+    _width("width", "soft width", 0.12, "low"),
+    _width("width_hard", "hard width", 0.06, "high"),
     Parameter("pluck.softest_mm", "softest", AMPLITUDE_MM, 0.1, MM, PLUCK, "macro", "softest amplitude"),
     Parameter(
         "pluck.hardest_mm", "hardest", AMPLITUDE_MM, 3.0, MM, PLUCK, "wheel", "hardest amplitude", wheel_factor=2
@@ -296,16 +290,7 @@ _OF_PATCHES = (
     Parameter("technique.harmonic", "harmonic", (1, 5), 1, COUNT, TECHNIQUE, "wheel", wheel=2, whole=True),
     Parameter("technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, "wheel", wheel=40),
     Parameter(
-        "technique.strokes",
-        "strokes",
-        (0, 2),
-        0,
-        COUNT,
-        TECHNIQUE,
-        "macro",
-        "strokes of strums",
-        whole=True,
-        words=STROKES,
+        "technique.strokes", "strokes", (0, 2), 0, COUNT, TECHNIQUE, "macro", "strokes of strums", words=STROKES
     ),
     Parameter("technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, "wheel", wheel=12),
     Parameter(

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from engine.plain_text import name_text, one_line
-from engine.read_file import read_bounded
-from engine.result_file import WriteError, explain, whole_file
+from engine.whole_file import WriteError, explain, read_bounded, result_file
 
 Entry = TypeVar("Entry")
 
@@ -63,7 +62,7 @@ def install(data: bytes, name: str, folder: Path, present: Iterable[Path], taken
     stem, ending = Path(name).stem, Path(name).suffix
     stems = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
     target = folder / f"{next(free for free in stems if free.casefold() not in taken)}{ending}"
-    with whole_file(target) as copy:
+    with result_file(target) as copy:
         copy.write(data)
     return target
 

@@ -5,28 +5,24 @@ A choice is saved once the device plays with it: one that was refused must not l
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.audio.devices import AudioDevice, output_devices
+from app.audio.choices import DeviceChoice, SoundChoice
+from app.audio.devices import output_devices
 from app.audio.problems import AudioProblem, ProblemKind
 from app.audio.sound import Sound, SoundStatus
 from app.presets.words import rate_word
 from app.views.controls.plain import plain_tip
-from app.views.dialogs.audio_dialog import AudioDialog, AudioState
+from app.views.dialogs.audio_dialog import AudioDialog
 from app.window.main_window import MainWindow
 
 if TYPE_CHECKING:
     from app.playing.notes import Notes
     from app.rendering import Take
-    from engine.voices import Gap
 
-# of the device's buffer, which is nearly all that sound waits for
-LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
 FREQUENT, FREQUENT_WITHIN_S = 3, 10.0  # gaps that are worth a word
 FREQUENT_GAPS = (
     "The sound has gaps. A longer buffer prevents them: Audio …, or Ctrl+comma. So does closing other programs."
@@ -55,7 +51,6 @@ class AudioControl(QObject):
         self._notice = ""
         self._latencies_s: tuple[float, ...] = ()
         self._measured_with: object = None  # device and buffer of these
-        self._last_known: Gap | None = None  # the user's zero: gaps up to this one are not counted
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
         self._advised = False  # of frequent gaps, with this buffer
@@ -63,15 +58,8 @@ class AudioControl(QObject):
 
     def open(self, rescan: bool = False) -> None:
         """Open the output as chosen. Return at once; `show` sees what became of it."""
-        device, sound = self._wish
         self._changes += 1
-        self.output.open(
-            AudioDevice(device.name, device.host_api) if device else None,
-            LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
-            sound.rate_hz,
-            sound.buffer if isinstance(sound.buffer, int) else 0,
-            rescan,
-        )
+        self.output.open(*self._wish, rescan)
 
     def report(self, problem: AudioProblem) -> None:
         """Show a fault of the output as a notice, with what plays on; an internal one stays, for its report."""
@@ -105,7 +93,7 @@ class AudioControl(QObject):
             self._show_badge(status, take.info.rate_hz)
         if self._dialog is not None and self._dialog.isVisible():
             self._moments += 1
-            self._dialog.show_state(self._state(status))
+            self._dialog.show_status(status, self._latencies_s)
             if self._moments % LIST_EVERY == 0 and self._listed is not None:
                 self._list_devices()
 
@@ -123,11 +111,10 @@ class AudioControl(QObject):
             dialog.choice_made.connect(self._choose)
             dialog.rescan_asked.connect(lambda: self.open(rescan=True))
             dialog.tone_asked.connect(self.output.sound_tone)
-            dialog.gaps_reset.connect(self._reset_gaps)
         self._listed = None
         self._list_devices()
         self._dialog.show_sound(self._wish[1])
-        self._dialog.show_state(self._state(self.output.status()))
+        self._dialog.show_status(self.output.status(), self._latencies_s)
         self._dialog.show()
         self._dialog.raise_()
 
@@ -135,10 +122,6 @@ class AudioControl(QObject):
         self._wish = (device, sound)
         self._advised = False
         self.open()
-
-    def _reset_gaps(self) -> None:
-        gaps = self.output.status().gaps
-        self._last_known = gaps[-1] if gaps else None
 
     def _list_devices(self) -> None:
         """List the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
@@ -148,7 +131,7 @@ class AudioControl(QObject):
         except AudioProblem:
             devices, choices = [], None
         else:
-            choices = [DeviceChoice(name=device.name, host_api=device.host_api) for device in devices]
+            choices = [device.choice for device in devices]
         if self._dialog is not None and (first or choices != self._listed):
             self._dialog.show_devices(choices or [], self._wish[0])
         self._listed = choices
@@ -161,18 +144,3 @@ class AudioControl(QObject):
         if fault:
             tip = f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,"
         self._window.show_rate(text, plain_tip(tip), fault)
-
-    def _state(self, status: SoundStatus) -> AudioState:
-        device, gaps = status.device, status.gaps  # the latest ones: the one that was known may be gone
-        if self._last_known in gaps:
-            gaps = gaps[gaps.index(self._last_known) + 1 :]
-        facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"
-        if self._latencies_s:
-            facts += f", key to device {1000 * statistics.median(self._latencies_s):.1f} ms (measured)"
-        return AudioState(
-            f"“{device.name}” ({device.host_api})" if device else "",
-            facts,
-            status.problem or "",
-            tuple(f"{gap.time_s:.1f} s: {gap.cause}" for gap in gaps),
-            status.load,
-        )

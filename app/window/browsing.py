@@ -12,9 +12,8 @@ from app.presets.library import Library
 from app.stage.session import Session
 from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import BrowserRow
-from app.views.controls.preset_bar import PresetBar
+from app.views.controls.choosers import ChoiceBar
 from app.views.dialogs.preset_card import preset_browser, preset_row
-from app.views.instrument.patch_bar import PatchBar
 from app.window.main_window import MainWindow
 from engine.folders import user_folder
 
@@ -26,15 +25,14 @@ class BrowserDesk(QObject):
         favourites: names of rows, also of those whose files are missing at present.
     """
 
-    def __init__(
-        self, window: MainWindow, bar: PresetBar | PatchBar, browser: Browser, favourites: Iterable[str]
-    ) -> None:
+    def __init__(self, window: MainWindow, bar: ChoiceBar, browser: Browser, favourites: Iterable[str]) -> None:
         super().__init__(window)
         self._notices = window.notices
         self._bar_filter = bar.filtered
         self.browser, self.favourites = browser, set(favourites)
         bar.browse_asked.connect(self.toggle)
         bar.all_asked.connect(browser.clear_filter)
+        bar.step_asked.connect(self.step)
         browser.opened.connect(self.reload)
         browser.listed_changed.connect(self._show_listed)
         browser.chosen.connect(self.choose)
@@ -113,7 +111,6 @@ class PresetDesk(BrowserDesk):
         self._library = library
         self._bar = window.presets
         self._known = set(library.names)
-        self._bar.step_asked.connect(self.step)
         library.changed.connect(self._library_changed)
         self.show_rows()
 

@@ -36,8 +36,6 @@ from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import ABOUT, HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
-from app.views.instrument.patch_bar import PatchBar
-from app.views.instrument.string_knobs import StringKnobs
 from app.views.stage import StageView
 from app.window.about import about_text
 from app.window.audio_control import AudioControl, MakeSound
@@ -232,15 +230,7 @@ class Controller(QObject):
     def _connect_undo(self) -> None:
         window, session = self.window, self.session
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(session.undo_words, session.redo_words))
-        strip = window.instrument
-        knobs = window.transport.knobs.values()
-        draggable: tuple[StageView | PatchBar | StringKnobs | Knob, ...] = (
-            self.string.view,
-            self.drum.view,
-            strip.bar,
-            strip.knobs,
-            *knobs,
-        )
+        draggable: tuple[StageView | Knob, ...] = (self.string.view, self.drum.view, *window.findChildren(Knob))
         for dragged in draggable:
             dragged.drag_started.connect(session.hold)
             dragged.drag_ended.connect(session.release)

@@ -20,7 +20,7 @@ from app.shared.parameters import OF_CHOICES
 from engine.folders import user_folder
 from engine.plain_text import name_text
 from engine.presets import PresetError
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 SOUNDS = (*ENDINGS, ".ogg", ".oga", ".opus")
 

@@ -8,10 +8,8 @@ from typing import Any
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
-from app.export.choices import ExportChoices
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
-from app.export.sampled.choices import SampledChoices
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
@@ -20,7 +18,7 @@ from app.session.choices import Choices
 from app.session.slots import other_preset, sound_of
 from app.stage.session import Session
 from app.views.dialogs.export_dialog import ExportDialog
-from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
+from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind, Remembered
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
@@ -40,7 +38,7 @@ class Exports(QObject):
         session: Session,
         library: Library,
         recordings: Recordings,
-        choices: tuple[ExportChoices, SampledChoices],
+        choices: Remembered,
     ) -> None:
         super().__init__(window)
         self._session = session
@@ -54,9 +52,9 @@ class Exports(QObject):
         window.installEventFilter(self)
 
     @property
-    def choices(self) -> tuple[ExportChoices, SampledChoices]:
+    def choices(self) -> Remembered:
         """The dialog's choices, to be saved."""
-        return self._choices if self.dialog is None else (self.dialog.choices(), self.dialog.sampled_choices())
+        return self._choices if self.dialog is None else self.dialog.choices()
 
     def open(self, kind: Kind) -> None:
         """Open the dialog at a page, or bring it to the front."""
@@ -65,7 +63,7 @@ class Exports(QObject):
             self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
-            self.dialog = ExportDialog(*self._choices, self._window)
+            self.dialog = ExportDialog(self._choices, self._window)
             self.dialog.finished.connect(self._end_dialog)
             self.dialog.exported.connect(self._forget_saved)
             self.dialog.ended.connect(self.ended)

@@ -40,6 +40,7 @@ from PySide6.QtWidgets import (
 from app.shared.vocabulary import Face
 from app.views import theme
 from app.views.controls.app_menu import AppMenu, menu_button
+from app.views.controls.choosers import PresetBar
 from app.views.controls.deck import Deck
 from app.views.controls.drop_sign import DropSign
 from app.views.controls.focus_ring import FocusRing
@@ -47,7 +48,6 @@ from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.overflow import Overflow
 from app.views.controls.parts import faint, filled, tool_button, words_label
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.preset_bar import PresetBar
 from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
 from app.views.controls.song_strip import SongStrip

@@ -16,7 +16,6 @@ from app.patches.patch import Patch
 from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
-from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
 
 
@@ -77,11 +76,7 @@ class MidiControl(QObject):
     def show_dialog(self, window: QWidget) -> None:
         """Open the dialog, which does not block the window, or bring it to the front."""
         if self._dialog is None:
-            dialog = self._dialog = MidiDialog(
-                {id: f"instrument: {knob.name}" if id in OF_PATCHES else knob.name for id, knob in LEARNABLE.items()},
-                {knob.id: knob.name for knob in modulated_by("wheel")},
-                window,
-            )
+            dialog = self._dialog = MidiDialog(window)
             dialog.patch_turned.connect(self._turn_patch)
             dialog.port_chosen.connect(self._choose_port)
             dialog.notes_chosen.connect(self._choose_notes)
@@ -98,23 +93,18 @@ class MidiControl(QObject):
         assert self._dialog is not None
         try:
             self._dialog.show_inputs(self.input.names(), self.input.name, "")
-            self._dialog.set_learnable("")
         except MidiUnavailable as error:
             self._dialog.show_inputs([], "", str(error))
-            self._dialog.set_learnable(str(error))
 
     def _show_choices(self) -> None:
         if self._dialog is not None:
-            controllers = {str(field): number for field, number in self.choices.controllers.items()}
-            self._dialog.show_choices(self.choices.notes, controllers, self._learning)
+            self._dialog.show_choices(self.choices, self._learning)
 
     def show_patch(self, patch: Patch | None) -> None:
         """Show the patch that is played; None for none."""
         self._patch = patch
         if self._dialog is not None:
-            self._dialog.set_patch_turnable(patch is not None)
-            if patch is not None:
-                self._dialog.show_patch(patch.mode, patch.bend_semitones, patch.bend_by, patch.mod_wheel)
+            self._dialog.show_patch(patch)
 
     def _turn_patch(self, field: str, value: object) -> None:
         if self._patch is not None:

@@ -55,8 +55,8 @@ from app.window.recordings import Recordings
 from app.window.song import SongPlayer
 from engine.kernels.midi import HARMONICS, LEGATO, PORTAMENTO, SLIDE_TIME, STRUM, TREMOLO
 from engine.plain_text import one_line
-from engine.result_file import WriteError
 from engine.schema import explained
+from engine.whole_file import WriteError
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
@@ -113,8 +113,6 @@ class PatchDesk(BrowserDesk):
         )
         panel.knobs.changed.connect(self.change)
         panel.knobs.figure_asked.connect(self.turn_to)
-        bar.previous_asked.connect(lambda: self.step(-1))
-        bar.next_asked.connect(lambda: self.step(1))
         bar.save_asked.connect(self.save)
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from app.views.background import Background
 from app.window.settings import Settings, save_settings
 
 
@@ -26,22 +26,19 @@ class SettingsSaver(QObject):
         super().__init__(parent)
         self._path, self._current = path, current
         self._base = self._seen = read
-        self._writing: threading.Thread | None = None
+        self._background = Background("settings", self)
         self._reported = False
 
     def look(self) -> None:
-        """Write, in a thread of its own, where the settings have changed, but not since the last look."""
+        """Write, in the background, where the settings have changed, but not since the last look."""
         now = self._current()
         rested, self._seen = now == self._seen, now
-        if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):
-            return
-        self._writing = threading.Thread(target=self._write, args=(now,), name="settings")
-        self._writing.start()
+        if rested and now != self._base and not self._background.busy:
+            self._background.start(lambda job: self._write(now))
 
     def close(self) -> None:
         """Write what has not been written yet."""
-        if self._writing is not None:
-            self._writing.join()
+        self._background.close(None, cancel=False)
         now = self._current()
         if now != self._base or not self._path.exists():
             self._write(now)

@@ -22,9 +22,8 @@ from app.shared.value import Value
 from app.views.look import Look
 from engine import bounds
 from engine.plain_text import one_line
-from engine.read_file import read_bounded
 from engine.schema import SchemaError, explained, parse_json
-from engine.whole_file import whole_file
+from engine.whole_file import read_bounded, whole_file
 
 # at the top of the browser at a first start: strings at full bandwidth, trained on plucks anywhere
 MOST_FAULTS = 50  # of a file that is kept for the rest of it

@@ -40,15 +40,15 @@ def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[R
 
 def main(buffer: str) -> None:
     """Play until the process is ended. `buffer`: see `Buffer`."""
+    from app.audio.choices import SoundChoice
     from app.audio.sound import Sound
     from app.playing.pair import Pair
-    from app.window.audio_control import LATENCY_S
 
     time_s = np.arange(RATE_HZ) / RATE_HZ
     tone = (LEVEL * np.sin(2 * np.pi * TONE_HZ * time_s)).astype(np.float32)[:, None]
     with Sound() as sound:
-        latency_s = LATENCY_S.get(buffer, 0.0)  # type: ignore[call-overload]
-        sound.open(buffer_s=latency_s, rate_hz=RATE_HZ, buffer_frames=0 if latency_s else int(buffer))
+        frames = int(buffer) if buffer.isdigit() else buffer
+        sound.open(sound=SoundChoice.model_validate({"rate_hz": RATE_HZ, "buffer": frames}))
         while sound.status().device is None:
             time.sleep(0.05)
         pair = Pair(sound.mixer, {"tone": tone})

@@ -27,7 +27,7 @@ from safetensors import SafetensorError, safe_open
 from engine import bounds
 from engine.models import build_model, read_model_configuration
 from engine.models._tension_law import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
-from engine.plain_text import name_text, one_line
+from engine.plain_text import LineError, name_text
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
 from engine.schema import SchemaError, parse_json, read, write
@@ -39,11 +39,8 @@ if TYPE_CHECKING:
 METADATA_KEY = "learned_strings"
 
 
-class PresetError(ValueError):
+class PresetError(LineError, ValueError):
     """A preset that cannot be used. The message names the file, what is wrong with it and the remedy, in one line."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from app.window.settings import Settings, load_settings
 from engine.folders import usable_files
 from engine.plain_text import LONGEST_MESSAGE
 from engine.presets import preset_digest
-from engine.read_file import UnusableFile, read_bounded
 from engine.schema import read_toml
+from engine.whole_file import UnusableFile, read_bounded
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_preset, damaged_value
 from tests.fuzz.readers import (

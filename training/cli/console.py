@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from engine.plain_text import duration, one_line
+from engine.plain_text import LineError, duration, one_line
 
 LINE_EVERY_S = 10.0  # between two lines of progress
 WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
@@ -38,11 +38,8 @@ class Shares:
         return lambda share: self._report((before + share) / self._pieces)
 
 
-class Failure(Exception):
+class Failure(LineError):
     """A command cannot be carried out. The message, one line, says what is wrong, where, and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
 
 
 def say(text: str) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from engine.bounds import check_choice
 from engine.plain_text import printable
-from engine.result_file import whole_file
+from engine.whole_file import result_file
 from training.cli.console import Failure, say
 
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
@@ -48,7 +48,7 @@ def table(
     if output is None:
         print(printable(text), end="")
         return
-    with whole_file(output) as file:
+    with result_file(output) as file:
         file.write(text.encode())
     print(output)
 

@@ -15,9 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from engine import bounds
-from engine.read_file import UnusableFile, read_bounded
-from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json, read, write
+from engine.whole_file import UnusableFile, WriteError, explain, read_bounded, result_file
 from training.recording.glide import TIMES_S, Glide
 from training.recording.note import Note
 from training.recording.numbering import PartialSeries
@@ -85,7 +84,7 @@ def save(path: Path, takes: Takes, steps: int) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise WriteError(explain(path.parent, error)) from error
-    with whole_file(path) as file:
+    with result_file(path) as file:
         file.write(json.dumps(write(state)).encode())
 
 

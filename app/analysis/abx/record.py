@@ -17,7 +17,7 @@ from app.rendering.subject import path_of, string_of
 from app.shared.version import program_version
 from engine.plain_text import name_text
 from engine.presets import preset_digest
-from engine.result_file import WriteError, explain, whole_file
+from engine.whole_file import WriteError, explain, result_file
 
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
@@ -140,6 +140,6 @@ def save_record(folder: Path, record: AbxRecord) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise WriteError(explain(folder, error)) from error
-    with whole_file(path) as file:
+    with result_file(path) as file:
         file.write(record.model_dump_json(indent=2).encode("utf-8"))
     return path

@@ -25,8 +25,7 @@ from app.shared.version import program_version
 from engine.effects.room import room_noise
 from engine.kernels.prepared import NOISE_UNIT
 from engine.python_process import python_command, python_environment
-from engine.result_file import WriteError, explain
-from engine.whole_file import naming, whole_file, whole_folder, working_folder
+from engine.whole_file import WriteError, explain, naming, whole_file, whole_folder, working_folder
 
 FULL_BYTES = 2**24  # where less is left, a build that failed has filled the disk
 COMPILING = 0.97  # of the time of a first build, measured

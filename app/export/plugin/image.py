@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from app.export.plugin.identity import identifier
 from app.export.plugin.layout import IMAGE, KINDS, MACRO, MOST_PARAMETERS, PARAMETER, SOURCES
-from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
+from app.export.plugin.parts import AMP, EFFECTS, body_of, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.strings import StringKeys
@@ -38,7 +38,7 @@ MAKER = "Learned Strings"
 MOST_NOTES = 40
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 NOISE_BYTES = 8  # of a frame
-SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, whole=True, words=SOURCES)
+SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, words=SOURCES)
 DRUM_PARAMETERS = (
     "knobs.decay",
     "knobs.brightness_decay",
@@ -192,9 +192,10 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, np.void]]:
     fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
     points = () if fixed else of.PLAYED[of.POINT :][: len(patch.pickup.points)]
     followed = [id for id in (*WHEELED, *points) if id in (DRUM_PARAMETERS if drums else ASSIGNABLE)]
+    heard = [id for id in EFFECTS if patch.body.name or not id.startswith("body.")]
     for kind, ids, order in (
         ("value", followed, of.PLAYED),
-        ("effect", effects_there(patch), EFFECTS),
+        ("effect", heard, EFFECTS),
         ("amp", AMP, AMP),
     ):
         for id in ids:

@@ -20,8 +20,7 @@ from pathlib import Path
 from app.export.plugin import texts
 from app.export.plugin.formats import TARGETS, System
 from engine.python_process import python_command, python_environment
-from engine.result_file import explain
-from engine.whole_file import whole_file
+from engine.whole_file import explain, whole_file
 
 WAIT_S = 0.1
 FUNCTIONS = 150  # of a part, about: dots of `texts`

@@ -33,11 +33,6 @@ def body_of(patch: Patch) -> Array:
     return body_memory(None if effects is None else effects.body)
 
 
-def effects_there(patch: Patch) -> tuple[str, ...]:
-    """The parameters of body and room that change an instrument's sound."""
-    return tuple(parameter for parameter in EFFECTS if patch.body.name or not parameter.startswith("body."))
-
-
 @dataclass(frozen=True, eq=False)
 class Kit:
     """Drums as `engine.kernels.kit` reads them.

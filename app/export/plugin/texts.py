@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from engine.kernels.numba_internals import libraries, write_code_alone
-from engine.result_file import explain
+from engine.whole_file import explain
 
 PREFIX = "ls_"  # of the entries' names
 # Entries of each; those that mixers call stand in its namespace under the same names

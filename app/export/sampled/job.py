@@ -21,8 +21,7 @@ from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, num
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
 from engine.presets import Preset, load_preset
-from engine.result_file import WriteError, explain, replaceable, whole_file
-from engine.whole_file import working_folder
+from engine.whole_file import WriteError, explain, replaceable, result_file, working_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -107,12 +106,12 @@ def export_sampled(
             samples_folder.mkdir()
             samples = _write_samples(plan, samples_folder, render, progress)
             if soundfont:
-                with whole_file(out) as file:
+                with result_file(out) as file:
                     gain_db = write_sf2(file, plan, samples, samples_folder, progress)
                 size = out.stat().st_size
             else:
                 size = sum(path.stat().st_size for path in samples_folder.iterdir())
-                with whole_file(out) as file:
+                with result_file(out) as file:
                     size += file.write(sfz_text(plan, samples, folder.name).encode())
                     file.flush()
                     if folder.exists():

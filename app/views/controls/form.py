@@ -1,18 +1,30 @@
-"""Parts of a dialog's form: labels of one width, rows, number boxes, and the choice of a file."""
+"""A dialog's form: rows of controls, each declared once with the field of choices that it stands for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
-from PySide6.QtCore import QStandardPaths, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QHBoxLayout, QLayout, QLineEdit, QWidget
+from PySide6.QtCore import QStandardPaths, Qt, Signal, SignalInstance
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QWidget,
+)
 
 from app.views import theme
-from app.views.controls.parts import NO_MARGINS, filled, tool_button
+from app.views.controls.number_box import CountBox, NumberBox
+from app.views.controls.parts import NO_MARGINS, combo_box, filled, tool_button
 from app.views.controls.plain import Label
 
-Rows = Mapping[str, QWidget | QLayout]
+Part = TypeVar("Part", bound=QWidget)
 LABEL_WIDTH = 104
 FILTERS = {
     ".wav": "WAV (*.wav)",
@@ -24,20 +36,91 @@ FILTERS = {
 }
 
 
-def filled_form(form: QFormLayout, rows: Rows) -> QFormLayout:
-    """The form with rows, by their labels; all are of one width, so that the forms of a dialog are aligned."""
-    form.setContentsMargins(NO_MARGINS)
-    for name, row in rows.items():
-        title = Label(name, minimumHeight=28)
-        title.setFixedWidth(theme.px(LABEL_WIDTH))
+class Form(QWidget):
+    """Rows of controls under names of one width. The control of a field is `form[field]`.
+
+    Args:
+        choices: has the values that controls begin with, by field.
+        tips: of the controls, by field.
+    """
+
+    changed = Signal()  # a control
+
+    def __init__(self, choices: object = None, tips: Mapping[str, str] | None = None) -> None:
+        super().__init__()
+        self._choices, self._tips = choices, tips or {}
+        self._controls: dict[str, Any] = {}
+        self.rows = QFormLayout(self)
+        self.rows.setContentsMargins(NO_MARGINS)
+        self.rows.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
+
+    def __getitem__(self, field: str) -> Any:
+        return self._controls[field]
+
+    def row(self, name: str, *parts: QWidget | None) -> QHBoxLayout:
+        """Add a row of parts side by side. A text or a file takes the room that is left; None is empty space."""
+        row = row_of(*parts)
+        title = Label(name, minimumHeight=28, minimumWidth=theme.px(LABEL_WIDTH))
         title.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        form.addRow(title, row)
-    return form
+        self.rows.addRow(title, row)
+        return row
+
+    def combo(self, field: str, name: str, entries: Iterable[tuple[str, object]]) -> QComboBox:
+        box = combo_box(name, entries, getattr(self._choices, field, None), self._tips[field])
+        return self._known(field, box, box.currentIndexChanged)
+
+    def check(self, field: str, text: str) -> QCheckBox:
+        box = check_box(text, getattr(self._choices, field), self._tips[field])
+        return self._known(field, box, box.toggled)
+
+    def number(self, field: str, name: str, limits: tuple[float, float], *form: Any, **more: Any) -> NumberBox:
+        """A field for a number; `form` and `more` as of `NumberBox`."""
+        box = NumberBox(name, limits, getattr(self._choices, field, 0), self._tips[field], *form, **more)
+        return self._known(field, box, box.valueChanged)
+
+    def count(self, field: str, name: str, most: int) -> CountBox:
+        box = CountBox(name, most, getattr(self._choices, field), self._tips[field])
+        return self._known(field, box, box.valueChanged)
+
+    def file_picker(self) -> FilePicker:
+        """The choice of the file that is written; its folder is the field."""
+        picker = FilePicker(getattr(self._choices, "folder", ""), self._tips["folder"])
+        return self._known("folder", picker, picker.changed)
+
+    def values(self) -> dict[str, Any]:
+        """The values of all controls, by field."""
+        return {field: value_of(control) for field, control in self._controls.items()}
+
+    def _known(self, field: str, control: Part, change: SignalInstance) -> Part:
+        self._controls[field] = control
+        change.connect(self.changed)
+        return control
 
 
-def row_of(*widgets: QWidget) -> QHBoxLayout:
-    """Side by side, with empty space at the end."""
-    return filled(QHBoxLayout(), *widgets, None, margins=NO_MARGINS)
+def value_of(control: QWidget) -> Any:
+    """The value that is chosen in a control of a form."""
+    if isinstance(control, FilePicker):
+        return control.folder
+    if isinstance(control, QComboBox):
+        return control.currentData()
+    return control.isChecked() if isinstance(control, QCheckBox) else control.value()  # type: ignore[attr-defined]
+
+
+def row_of(*parts: QWidget | None) -> QHBoxLayout:
+    """Side by side, as `Form.row`; with empty space at the end where nothing takes it."""
+    row = filled(QHBoxLayout(), *parts, margins=NO_MARGINS)
+    takers = [part for part in parts if part is None or _takes_room(part)]
+    for part in takers:
+        if part is not None:
+            row.setStretchFactor(part, 1)
+    if not takers:
+        row.addStretch(1)
+    return row
+
+
+def _takes_room(part: QWidget) -> bool:
+    expands = part.sizePolicy().horizontalPolicy() == QSizePolicy.Policy.Expanding
+    return expands or (isinstance(part, QLabel) and part.wordWrap())
 
 
 def check_box(text: str, on: bool, tip: str) -> QCheckBox:
@@ -70,6 +153,7 @@ class FilePicker(QWidget):
         row = row_of(tool_button("Browse …", tip="Choose the file", pressed=self.browse))
         row.insertWidget(0, self.edit, 100)
         self.setLayout(row)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
 
     @property
     def folder(self) -> str:

@@ -25,7 +25,7 @@ from app.playing.pair import Pair
 from app.views.controls.parts import filled
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from app.views.dialogs.question import ask
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
 

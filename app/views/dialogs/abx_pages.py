@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import ClassVar
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import (
-    QFormLayout,
-    QHBoxLayout,
-    QLabel,
-    QLayout,
-    QProgressBar,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import MEANING, AbxRecord, p_text
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, AbxChoices, needed_correct
-from app.views.controls.form import check_box, filled_form, row_of
-from app.views.controls.number_box import CountBox
+from app.views.controls.form import Form
 from app.views.controls.parts import NO_MARGINS, filled, label, push_button, show_kind
 from app.views.controls.plain import Label
 
@@ -39,29 +30,32 @@ class SetupPage(QWidget):
     """The page before the test; `show_state` shows whether it can start. `words`: the compared sounds."""
 
     audition_asked = Signal(str)  # "A" or "B"
+    TIPS: ClassVar = {
+        "trials": "Fixed before the start: a test that could stop at any time would prove nothing",
+        "restart": "Otherwise the switch happens at the playhead, with a cross-fade",
+    }
 
     def __init__(self, words: str, labels: Sequence[str], choices: AbxChoices) -> None:
         super().__init__()
-        tip = "Fixed before the start: a test that could stop at any time would prove nothing"
-        self.trials = CountBox("Number of trials", MOST_TRIALS, choices.trials, tip)
+        form = Form(choices, self.TIPS)
+        self.trials = form.count("trials", "Number of trials", MOST_TRIALS)
         self.trials.valueChanged.connect(lambda: self._show_trials(self.trials.value()))
-        tip = "Otherwise the switch happens at the playhead, with a cross-fade"
-        self.restart = check_box("Restart from the pluck at each switch", choices.restart, tip)
+        self.restart = form.check("restart", "Restart from the pluck at each switch")
         self._needed, self._warning = label("faint"), label("warning")
         self.start = push_button("Start the test", "Begin the first trial", kind="play")
         self.start.setDefault(True)  # at first it is disabled and cannot have the focus
         self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
-        rows: dict[str, QWidget | QLayout] = {"Note": label(text=words)}
+        form.row("Note", label(text=words))
         for name, text in zip("AB", labels, strict=True):
             listen = push_button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
             listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
             self._listen.append(listen)
-            rows[name] = row_of(listen, Label(text))
-        rows |= {"Trials": row_of(self.trials, self._needed), "Switch": self.restart}
+            form.row(name, listen, Label(text))
+        form.row("Trials", self.trials, self._needed)
+        form.row("Switch", self.restart)
         self._needed.setMinimumWidth(320)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
-        form = filled_form(QFormLayout(), rows)
         parts = label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons
         filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
         self._show_trials(choices.trials)

@@ -5,25 +5,28 @@ Every choice takes effect at once. The dialog does not block the window: a buffe
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
-    QFormLayout,
     QFrame,
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
+from app.audio.sound import SoundStatus
+from app.views.controls.form import Form
 from app.views.controls.parts import combo_box, filled, label, push_button, refill
 from app.views.controls.plain import Label
+from engine.voices import Gap
 
 RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
 BUFFERS: dict[Buffer, str] = {
@@ -42,24 +45,12 @@ ADVICE = (
 )
 
 
-@dataclass(frozen=True)
-class AudioState:
-    """The state of the present output, as the dialog reports it."""
-
-    playing_on: str  # a device with its host API; "": none
-    facts: str  # its rate, its buffer, and the latency that was measured
-    problem: str
-    gaps: tuple[str, ...]  # dropouts: when and why, the latest last
-    load: float  # processor time of the mixer as a share of the time that it renders
-
-
 class AudioDialog(QDialog):
     """Gestures emit signals; `show_…` shows what became of them."""
 
     choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
     rescan_asked = Signal()
     tone_asked = Signal(str)  # left, right or both
-    gaps_reset = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -72,6 +63,7 @@ class AudioDialog(QDialog):
         QHBoxLayout(self._problem).addWidget(self._problem_label)
         tip = "Audio output; remembered by its name"
         self._device = combo_box("Output", [("System default", None)], tip=tip, picked=self._choose)
+        self._device.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         tip = "Sample rate of the device; the model's rate is converted to it"
         rates = [(name, rate) for rate, name in RATES.items()]
@@ -82,6 +74,8 @@ class AudioDialog(QDialog):
         self._gaps = Label("0", minimumWidth=40)
         tip = "Processor time of the sound as a share of the time it plays: near 100 % there are dropouts"
         self._load = Label("0 %", toolTip=tip)
+        self._latest: Gap | None = None
+        self._zero: Gap | None = None  # the user's: gaps up to this one are not counted
         self._lay_out()
 
     @property
@@ -107,21 +101,33 @@ class AudioDialog(QDialog):
         self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))
         self._buffer.setCurrentIndex(self._buffer.findData(sound.buffer))
 
-    def show_state(self, state: AudioState) -> None:
-        output = bool(state.playing_on)
-        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if output else "No audio output.")
-        _set(self._problem_label, state.problem)
-        latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
-        _set(self._gaps, f"{len(state.gaps)}{latest}")
-        tip = "\n".join(["Silences while a string should have sounded", *state.gaps[-12:]])
+    def show_status(self, status: SoundStatus, latencies_s: Sequence[float] = ()) -> None:
+        """Show the state of the output; `latencies_s`: from keys to the device, as measured."""
+        device, gaps = status.device, status.gaps
+        self._latest = gaps[-1] if gaps else None
+        if self._zero in gaps:  # it may be gone: only the latest are there
+            gaps = gaps[gaps.index(self._zero) + 1 :]
+        facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"
+        if latencies_s:
+            facts += f", key to device {1000 * statistics.median(latencies_s):.1f} ms (measured)"
+        output = device and f"Sound goes to “{device.name}” ({device.host_api}), {facts}."
+        _set(self._state_label, output or "No audio output.")
+        _set(self._problem_label, status.problem or "")
+        words = [f"{gap.time_s:.1f} s: {gap.cause}" for gap in gaps]
+        _set(self._gaps, f"{len(gaps)}, the last at {words[-1]}" if gaps else "0")
+        tip = "\n".join(["Silences while a string should have sounded", *words[-12:]])
         if self._gaps.toolTip() != tip:
             self._gaps.setToolTip(tip)
-        _set(self._load, f"{100 * state.load:.0f} %")
-        if self._problem.isHidden() == bool(state.problem):
-            self._problem.setVisible(bool(state.problem))
+        _set(self._load, f"{100 * status.load:.0f} %")
+        if self._problem.isHidden() == bool(status.problem):
+            self._problem.setVisible(bool(status.problem))
             self.adjustSize()
         for button in self._tones:
-            button.setEnabled(output)
+            button.setEnabled(device is not None)
+
+    def _reset_gaps(self) -> None:
+        self._zero = self._latest
+        self._gaps.setText("0")
 
     def _choose(self, _: object) -> None:
         self.choice_made.emit(self.device, self.sound)
@@ -136,18 +142,14 @@ class AudioDialog(QDialog):
             tone.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
             self._tones.append(tone)
         tip = "Count dropouts from zero"
-        reset = push_button("Reset", tip, tip, pressed=self.gaps_reset)
-        form = QFormLayout()
-        form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        form.setSpacing(10)
-        output = filled(QHBoxLayout(), self._device, rescan)
-        output.setStretch(0, 1)
-        form.addRow("Output", output)
-        form.addRow("Sample rate", self._rate)
-        form.addRow("Buffer", self._buffer)
-        form.addRow("Test tone", filled(QHBoxLayout(), *self._tones, None))
-        form.addRow("Dropouts", filled(QHBoxLayout(), self._gaps, reset, None))
-        form.addRow("Load", self._load)
+        reset = push_button("Reset", tip, tip, pressed=self._reset_gaps)
+        form = Form()
+        form.row("Output", self._device, rescan)
+        form.row("Sample rate", self._rate)
+        form.row("Buffer", self._buffer)
+        form.row("Test tone", *self._tones)
+        form.row("Dropouts", self._gaps, reset)
+        form.row("Load", self._load)
         tip = "Close; changes are already applied"
         close = push_button("Close", tip, tip, pressed=self.accept, default=True)
         last, advice = filled(QHBoxLayout(), None, close), label("faint", ADVICE)

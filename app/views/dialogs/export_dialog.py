@@ -5,19 +5,15 @@ It does not block the window: several minutes are for playing.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QTabBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QTabBar, QVBoxLayout, QWidget
 
-from app.export.choices import ExportChoices
 from app.export.job import EXPECTED, ExportJob
-from app.export.sampled.choices import SampledChoices
-from app.views.background import Background
-from app.views.controls.parts import filled, label, push_button, show_kind
+from app.views.controls.parts import filled, push_button, show_kind
 from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
@@ -25,13 +21,13 @@ from app.views.dialogs.export_pages import (
     NotePage,
     PerformancePage,
     PluginPage,
+    Remembered,
     SamplerPage,
     WavForm,
 )
-from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
-from engine.plain_text import duration
-from engine.result_file import WriteError
+from app.views.dialogs.work_dialog import WorkDialog
+from engine.whole_file import WriteError
 
 KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
@@ -40,27 +36,19 @@ REPLACE = "Replace"  # the button's word where a file of this name is there
 CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
-class ExportDialog(GrowingDialog):
+class ExportDialog(WorkDialog):
     """The dialog of exports. It follows what the window plays (`show_subjects`) until an export begins.
 
     Attributes:
-        state: a line or more on what is to come, on progress, or on the result.
         save: the button that starts.
     """
 
     exported = Signal(object)  # the job that has ended well
     ended = Signal(bool)  # a job, well or not; the dialog shows its result by then
 
-    def __init__(self, export: ExportChoices, sampled: SampledChoices, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Export")
-        self.setMinimumWidth(680)
-        self._export = export
-        self._background = Background("export", self, expected=EXPECTED)
-        self._background.progressed.connect(self._show_progress)
-        self._background.finished.connect(self._show_finished)
-        self._background.failed.connect(self._show_failure)
-        self._background.cancelled.connect(self._show_cancelled)
+    def __init__(self, remembered: Remembered, parent: QWidget | None = None) -> None:
+        export, sampled = remembered
+        super().__init__("Export", 680, "export", EXPECTED, parent)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
         self.wav = WavForm(export)
@@ -82,11 +70,8 @@ class ExportDialog(GrowingDialog):
         self.tabs.currentChanged.connect(self._turn_page)
 
     def _lay_out(self) -> None:
-        self.state = label("faint", selectable=True)
         self.state.setMinimumHeight(52)
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.bar = QProgressBar(maximum=1000)
-        self.bar.setAccessibleName("Progress")
         tip = "Open the folder of what was saved"
         self.show_folder = push_button("Show in folder", tip, pressed=self._open_folder)
         tip = "Render and save"
@@ -95,7 +80,6 @@ class ExportDialog(GrowingDialog):
         buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
         self._choosers = (self.tabs, *self.pages.values(), self.wav)
         filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons, spacing=12)
-        self.bar.hide()
         self.show_folder.hide()
 
     @property
@@ -109,14 +93,11 @@ class ExportDialog(GrowingDialog):
     @property
     def job(self) -> ExportJob | None:
         """The job under way."""
-        return self._job if self._background.busy else None
+        return self._job if self.background.busy else None
 
-    def choices(self) -> ExportChoices:
-        """The choices of notes and performances, to be remembered."""
-        return self.note.choices()
-
-    def sampled_choices(self) -> SampledChoices:
-        return self.sampler.choices()
+    def choices(self) -> Remembered:
+        """The choices of all pages, to be remembered."""
+        return self.note.choices(), self.sampler.choices()
 
     def open_at(self, kind: Kind) -> None:
         """Show a page, unless an export is under way, and bring the dialog to the front."""
@@ -169,23 +150,16 @@ class ExportDialog(GrowingDialog):
         if not self.save.isEnabled() or (self.save.text() == REPLACE != words):
             return
         self._job = job = self.page.job()
-        self._started_s = time.monotonic()
         for part in (*self._choosers, self.save):
             part.setEnabled(False)
         self.close_button.setText("Cancel")
-        self.bar.setValue(0)
-        self.bar.show()
         self._show_text("Rendering …")
-        self._background.start(lambda work: job.run(work.progress))
+        self.begin(lambda work: job.run(work.progress), self._show_finished)
         if (parent := self.parentWidget()) is not None:
             parent.window().activateWindow()  # whose keys play on
 
-    def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
-        self.bar.setValue(round(1000 * share))
-        if left_s is None and share > 0:
-            left_s = (time.monotonic() - self._started_s) * (1 - share) / share
-        left = f", about {duration(max(left_s, 1.0))} left" if left_s else ""
-        self._show_text(f"{text or 'Rendering'}{left}. {MEANWHILE}")
+    def progress_words(self, text: str, left: str) -> str:
+        return f"{text or 'Rendering'}{left and f', {left}'}. {MEANWHILE}"
 
     def _show_finished(self, words: str) -> None:
         if self._job is not None and self.page.writes_wav:
@@ -196,11 +170,11 @@ class ExportDialog(GrowingDialog):
         self.show_folder.show()
         self.ended.emit(True)
 
-    def _show_failure(self, message: str, _details: str) -> None:
+    def show_failure(self, message: str) -> None:
         self._end(message, failed=True)
         self.ended.emit(False)
 
-    def _show_cancelled(self) -> None:
+    def show_cancelled(self) -> None:
         assert self._job is not None
         self._end(f"Cancelled; {self._job.cancelled}")
         self.ended.emit(False)
@@ -225,7 +199,7 @@ class ExportDialog(GrowingDialog):
 
     def done(self, result: int) -> None:
         """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""
-        self._background.close(None)
+        self.background.close(None)
         super().done(result)
 
     def reject(self) -> None:
@@ -234,10 +208,10 @@ class ExportDialog(GrowingDialog):
         if self.job is None:
             self.accept()
         elif ask(self, "Cancel the export?", question, CONTINUE, CANCEL) == CANCEL:
-            self._background.stop()
+            self.background.stop()
 
     def _close_or_cancel(self) -> None:
         if self.job is None:
             self.accept()
         else:
-            self._background.stop()
+            self.background.stop()

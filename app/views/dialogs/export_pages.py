@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance
-from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QWidget
+from PySide6.QtCore import QSignalBlocker
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
@@ -30,12 +28,11 @@ from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
-from app.views.controls.form import FilePicker, Rows, check_box, filled_form, row_of
-from app.views.controls.number_box import CountBox, NoteBox, NumberBox
-from app.views.controls.parts import combo_box, faint, label
-from engine.result_file import WriteError, explain
+from app.views.controls.form import FilePicker, Form, check_box
+from app.views.controls.number_box import NoteBox
+from app.views.controls.parts import faint, label
+from engine.whole_file import WriteError, explain
 
-Control = QComboBox | QCheckBox | NumberBox | FilePicker
 Kind = Literal["note", "performance", "sampler", "plugin"]
 SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Model", "model"),
@@ -46,6 +43,7 @@ SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
 RATES_HZ = (44_100, 48_000, 96_000)
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
+Remembered = tuple[ExportChoices, SampledChoices]  # choices from one dialog to the next
 PLUGIN_NAMES = {"clap": "CLAP", "vst3": "VST3", "lv2": "LV2"}
 SYSTEM_NAMES = {
     "linux-x64": "Linux",
@@ -75,52 +73,26 @@ class HeardInstrument:
     preset: PresetEntry
 
 
-class ChoicesForm(QWidget):
-    """A form of controls, each for a field of choices."""
-
-    changed = Signal()
-
-    def _lay_out(
-        self, rows: Rows, controls: Mapping[str, Control], settle: Callable[[], object] | None = None
-    ) -> QFormLayout:
-        """Lay out the rows; `settle` is called when a control changes that is no file."""
-        self._controls = controls
-        for control in controls.values():
-            change = _change_of(control)
-            change.connect(self.changed)
-            if settle is not None and not isinstance(control, FilePicker):
-                change.connect(settle)
-        return filled_form(QFormLayout(self), rows)
-
-    def values(self) -> dict[str, Any]:
-        return {field: _value_of(control) for field, control in self._controls.items()}
-
-
-class WavForm(ChoicesForm):
+class WavForm(Form):
     """Sample rate, format and level of WAV files; notes and performances share it."""
 
+    TIPS: ClassVar = {
+        "rate_hz": "A rate above the model's own adds no bandwidth",
+        "bits": "16 bits are dithered; floating point never clips",
+        "normalise": "One gain for model and truth. Off: as loud as at a volume of 0 dB; of a string alone, 10 mm "
+        "are full scale",
+    }
+
     def __init__(self, export: ExportChoices) -> None:
-        super().__init__()
-        rates = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ)]
-        tip = "A rate above the model's own adds no bandwidth"
-        self.rate = combo_box("Sample rate", rates, export.rate_hz, tip)
+        super().__init__(export, self.TIPS)
         self.note = faint()
-        formats = [(name, bits) for bits, name in BITS_NAMES.items()]
-        self.bits = combo_box("Format", formats, export.bits, "16 bits are dithered; floating point never clips")
-        tip = (
-            "One gain for model and truth. Off: as loud as at a volume of 0 dB; "
-            "of a string alone, 10 mm are full scale"
-        )
-        self.normalise = check_box("Normalise to −1 dBFS", export.normalise, tip)
-        rows: Rows = {
-            "Sample rate": row_of(self.rate, self.note),
-            "Format": row_of(self.bits),
-            "Level": row_of(self.normalise),
-        }
-        self._lay_out(rows, {"rate_hz": self.rate, "bits": self.bits, "normalise": self.normalise})
+        rates = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ)]
+        self.row("Sample rate", self.combo("rate_hz", "Sample rate", rates), self.note)
+        self.row("Format", self.combo("bits", "Format", [(name, bits) for bits, name in BITS_NAMES.items()]))
+        self.row("Level", self.check("normalise", "Normalise to −1 dBFS"))
 
 
-class ExportPage(ChoicesForm):
+class ExportPage(Form):
     """A page with the subject and the settings of an export; a further kind is a further subclass.
 
     Attributes:
@@ -152,62 +124,52 @@ class NotePage(ExportPage):
     """The export of a pluck to one file, or two."""
 
     title, missing = "Note", "There is no preset to export: choose one first."
+    TIPS: ClassVar = {
+        "source": "What to save",
+        "difference_gain_db": "Gain of the difference, model − truth",
+        "until_decayed": "Where the file ends: when the sound has decayed, or after a fixed time",
+        "decay_db": "The sound ends where model and truth are this far below their peak",
+        "longest_s": "A string that rings longer is faded out at this length",
+        "seconds": "The end is faded out within 10 ms",
+        "folder": "With two files, the source is appended to each name",
+    }
 
     def __init__(self, export: ExportChoices, wav: WavForm) -> None:
-        super().__init__()
-        self._export, self._wav = export, wav
+        super().__init__(export, self.TIPS)
+        self._wav = wav
         self._subject: HeardNote | None = None
-        self.what = label("faint")
-        self.source = combo_box("Source", SOURCE_NAMES, export.source, "What to save")
+        self.what, self.through_words, self.names = label("faint"), label(), faint()
         self.through = check_box("On", True, "Off: the string alone, without the instrument")
         self.through.setAccessibleName("Instrument")
-        self.through_words = label()
-        limits = 0.1, LONGEST_S
-        ends = (("Until it has decayed", True), ("Fixed", False))
-        tip = "Where the file ends: when the sound has decayed, or after a fixed time"
-        self.length = combo_box("Length", ends, export.until_decayed, tip)
-        tip = "The sound ends where model and truth are this far below their peak"
-        self.decay = NumberBox("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
-        tip = "A string that rings longer is faded out at this length"
-        self.longest = NumberBox("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
-        tip = "The end is faded out within 10 ms"
-        self.seconds = NumberBox("Duration", limits, export.seconds, tip, " s", 1, 0.5)
-        name, tip = "Gain of the difference", "Gain of the difference, model − truth"
-        gain_db, limits_db = export.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB
-        self.gain = NumberBox(name, limits_db, gain_db, tip, " dB", step=6, prefix="+")
-        self.file = FilePicker(export.folder, "With two files, the source is appended to each name")
-        self.names = faint()
-        through = row_of(self.through, self.through_words)
-        through.setStretch(1, 1)
-        through.setStretch(2, 0)
-        rows: Rows = {
-            "Sound": self.what,
-            "Source": row_of(self.source, self.gain),
-            "Instrument": through,
-            "Length": row_of(self.length, self.decay, self.longest, self.seconds),
-            "File": self.file,
-            "Saved as": self.names,
-        }
-        controls: dict[str, Control] = {
-            "folder": self.file,
-            "source": self.source,
-            "alone": self.through,
-            "until_decayed": self.length,
-            "decay_db": self.decay,
-            "longest_s": self.longest,
-            "seconds": self.seconds,
-            "difference_gain_db": self.gain,
-        }
-        self._form = self._lay_out(rows, controls, self._show)
+        self.through.toggled.connect(self.changed)
+        self.file = self.file_picker()
+        gain, limits = "Gain of the difference", (0.1, LONGEST_S)
+        self.row("Sound", self.what)
+        self.row(
+            "Source",
+            self.combo("source", "Source", SOURCE_NAMES),
+            self.number("difference_gain_db", gain, DIFFERENCE_GAIN_RANGE_DB, " dB", step=6, prefix="+"),
+        )
+        self.row("Instrument", self.through, self.through_words)
+        self.row(
+            "Length",
+            self.combo("until_decayed", "Length", (("Until it has decayed", True), ("Fixed", False))),
+            self.number("decay_db", "Decay", DECAY_RANGE_DB, " dB", step=5, prefix="by "),
+            self.number("longest_s", "Longest duration", limits, " s", 1, prefix="at most "),
+            self.number("seconds", "Duration", limits, " s", 1, 0.5),
+        )
+        self.row("File", self.file)
+        self._names_row = self.row("Saved as", self.names)
+        self.changed.connect(self._show)
         wav.changed.connect(self._show)
-        self.file.changed.connect(self._show)
 
     def show_subject(self, subject: HeardNote | None) -> None:
         before, self._subject = self._subject, subject
         if subject is not None and (before is None or before.source != subject.source):
-            self.source.setCurrentIndex(self.source.findData(subject.chosen(self.source.currentData())))
+            box = self["source"]
+            box.setCurrentIndex(box.findData(subject.chosen(box.currentData())))
             if subject.source == "difference":
-                self.gain.setValue(subject.difference_gain_db)
+                self["difference_gain_db"].setValue(subject.difference_gain_db)
         self._show()
 
     def choices(self) -> ExportChoices:
@@ -216,7 +178,7 @@ class NotePage(ExportPage):
 
     def paths(self) -> dict[Source, Path]:
         """The files that will be written, by source. Raises ValueError: no name is given."""
-        path, source = self.file.path, self.source.currentData()
+        path, source = self.file.path, self["source"].currentData()
         if source != "files":
             return {source: path}
         stem = path.stem.removesuffix(" model").removesuffix(" truth")
@@ -232,14 +194,14 @@ class NotePage(ExportPage):
         return "Replace" if there else "Export", RECIPE_NOTE
 
     def _show(self) -> None:
-        decays = self.length.currentData()
-        for spin, visible in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
-            spin.setVisible(visible)
+        decays = self["until_decayed"].currentData()
+        for field, visible in (("decay_db", decays), ("longest_s", decays), ("seconds", not decays)):
+            self[field].setVisible(visible)
         if self._subject is None:
             return
         subject, sound = self._subject, self._subject.sound
-        source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
-        self.gain.setVisible(source == "difference")
+        source, rate_hz = self["source"].currentData(), self._wav["rate_hz"].currentData()
+        self["difference_gain_db"].setVisible(source == "difference")
         can_be_alone = sound.alone != sound
         alone = can_be_alone and not self.through.isChecked()
         self.through.setVisible(can_be_alone)
@@ -253,7 +215,7 @@ class NotePage(ExportPage):
         self.file.suggest(subject.file_name("model" if source == "files" else source))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
-        self._form.setRowVisible(self.names, two)
+        self.rows.setRowVisible(self._names_row, two)
 
 
 class PerformancePage(ExportPage):
@@ -263,12 +225,12 @@ class PerformancePage(ExportPage):
     window_title = "Save the recording"
 
     def __init__(self, export: ExportChoices, wav: WavForm) -> None:
-        super().__init__()
+        super().__init__(export, {"folder": "The MIDI file has the same name"})
         self._wav = wav
         self._subject: HeardPerformance | None = None
-        self.what = label("faint")
-        self.file = FilePicker(export.folder, "The MIDI file has the same name")
-        self._lay_out({"Sound": self.what, "File": self.file}, {"folder": self.file})
+        self.what, self.file = label("faint"), self.file_picker()
+        self.row("Sound", self.what)
+        self.row("File", self.file)
 
     def show_subject(self, subject: HeardPerformance | None) -> None:
         self._subject = subject
@@ -301,55 +263,42 @@ class SamplerPage(ExportPage):
     title = "Sampler"
     missing = "There is no instrument to export: choose one first."
     writes_wav = False
+    TIPS: ClassVar = {
+        "form": "An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits",
+        "bits": "Of each sample",
+        "rate_hz": "Of the samples",
+        "every": "One sample for so many keys; those between are transposed",
+        "layers": "How many velocities are rendered of each key",
+        "seconds": "Silent ones end sooner; one that still rings is faded out",
+        "source": "What plays the instrument",
+        "dry": "A room in the samples ends with the release of each key",
+        "folder": "Where the instrument is written",
+    }
 
     def __init__(self, choices: SampledChoices) -> None:
-        super().__init__()
+        super().__init__(choices, self.TIPS)
         self._subject: HeardInstrument | None = None
         self._chosen_keys = choices.keys
-        self.what = label()
-        tip = "An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits"
-        self.form = combo_box("Format", FORM_NAMES, choices.form, tip)
-        self.bits = combo_box("Bits", [("24-bit", "24"), ("16-bit, dithered", "16")], choices.bits, "Of each sample")
-        rates = [(f"{hz / 1000:g} kHz", hz) for hz in RATES_HZ]
-        self.rate = combo_box("Sample rate", rates, choices.rate_hz, "Of the samples")
+        self.what, self.size_text, self.file = label(), label(selectable=True), self.file_picker()
+        self.size_text.setMinimumHeight(36)  # of two lines
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
         self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
-        tip = "One sample for so many keys; those between are transposed"
-        self.every = CountBox("Keys a sample", WIDEST_STEP, choices.every, tip)
-        tip = "How many velocities are rendered of each key"
-        self.layers = CountBox("Velocity layers", MOST_LAYERS, choices.layers, tip)
-        tip = "Silent ones end sooner; one that still rings is faded out"
-        self.seconds = NumberBox("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
-        sources, tip = SOURCE_NAMES[:2], "What plays the instrument"
-        self.source = combo_box("Source", sources, choices.source, tip)
-        tip = "A room in the samples ends with the release of each key"
-        self.dry = check_box("Dry: the room is left to the sampler", choices.dry, tip)
-        self.file = FilePicker(choices.folder, "Where the instrument is written")
-        self.size_text = label(selectable=True)
-        self.size_text.setMinimumHeight(36)  # of two lines
-        every = (faint("a sample for every"), self.every, faint("keys"))
-        rows: Rows = {
-            "Sound": self.what,
-            "Format": row_of(self.form, self.bits, self.rate),
-            "Keys": row_of(self.lowest, faint("to"), self.highest, *every),
-            "Velocity layers": row_of(self.layers),
-            "Length": row_of(self.seconds),
-            "Source": row_of(self.source, self.dry),
-            "File": self.file,
-            "": self.size_text,
-        }
-        controls: dict[str, Control] = {
-            "folder": self.file,
-            "form": self.form,
-            "bits": self.bits,
-            "rate_hz": self.rate,
-            "every": self.every,
-            "layers": self.layers,
-            "seconds": self.seconds,
-            "source": self.source,
-            "dry": self.dry,
-        }
-        self._lay_out(rows, controls, self._suggest_name)
+        every = faint("a sample for every"), self.count("every", "Keys a sample", WIDEST_STEP), faint("keys")
+        self.row("Sound", self.what)
+        self.row(
+            "Format",
+            self.combo("form", "Format", FORM_NAMES),
+            self.combo("bits", "Bits", [("24-bit", "24"), ("16-bit, dithered", "16")]),
+            self.combo("rate_hz", "Sample rate", [(f"{hz / 1000:g} kHz", hz) for hz in RATES_HZ]),
+        )
+        self.row("Keys", self.lowest, faint("to"), self.highest, *every)
+        self.row("Velocity layers", self.count("layers", "Velocity layers", MOST_LAYERS))
+        self.row("Length", self.number("seconds", "Longest sample", SECONDS_RANGE, " s", 1, prefix="at most "))
+        dry = self.check("dry", "Dry: the room is left to the sampler")
+        self.row("Source", self.combo("source", "Source", SOURCE_NAMES[:2]), dry)
+        self.row("File", self.file)
+        self.row("", self.size_text)
+        self["form"].currentIndexChanged.connect(self._suggest_name)
         for box in (self.lowest, self.highest):
             box.valueChanged.connect(self.changed)
 
@@ -365,7 +314,7 @@ class SamplerPage(ExportPage):
             with QSignalBlocker(box):
                 box.setRange(low, high)
                 box.setValue(key)
-        self.dry.setEnabled(patch.room.mix > 0)
+        self["dry"].setEnabled(patch.room.mix > 0)
         problem = body_problem(patch)
         self.what.setText(f"{patch.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
         self._suggest_name()
@@ -416,8 +365,8 @@ class SamplerPage(ExportPage):
         return "Replace" if out.is_file() else "Export", ""
 
     def _suggest_name(self) -> None:
-        soundfont = self.form.currentData() == "sf2"
-        self.bits.setVisible(not soundfont)
+        soundfont = self["form"].currentData() == "sf2"
+        self["bits"].setVisible(not soundfont)
         self.file.suffix = ".sf2" if soundfont else ".sfz"
         if self._subject is not None:
             self.file.suggest(plain_stem(self._subject.patch.name) + self.file.suffix)
@@ -430,18 +379,24 @@ class PluginPage(ExportPage):
     missing = "There is no instrument to export: choose one first."
     writes_wav = False
 
+    TIPS: ClassVar = {
+        "form": "CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux",
+        "system": "Of the computer that it is for",
+        "folder": "Where the plug-in is written; hosts look for it where it is suggested",
+    }
+
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(None, self.TIPS)
         self._subject: HeardInstrument | None = None
-        self.what = label()
-        tip = "CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux"
-        self.form = combo_box("Format", [(name, form) for form, name in PLUGIN_NAMES.items()], "clap", tip)
-        systems, tip = [(name, target) for target, name in SYSTEM_NAMES.items()], "Of the computer that it is for"
-        self.system = combo_box("System", systems, _this_system(), tip)
-        self.file = FilePicker("", "Where the plug-in is written; hosts look for it where it is suggested")
-        rows: Rows = {"Sound": self.what, "Format": row_of(self.form, self.system), "File": self.file}
-        controls: dict[str, Control] = {"folder": self.file, "form": self.form, "system": self.system}
-        self._lay_out(rows, controls, self._suggest_name)
+        self.what, self.file = label(), self.file_picker()
+        formats = self.combo("form", "Format", [(name, form) for form, name in PLUGIN_NAMES.items()])
+        systems = self.combo("system", "System", [(name, target) for target, name in SYSTEM_NAMES.items()])
+        systems.setCurrentIndex(systems.findData(_this_system()))
+        self.row("Sound", self.what)
+        self.row("Format", formats, systems)
+        self.row("File", self.file)
+        for box in (formats, systems):
+            box.currentIndexChanged.connect(self._suggest_name)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
         self._subject = subject
@@ -454,14 +409,14 @@ class PluginPage(ExportPage):
             raise ValueError(self.missing)
         check_compiler()
         patch, preset = self._subject.patch, self._subject.preset.path
-        return PluginExport(patch, preset, self.form.currentData(), self.system.currentData(), self.file.path)
+        return PluginExport(patch, preset, self["form"].currentData(), self["system"].currentData(), self.file.path)
 
     def offer(self) -> tuple[str, str]:
         replaces = self.job().replaces()
         return ("Replace", f"{replaces} {PLUGIN_NOTE}") if replaces else ("Export", PLUGIN_NOTE)
 
     def _suggest_name(self) -> None:
-        form, system = self.form.currentData(), self.system.currentData()
+        form, system = self["form"].currentData(), self["system"].currentData()
         self.file.suffix = f".{form}"
         if self._subject is not None:
             folder = install_folder(form, system) if system == _this_system() else Path.home()
@@ -494,19 +449,3 @@ def _through_words(sound: NoteSound, alone: bool, source: Chosen) -> str:
     if source == "difference":
         return f"{patch.name}, without amplifier, body and room, as a difference is heard"
     return f"{patch.name} with {added_words(patch)}, as it is heard"
-
-
-def _value_of(control: Control) -> Any:
-    if isinstance(control, FilePicker):
-        return control.folder
-    if isinstance(control, QComboBox):
-        return control.currentData()
-    return control.isChecked() if isinstance(control, QCheckBox) else control.value()
-
-
-def _change_of(control: Control) -> SignalInstance:
-    if isinstance(control, FilePicker):
-        return control.changed
-    if isinstance(control, QComboBox):
-        return control.currentIndexChanged
-    return control.toggled if isinstance(control, QCheckBox) else control.valueChanged

@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
-    QFormLayout,
-    QHBoxLayout,
-    QLineEdit,
-    QProgressBar,
-    QRadioButton,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QRadioButton, QStackedWidget, QVBoxLayout, QWidget
 
 from app.audio.note_file import NoteFileError
 from app.audio.sound import Sound
 from app.patches.library import PatchError
 from app.playing.pair import Pair
 from app.shared.worker import Job, Work
-from app.views.background import Background
-from app.views.controls.form import Rows, filled_form, row_of
-from app.views.controls.number_box import NumberBox
-from app.views.controls.parts import NO_MARGINS, combo_box, filled, label, push_button, read_only_text
-from app.views.dialogs.growing import GrowingDialog
+from app.views.controls.form import Form
+from app.views.controls.parts import NO_MARGINS, filled, label, push_button, read_only_text
 from app.views.dialogs.question import ask
-from engine.plain_text import duration, name_text
+from app.views.dialogs.work_dialog import WorkDialog
+from engine.plain_text import name_text
 from engine.presets import PresetError
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 if TYPE_CHECKING:
     from app.instrument.learned import Reasons
@@ -52,33 +40,27 @@ HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
 )
 
 
-class LearnDialog(GrowingDialog):
+class LearnDialog(WorkDialog):
     """A dialog that writes nothing before "Keep and play".
 
     Errors are stated without anything copied from the recording.
-
-    Attributes:
-        state: what is found, or how far it is.
     """
 
     body_chosen = Signal(str)  # the file
     instrument_kept = Signal(object)  # `Kept`
+    KNOWN = "Type it where you know it; otherwise it is assumed"
+    TIPS: ClassVar = {
+        "kind": "For what a sound does not give: density and length",
+        "length_m": KNOWN,
+        "gauge_mm": KNOWN,
+    }
 
     def __init__(self, file: Path, output: Sound, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(file.name)
-        self.setMinimumWidth(620)
+        super().__init__(file.name, 620, "learn", EXPECTED, parent)
         self._file, self._output = file, output
         self._learned: Learned | None = None
         self._pair: Pair | None = None
         self._against: Reasons | None = None  # None: not examined yet
-        self._then: Callable[[Any], None] = self._show_examined
-        self._began_s = 0.0
-        self._background = Background("learn", self, expected=EXPECTED)
-        self._background.progressed.connect(self._show_progress)
-        self._background.finished.connect(lambda result: self._then(result))
-        self._background.failed.connect(self._show_failure)
-        self._background.cancelled.connect(self._show_cancelled)
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
@@ -86,15 +68,15 @@ class LearnDialog(GrowingDialog):
             choice.toggled.connect(self._show_choice)
         self.name = QLineEdit(name_text(file.stem[:60]))
         self.name.setAccessibleName("Name of the instrument")
-        self.kind = combo_box("Instrument", KINDS, "guitar", "For what a sound does not give: density and length")
-        tip = "Type it where you know it; otherwise it is assumed"
-        self.length_m = NumberBox("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
-        self.gauge_mm = NumberBox("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
+        self._form = Form(None, self.TIPS)
+        self._form.row("Name", self.name)
+        self.kind = self._form.combo("kind", "Instrument", KINDS)
+        self.length_m = self._form.number("length_m", "Sounding length", (0, LONGEST_M), " m", 3, 0.01)
+        self.gauge_mm = self._form.number("gauge_mm", "Diameter", (0, THICKEST_MM), " mm", 2, 0.05)
+        for name, control in (("Instrument", self.kind), ("Length", self.length_m), ("Diameter", self.gauge_mm)):
+            self._form.row(name, control)
         for box in (self.length_m, self.gauge_mm):
             box.setSpecialValueText("assumed")  # where it is 0
-        self.state = label("faint", selectable=True)
-        self.bar = QProgressBar(maximum=1000)
-        self.bar.setAccessibleName("Progress")
         self.report = read_only_text("Report")
         tip = "Both play on, in a loop; the switch is at the same moment"
         self.heard = {key: push_button(text, tip, checkable=True, autoDefault=True) for key, text in HEARD}
@@ -109,15 +91,9 @@ class LearnDialog(GrowingDialog):
         self._examine()
 
     def _lay_out(self) -> None:
-        form: Rows = {
-            "Name": self.name,
-            "Instrument": row_of(self.kind),
-            "Length": row_of(self.length_m),
-            "Diameter": row_of(self.gauge_mm),
-        }
         question, result = QWidget(), QWidget()
         heading = label(text="String or body?")
-        parts = heading, self.string, filled_form(QFormLayout(), form), self.body, None
+        parts = heading, self.string, self._form, self.body, None
         filled(QVBoxLayout(question), *parts, margins=NO_MARGINS)
         sounds = filled(QHBoxLayout(), *self.heard.values())
         for place in range(sounds.count()):
@@ -127,7 +103,6 @@ class LearnDialog(GrowingDialog):
             self._pages.addWidget(page)
         buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
         filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons, spacing=12)
-        self.bar.hide()
 
     # String or body
 
@@ -140,8 +115,7 @@ class LearnDialog(GrowingDialog):
 
             return reasons_against(self._file)
 
-        self._then = self._show_examined
-        self._background.start(work)
+        self.begin(work, self._show_examined, bar=False)
 
     def _show_examined(self, against: Reasons) -> None:
         self._against = against
@@ -149,10 +123,9 @@ class LearnDialog(GrowingDialog):
         self._show_choice()
 
     def _show_choice(self) -> None:
-        if self._background.busy:
+        if self.background.busy:
             return
-        for part in (self.name, self.kind, self.length_m, self.gauge_mm):
-            part.setEnabled(self.string.isChecked())
+        self._form.setEnabled(self.string.isChecked())
         against = self._against
         refusals, warnings = (against.refusals, against.warnings) if against is not None else ([], [])
         if self.body.isChecked():
@@ -192,16 +165,10 @@ class LearnDialog(GrowingDialog):
             (learned,) = learn_files([self._file], progress=job.progress, **choices)
             return learned, both_sounds(learned, rate_hz)
 
-        self.bar.setValue(0)
-        self.bar.show()
-        self._began_s = time.monotonic()
-        self._begin(work, self._show_learned)
+        self._work(work, self._show_learned)
 
-    def _show_progress(self, share: float, *_: object) -> None:
-        self.bar.setValue(round(1000 * share))
-        spent_s = time.monotonic() - self._began_s
-        left = f" About {duration(max(spent_s * (1 / share - 1), 1.0))} left." if share > 0.1 else ""
-        self.state.setText(f"Learning the string.{left}")
+    def progress_words(self, text: str, left: str) -> str:
+        return f"Learning the string.{left and f' {left.capitalize()}.'}"
 
     def _show_learned(self, result: tuple[Any, Any]) -> None:
         from training.recording.table import as_text
@@ -243,19 +210,18 @@ class LearnDialog(GrowingDialog):
             assert learned is not None
             return keep(name, [learned], kind)
 
-        self._begin(work, self._show_kept)
+        self._work(work, self._show_kept)
 
-    def _begin(self, work: Work, then: Callable[[Any], None]) -> None:
+    def _work(self, work: Work, then: Callable[[Any], None]) -> None:
         self._pages.setEnabled(False)
         self.start.setEnabled(False)
-        self._then = then
-        self._background.start(work)
+        self.begin(work, then)
 
     def _show_kept(self, kept: object) -> None:
         self.instrument_kept.emit(kept)
         self.accept()
 
-    def _show_failure(self, message: str, _details: str) -> None:
+    def show_failure(self, message: str) -> None:
         from app.instrument.learned import Reasons
 
         if self._against is None:  # not even examined: it can only be a body
@@ -266,7 +232,7 @@ class LearnDialog(GrowingDialog):
             return
         self._show_ready(message)
 
-    def _show_cancelled(self) -> None:
+    def show_cancelled(self) -> None:
         self._show_ready("Cancelled. Learn continues there.")
 
     def _show_ready(self, words: str) -> None:
@@ -277,7 +243,7 @@ class LearnDialog(GrowingDialog):
 
     def may_close(self) -> bool:
         """Return True if nothing would be lost, or the user agrees to that."""
-        if self._background.busy and self._against is not None:
+        if self.background.busy and self._against is not None:
             question = "The string is being learned. A learning that is stopped continues the next time."
             return ask(self, "Stop learning?", question, CONTINUE, STOP) == STOP
         if self._learned is not None:
@@ -287,13 +253,13 @@ class LearnDialog(GrowingDialog):
 
     def reject(self) -> None:
         """Escape or Cancel: ends the learning under way, which can be continued; otherwise closes."""
-        if self._background.busy and self._against is not None:
-            self._background.stop()
+        if self.background.busy and self._against is not None:
+            self.background.stop()
         elif self.may_close():
             super().reject()
 
     def done(self, result: int) -> None:
         if self._pair is not None:
             self._pair.stop()
-        self._background.close()
+        self.background.close()
         super().done(result)

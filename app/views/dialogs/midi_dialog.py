@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import partial
 
 from PySide6.QtCore import QMargins, Signal
-from PySide6.QtWidgets import (
-    QComboBox,
-    QDialog,
-    QFormLayout,
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QComboBox, QDialog, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from app.shared.parameters import OF_PATCHES
+from app.patches.patch import Patch
+from app.playing.midi import MidiChoices
+from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
+from app.views.controls.form import Form
 from app.views.controls.parts import combo_box, faint, filled, label, push_button, refill, scrolled, show_kind
 from app.views.controls.plain import Label
 
@@ -43,12 +36,7 @@ OF_THE_PATCH = "It belongs to the instrument and is saved with it"
 
 
 class MidiDialog(QDialog):
-    """Gestures emit signals; `show_…` shows what became of them.
-
-    Args:
-        turned: the names of what a controller can turn, by the id of its parameter.
-        wheel: names of what the modulation wheel can turn, by field of a patch.
-    """
+    """Gestures emit signals; `show_…` shows what became of them."""
 
     port_chosen = Signal(str)  # "": none
     notes_chosen = Signal(str)
@@ -56,7 +44,7 @@ class MidiDialog(QDialog):
     forget_asked = Signal(str)
     patch_turned = Signal(str, object)  # a field of the patch, and its value
 
-    def __init__(self, names: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
@@ -64,7 +52,7 @@ class MidiDialog(QDialog):
         self._inputs = combo_box("MIDI input", [], tip=tip, picked=self.port_chosen.emit)
         tip = "Velocity always sets how hard the string is plucked"
         self._notes = combo_box("MIDI notes control", NOTE_MODES, tip=tip, picked=self.notes_chosen.emit)
-        turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
+        turnable = [(_capital(knob.name), knob.id) for knob in modulated_by("wheel")]
         self._of_patch: dict[str, QComboBox] = {}
         for field, name, entries, tip in (
             ("mode", "Channels", CHANNELS, CHANNELS_TIP),
@@ -75,71 +63,64 @@ class MidiDialog(QDialog):
             picked = partial(self.patch_turned.emit, field)
             self._of_patch[field] = combo_box(name, entries, tip=f"{tip}.\n{OF_THE_PATCH}", picked=picked)
         self._problem = label("warning", selectable=True)
-        self._turned = names
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
-        form = QFormLayout()
+        form = Form()
         for box in (self._inputs, self._notes, *self._of_patch.values()):
-            title = Label("Input" if box is self._inputs else box.accessibleName())
-            title.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
-            form.addRow(title, box)
+            form.row("Input" if box is self._inputs else box.accessibleName(), box)
         rows = QWidget()
-        rows.setLayout(self._build_rows(names))
+        rows.setLayout(self._build_rows())
         close = push_button("Close", "Close the dialog; MIDI plays on (Escape)", pressed=self.reject)
         last = filled(QHBoxLayout(), None, close)
         parts = form, self._problem, faint("CONTROLLERS"), scrolled(rows), last
         column = filled(QVBoxLayout(self), *parts, spacing=12, margins=QMargins(18, 16, 18, 16))
         column.setStretch(3, 1)
-        self.set_learnable("")
+        self.show_inputs([], "", "")
 
-    def _build_rows(self, names: Mapping[str, str]) -> QGridLayout:
+    def _build_rows(self) -> QGridLayout:
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)
-        for row, (field, name) in enumerate(names.items()):
+        for row, field in enumerate(LEARNABLE):
+            name = _learnable_name(field)
             taught = Label()
             learn = push_button("Learn", name=f"Assign a controller to {name}", checkable=True)
             forget = push_button("Forget", f"Unassign {name}", f"Unassign {name}")
             for button, signal in ((learn, self.learn_asked), (forget, self.forget_asked)):
                 button.clicked.connect(lambda _=False, signal=signal, field=field: signal.emit(field))
-            for place, widget in enumerate((Label(name[:1].upper() + name[1:]), taught, learn, forget)):
+            for place, widget in enumerate((Label(_capital(name)), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget
         return grid
 
-    def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
-        """Show the inputs that are connected, and the one that is open; `problem`: why there are none."""
+    def show_inputs(self, names: Sequence[str], open_name: str, problem: str) -> None:
+        """Show the inputs that are connected, and the one that is open; `problem`: why nothing can be, or ""."""
         none = "None" if names else "No MIDI input found"
         refill(self._inputs, [(none, ""), *((name, name) for name in names)], open_name)
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
-
-    def show_patch(self, mode: str, bend_semitones: float, bend_by: str, mod_wheel: str) -> None:
-        """Show the use that the played patch makes of channels and wheels."""
-        values = {"mode": mode, "bend_semitones": bend_semitones, "bend_by": bend_by, "mod_wheel": mod_wheel}
-        if self._of_patch["bend_semitones"].findData(bend_semitones) < 0:
-            self._of_patch["bend_semitones"].addItem(*_bend(bend_semitones))
-        for field, box in self._of_patch.items():
-            box.setCurrentIndex(max(0, box.findData(values[field])))
-
-    def set_patch_turnable(self, turnable: bool) -> None:
-        for box in self._of_patch.values():
-            box.setEnabled(turnable)
-
-    def set_learnable(self, why_not: str) -> None:
-        """Show why no controller can be assigned, with the remedy; "" where one can."""
         for field, (_, learn, _) in self._rows.items():
-            learn.setEnabled(not why_not)
-            learn.setToolTip(why_not or f"Click, then move a control to assign it to {self._turned[field]}")
+            learn.setEnabled(not problem)
+            learn.setToolTip(problem or f"Click, then move a control to assign it to {_learnable_name(field)}")
+
+    def show_patch(self, patch: Patch | None) -> None:
+        """Show the use that the played patch makes of channels and wheels; None: there is no patch."""
+        for field, box in self._of_patch.items():
+            box.setEnabled(patch is not None)
+            if patch is not None:
+                value = getattr(patch, field)
+                if field == "bend_semitones" and box.findData(value) < 0:
+                    box.addItem(*_bend(value))
+                box.setCurrentIndex(max(0, box.findData(value)))
 
     def show_problem(self, text: str) -> None:
         self._problem.setText(text)
         self._problem.setVisible(bool(text))
 
-    def show_choices(self, notes: str, controllers: Mapping[str, int], learning: str | None) -> None:
-        """Show what notes do, the numbers of controllers by field, and the field that waits for one."""
-        self._notes.setCurrentIndex(max(0, self._notes.findData(notes)))
+    def show_choices(self, choices: MidiChoices, learning: str | None) -> None:
+        """Show what notes do, the controllers, and the field that waits for one."""
+        self._notes.setCurrentIndex(max(0, self._notes.findData(choices.notes)))
         for field, (taught, learn, forget) in self._rows.items():
-            waits, number = field == learning, controllers.get(field)
+            waits, number = field == learning, choices.controllers.get(field)
             taught.setText("Move a control …" if waits else "–" if number is None else f"Controller {number}")
             show_kind(taught, "" if waits or number is not None else "faint")
             learn.setChecked(waits)
@@ -148,3 +129,12 @@ class MidiDialog(QDialog):
 
 def _bend(semitones: float) -> tuple[str, float]:
     return f"± {semitones:g} semitone{'' if semitones == 1 else 's'}", semitones
+
+
+def _learnable_name(field: str) -> str:
+    name = LEARNABLE[field].name
+    return f"instrument: {name}" if field in OF_PATCHES else name
+
+
+def _capital(name: str) -> str:
+    return name[:1].upper() + name[1:]

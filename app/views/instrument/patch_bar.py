@@ -12,20 +12,18 @@ from functools import partial
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
-    QFrame,
     QHBoxLayout,
     QLabel,
     QMenu,
     QSizePolicy,
     QToolButton,
     QVBoxLayout,
-    QWidget,
 )
 
 from app.patches.patch import Macro, Patch
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
-from app.views.controls.choosers import FilterButton, NameButton
+from app.views.controls.choosers import ChoiceBar
 from app.views.controls.knob import NARROW_WIDTH, Knob
 from app.views.controls.number_box import say_above
 from app.views.controls.overflow import Overflow
@@ -54,12 +52,9 @@ AMP = ("amp.drive_db", "amp.tone_db")
 MIXES = (*AMP, "body.mix", "room.mix", "level_db")
 
 
-class PatchBar(QFrame):
+class PatchBar(ChoiceBar):
     """Gestures emit signals; setters show what became of them."""
 
-    previous_asked = Signal()
-    next_asked = Signal()
-    browse_asked = Signal()
     save_asked = Signal()
     rename_asked = Signal()
     revert_asked = Signal()
@@ -68,16 +63,13 @@ class PatchBar(QFrame):
     recording_save_asked = Signal()  # one that is not saved yet
     recording_discard_asked = Signal()
     scala_remove_asked = Signal()  # the Scala scale and keyboard mapping of the patch
-    all_asked = Signal()  # clear the browser's filter
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
     changed = Signal(str, float)  # a field of a patch and its new value
     body_chosen = Signal(str)  # its name; "": none
-    drag_started = Signal()
-    drag_ended = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__("instrument", "No instrument")
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
         self._compact = self._tight = False
@@ -91,9 +83,6 @@ class PatchBar(QFrame):
         for number, knob in enumerate(self.macros):
             knob.value_asked.connect(partial(self.macro_turned.emit, number))
             knob.hide()
-        for knob in (*self.macros, *self.knobs.values()):
-            knob.drag_started.connect(self.drag_started)
-            knob.drag_ended.connect(self.drag_ended)
         self._before_macros = vertical_rule()
         self._before_macros.hide()
         macros = filled(QHBoxLayout(), *self.macros, spacing=0)
@@ -102,12 +91,7 @@ class PatchBar(QFrame):
         row.setStretch(0, 1)
 
     def _build_words(self) -> QVBoxLayout:
-        tip = "Previous instrument in the browser's list"
-        previous = tool_button("◀", "Previous instrument", tip, "narrow", self.previous_asked)
-        tip = "Next instrument in the browser's list"
-        following = tool_button("▶", "Next instrument", tip, "narrow", self.next_asked)
-        tip = "Browse the instruments"
-        self.name = NameButton("No instrument", tip, self.browse_asked, narrowest=NARROW_NAME, widest=320)
+        self.name.setMaximumWidth(320)
         self.category = Label(objectName="badge", toolTip="The instrument's category", visible=False)
         tip = "Save the instrument; a factory one under a name of your own"
         self.save = tool_button("Save", "Save the instrument", tip, "small", self.save_asked)
@@ -123,12 +107,11 @@ class PatchBar(QFrame):
         for button in buttons:
             button.setEnabled(False)
         above = filled(QHBoxLayout(), spacing=6)
-        filled(above, previous, self.name, following, self.category, None, *buttons, self.more)
+        filled(above, self.previous, self.name, self.following, self.category, None, *buttons, self.more)
         above.setStretchFactor(self.name, 1000)
         return filled(QVBoxLayout(), above, self._build_state(), spacing=4)
 
     def _build_state(self) -> QHBoxLayout:
-        self.filtered = FilterButton("instruments", self.all_asked)
         self.note = words_label()
         tip = "Remove the Scala tuning of the instrument"
         self.scala = tool_button("Scala  ✕", tip, kind="solo", pressed=self.scala_remove_asked, visible=False)
@@ -208,9 +191,7 @@ class PatchBar(QFrame):
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
         """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
-        mark = "●  " if changed else ""
-        self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
-        self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")
+        self.show_name(patch.name, *(("●  ", ", changed") if changed else ()))
         tip = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
         self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))
         self.category.setText(patch.category)

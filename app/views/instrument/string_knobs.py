@@ -84,8 +84,6 @@ class StringKnobs(QWidget):
 
     changed = Signal(str, object)  # a field of a patch and its new value
     figure_asked = Signal(str, float)  # a knob's field, and the figure that it is to have, in the unit that is shown
-    drag_started = Signal()
-    drag_ended = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -113,8 +111,6 @@ class StringKnobs(QWidget):
             knob = Knob(parameter, width=WIDTHS.get(parameter.id, NARROW_WIDTH), low=True)
             knob.figure_asked.connect(partial(self.figure_asked.emit, parameter.id))
             knob.value_asked.connect(partial(self._ask, parameter.id))
-            knob.drag_started.connect(self.drag_started)
-            knob.drag_ended.connect(self.drag_ended)
             self.knobs[parameter.id] = knob
             row.addWidget(knob)
         column = filled(QVBoxLayout(), spacing=0)

@@ -18,6 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from app.audio.choices import SoundChoice
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from engine.pluck import Pluck
@@ -70,7 +71,8 @@ def main(rate: str, action: str, *argument: str) -> None:
     problems: list[AudioProblem] = []
     notes(int(rate), 0)  # compiles, which may take longer than there is until the first frame
     with Sound(problems.append) as sound:
-        sound.open(buffer_s=0.1, rate_hz=int(rate))  # the computer may be busy with other tests
+        choice = SoundChoice.model_construct(rate_hz=int(rate), buffer=int(rate) // 10)
+        sound.open(sound=choice)  # the computer may be busy with other tests
         wait_until(lambda: sound.status().device is not None or problems != [])
         time.sleep(0.2)  # let the device settle
         mixer = sound.mixer

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 import app
+from app.audio.choices import DeviceChoice
 from app.audio.devices import AudioDevice, close_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
 from app.audio.problems import AudioProblem, ProblemKind
@@ -117,7 +118,7 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
     portaudio: FakeSoundDevice, mixer: Mixer, buffer_s: float, latency_s: float, block: int
 ) -> None:
     """In blocks of a quarter of its buffer, of two of its channels."""
-    wanted = find(AudioDevice("HDMI", "ALSA"))
+    wanted = find(DeviceChoice(name="HDMI", host_api="ALSA"))
     portaudio.entries.insert(0, ("Webcam", 0, 2))  # its index moves
     close_device(open_device(wanted, buffer_s, mixer))
     assert portaudio.opened == [
@@ -130,12 +131,12 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
 
 
 def test_nothing_is_looked_for_again_while_a_stream_is_open(portaudio: FakeSoundDevice, mixer: Mixer) -> None:
-    stream = open_device(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
+    stream = open_device(find(DeviceChoice(name="Speakers", host_api="ALSA")), 0.05, mixer)
     output_devices(rescan=True)
     assert portaudio.restarts == 0
     close_device(stream)
     assert portaudio.streams[0].asked == ["abort", "close"]  # though it could not stop
-    assert find(AudioDevice("Headset", "ALSA"), rescan=True).channels == 2, "it was plugged in"
+    assert find(DeviceChoice(name="Headset", host_api="ALSA"), rescan=True).channels == 2, "it was plugged in"
     assert portaudio.restarts == 1
 
 
@@ -145,7 +146,7 @@ def test_times_of_a_device_that_cannot_be_are_not_shown(
 ) -> None:
     for name in ("latency", "time", "cpu_load"):
         monkeypatch.setattr(FakeStream, name, value)
-    output = DeviceOutput(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
+    output = DeviceOutput(find(DeviceChoice(name="Speakers", host_api="ALSA")), 0.05, mixer)
     assert output.latency_s == 0.05, "as it was asked for"
     assert math.isfinite(output.now_s()) and 0 <= output.load() < math.inf
     mixer.record["dac_s"] = value
@@ -160,7 +161,7 @@ def test_an_output_plays_stalls_and_is_lost(
 ) -> None:
     clock = SimpleNamespace(now_s=100.0)
     monkeypatch.setattr("app.audio.output.time.monotonic", lambda: clock.now_s)
-    output = DeviceOutput(find(AudioDevice("Speakers", "ALSA")), 0.05, mixer)
+    output = DeviceOutput(find(DeviceChoice(name="Speakers", host_api="ALSA")), 0.05, mixer)
     (stream,) = portaudio.streams
     assert (output.latency_s, output.now_s(), output.load()) == (0.02, 3.0, 0.1)
     found = []
@@ -201,8 +202,8 @@ def opening(error: Exception) -> Callable[[FakeSoundDevice], None]:
         (opening(PortAudioError("x", -9999, (0, 0, "AUDCLNT_E_DEVICE_IN_USE"))), ProblemKind.BUSY, "in use"),
         (opening(PortAudioError("x", -9999, (0, -19, "No such device"))), ProblemKind.VANISHED, "disconnected"),
         (opening(PortAudioError("Invalid device", -9996)), ProblemKind.VANISHED, "disconnected"),
-        (opening(PortAudioError("Internal PortAudio error", -9986)), ProblemKind.OTHER, "could not be opened"),
-        (opening(ValueError("strange")), ProblemKind.OTHER, "could not be opened"),
+        (opening(PortAudioError("Internal PortAudio error", -9986)), ProblemKind.NOT_OPENED, "could not be opened"),
+        (opening(ValueError("strange")), ProblemKind.NOT_OPENED, "could not be opened"),
         (
             lambda portaudio: setattr(portaudio, "start_error", PortAudioError("busy", -9985)),
             *(ProblemKind.BUSY, "in use by another program"),
@@ -218,7 +219,7 @@ def opening(error: Exception) -> Callable[[FakeSoundDevice], None]:
 def test_a_device_that_cannot_be_opened_is_explained_and_freed(
     portaudio: FakeSoundDevice, mixer: Mixer, fault: Callable[[Any], object], kind: ProblemKind, message: str
 ) -> None:
-    wanted = find(AudioDevice("Speakers", "ALSA"))
+    wanted = find(DeviceChoice(name="Speakers", host_api="ALSA"))
     fault(portaudio)
     with pytest.raises(AudioProblem, match=message) as caught:
         DeviceOutput(wanted, 0.05, mixer)

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from app.audio import sound as sound_module
+from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
-from app.audio.problems import AudioProblem, ProblemKind, no_device, refused, vanished
-from app.audio.sound import BUFFER_S, Sound
+from app.audio.problems import AudioProblem, ProblemKind, problem, refused
+from app.audio.sound import Sound
 from engine.effects import Effects
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
@@ -62,14 +63,14 @@ class Desk:
     rescans: int = 0
     problems: list[AudioProblem] = field(default_factory=list)
 
-    def look_up(self, device: AudioDevice | None, rescan: bool) -> AudioDevice:
+    def look_up(self, device: DeviceChoice | None, rescan: bool) -> AudioDevice:
         if rescan:
             self.rescans += 1
             assert all(output.closed for output in self.outputs), "PortAudio must not start under an open stream"
         for each in self.devices:
-            if device is None or (each.name, each.host_api) == (device.name, device.host_api):
+            if device in (None, each.choice):
                 return each
-        raise no_device() if device is None else vanished(device.name)
+        raise problem(ProblemKind.VANISHED if device else ProblemKind.NO_DEVICE, device.name if device else "")
 
     def open_output(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> FakeOutput:
         assert all(output.closed for output in self.outputs), "one at a time: it might refuse to be opened twice"
@@ -111,10 +112,10 @@ def wait_for(condition: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
-def opened(sound: Sound, device: AudioDevice | None = None, **options: float) -> None:
+def opened(sound: Sound, device: AudioDevice | None = None, rescan: bool = False, **options: object) -> None:
     """Asks for a device and waits until that was obeyed or refused."""
     done = sound.status().changes_done
-    sound.open(device, **options)  # type: ignore[arg-type]
+    sound.open(device and device.choice, SoundChoice.model_validate(options), rescan)
     wait_for(lambda: sound.status().changes_done > done)
 
 
@@ -132,8 +133,8 @@ def time_goes_on(voice: Voice) -> None:
 
 def plays_on(sound: Sound, desk: Desk) -> None:
     """What is asked of it is done, and the mixer is still the device's."""
-    opened(sound, buffer_s=0.5)
-    wait_for(lambda: sound.status().latency_s == 0.5)
+    opened(sound, buffer="high")
+    wait_for(lambda: sound.status().latency_s == 0.04)
     assert sound.mixer is desk.outputs[-1].mixer and not desk.outputs[-1].closed
     voice = lasting(sound)
     assert np.abs(sound.mixer.render(4800)).max() > 0.1 and not voice.over
@@ -152,7 +153,7 @@ def test_the_systems_default_is_opened_at_its_own_rate(sound: Sound, desk: Desk)
     opened(sound)
     wait_for(lambda: sound.status().load == 0.25)
     status = sound.status()
-    assert (status.device, status.rate_hz, status.latency_s, status.problem) == (HEADPHONES, 48_000, BUFFER_S, None)
+    assert (status.device, status.rate_hz, status.latency_s, status.problem) == (HEADPHONES, 48_000, 0.012, None)
     assert sound.now_s() == 7.0 and sound.mixer is before is desk.outputs[0].mixer and desk.problems == []
     opened(sound)
     assert len(desk.outputs) == 1, "asking for what there is changes nothing"
@@ -162,9 +163,9 @@ def test_what_rings_goes_on_where_the_rate_stays(sound: Sound, desk: Desk) -> No
     desk.devices.append(AudioDevice("Monitor", "Test API", 48_000))
     opened(sound)
     voice = lasting(sound)
-    opened(sound, desk.devices[-1], buffer_s=0.03)
+    opened(sound, desk.devices[-1], buffer="high")
     assert sound.mixer.voices == [voice] and desk.outputs[0].closed
-    assert desk.outputs[1].mixer is desk.outputs[0].mixer and desk.outputs[1].latency_s == 0.03
+    assert desk.outputs[1].mixer is desk.outputs[0].mixer and desk.outputs[1].latency_s == 0.04
 
 
 def test_another_rate_has_another_mixer_with_all_that_is_set_also_while_it_is_opened(
@@ -187,10 +188,10 @@ def test_channels_rate_and_buffer_are_those_of_the_device_or_of_the_choice(sound
     desk.devices.insert(0, AudioDevice("Telephone", "Test API", 48_000, channels=1))
     opened(sound)
     assert sound.mixer.channels == 1
-    opened(sound, HEADPHONES, rate_hz=96_000, buffer_frames=480)
+    opened(sound, HEADPHONES, rate_hz=96_000, buffer=512)
     assert sound.rate_hz == 96_000
     assert desk.outputs[-1].device == replace(HEADPHONES, default_rate_hz=96_000)
-    assert desk.outputs[-1].latency_s == 0.005
+    assert desk.outputs[-1].latency_s == 512 / 96_000
 
 
 def test_a_look_for_devices_interrupts_and_takes_the_same_again(sound: Sound, desk: Desk) -> None:
@@ -231,15 +232,15 @@ def busy(device: AudioDevice) -> AudioProblem | None:
 
 
 def slow_only(device: AudioDevice) -> AudioProblem | None:
-    fast = device.default_rate_hz == 192_000
-    return refused(ValueError("Invalid sample rate"), device.name, 192_000) if fast else None
+    fast = device.default_rate_hz == 96_000
+    return refused(ValueError("Invalid sample rate"), device.name, 96_000) if fast else None
 
 
 @pytest.mark.parametrize(
     ("refuses", "device", "options", "kind", "words"),
     [
         (busy, SPEAKERS, {}, ProblemKind.BUSY, "in use by another program"),
-        (slow_only, HEADPHONES, {"rate_hz": 192_000}, ProblemKind.RATE_REFUSED, "refuses 192000 Hz"),
+        (slow_only, HEADPHONES, {"rate_hz": 96_000}, ProblemKind.RATE_REFUSED, "refuses 96000 Hz"),
         (busy, replace(HEADPHONES, name="Gone"), {}, ProblemKind.VANISHED, "disconnected"),
     ],
 )
@@ -349,7 +350,7 @@ def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(
         sound.watch(broken)
     else:
         monkeypatch.setattr(Mixer, stage, broken)
-        opened(sound, buffer_s=0.2)
+        opened(sound, buffer=2048)
     wait_for(lambda: desk.problems)
     plays_on(sound, desk)
     (problem,) = desk.problems
@@ -379,7 +380,7 @@ def test_a_fault_while_a_device_is_opened_is_reported_and_tried_again(
     with desk.sound() as sound:
         sound.open()
         wait_for(lambda: sound.status().device is not None)
-        assert desk.kinds == [ProblemKind.OTHER]
+        assert desk.kinds == [ProblemKind.UNEXPECTED]
         assert "internal error" in desk.problems[0].message and "a mistake" in desk.problems[0].detail
         plays_on(sound, desk)
 

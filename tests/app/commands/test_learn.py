@@ -22,7 +22,7 @@ from app.instrument.offline import render_note
 from app.patches.library import find_patch
 from app.shared.parameters import NOISE_DB
 from engine.presets import load_preset
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 from tests.app.commands.conftest import Run
 from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note

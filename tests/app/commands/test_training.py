@@ -20,8 +20,8 @@ import torch
 
 from engine.compare.relative import RelativeError
 from engine.presets import SHIPPED, load_preset, preset_digest
-from engine.result_file import REMEDIES
 from engine.schema import read, write
+from engine.whole_file import REMEDIES
 from tests.app.commands.conftest import CONFIGURATION, PLAN, FullDisk, Run
 from training.cell import Cell, configuration_of, load
 from training.cli import console

@@ -29,11 +29,11 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError
 from engine.resonators.sine_transform import listening_weights, project
-from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice, model_program, offline, truth_program
 from engine.voices.voice import ATTACK_S
+from engine.whole_file import WriteError
 from tests.app.sounds import export_sound, render_sound
 
 PLAIN = WavSettings("32f", fade_out_s=0)

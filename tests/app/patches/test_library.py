@@ -22,7 +22,7 @@ from app.patches.library import (
     save_patch,
 )
 from app.patches.patch import Patch
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 Make = Callable[..., Patch]
 

@@ -23,8 +23,8 @@ from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, preset_digest
-from engine.result_file import WriteError
 from engine.values.ear import Ear
+from engine.whole_file import WriteError
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 

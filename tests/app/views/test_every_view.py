@@ -71,7 +71,6 @@ from app.views.dialogs import (
     export_pages,
     help_dialog,
     learn_dialog,
-    midi_dialog,
 )
 from app.views.instrument import patch_card
 from app.views.plots import figures_table, kept_plot, legend, plots, time_plot
@@ -79,7 +78,7 @@ from app.views.plots import plot as plot_module
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
-BASES = {"ChoicesForm", "ExportPage", "GrowingDialog", "Playable", "StageView"}
+BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
@@ -124,7 +123,7 @@ def made_legend() -> QWidget:
 
 def export_at(kind: export_pages.Kind) -> Callable[[], QWidget]:
     def make() -> QWidget:
-        made = export_dialog.ExportDialog(ExportChoices(), SampledChoices())
+        made = export_dialog.ExportDialog((ExportChoices(), SampledChoices()))
         made.open_at(kind)
         return made
 
@@ -169,7 +168,7 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     focus_ring.FocusRing: with_ring,
     form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
     knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
-    choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print, 60, 200)),
+    choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print)),
     number_box.NoteBox: lambda: number_box.NoteBox("Lowest key", "The lowest"),
     notice_bar.NoticeBar: notice,
     number_box.NumberBox: lambda: number_box.NumberBox("Length", (0, 5), 1, "The length", " m", 2),
@@ -201,7 +200,6 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
         [("F1", "Help")], [("A view", "All")], Path("log"), "About"
     ),
     learn_dialog.LearnDialog: learn,
-    midi_dialog.MidiDialog: lambda: midi_dialog.MidiDialog({"position": "position"}, {"knobs.decay": "decay"}),
 }
 
 

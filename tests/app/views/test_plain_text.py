@@ -18,10 +18,10 @@ from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
+from app.views.controls.choosers import PresetBar
 from app.views.controls.elided_label import Readout
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.preset_bar import PresetBar
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
@@ -67,7 +67,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
+    dialog = ExportDialog((export, SampledChoices(folder=str(tmp_path / EVIL))))
     patch = read_patch(SHIPPED / "classical_guitar.json")
     note = heard_note(Choices(single=entry.name), Library([entry]), None)
     dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})

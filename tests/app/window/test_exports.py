@@ -119,9 +119,9 @@ def test_playing_is_recorded_as_it_is_heard_and_a_dropped_recording_changes_noth
     assert guitar.choices == before and not own_bodies().exists(), "it is neither a recipe nor a body"
     record(guitar)
     wav = dialog_of(guitar).wav
-    choose(wav.rate, 44_100)
-    choose(wav.bits, "16")
-    wav.normalise.setChecked(True)
+    choose(wav["rate_hz"], 44_100)
+    choose(wav["bits"], "16")
+    wav["normalise"].setChecked(True)
     save(guitar, tmp_path / "cd.wav")
     info = soundfile.info(tmp_path / "cd.wav")
     assert (info.samplerate, info.subtype) == (44_100, "PCM_16")
@@ -379,10 +379,10 @@ def test_the_patch_is_exported_for_samplers_while_the_window_plays_and_choices_a
         zone.stem for zone in SampledPlan(short.patch, (60, 61), layers=1).zones
     ]
     assert soundfile.info(samples[0]).frames == 9_600
-    dialog.sampler.layers.setValue(7)
+    dialog.sampler["layers"].setValue(7)
     assert short.controller.settings().sampled.layers == 7, "should the process be killed now"
     dialog.close()
-    assert open_sampler(short).sampler.layers.value() == 7
+    assert open_sampler(short).sampler["layers"].value() == 7
     short.close()
     remembered = load_settings(tmp_path / "settings.json")[0].sampled
     assert (remembered.layers, remembered.keys, remembered.folder) == (7, (60, 61), str(tmp_path))

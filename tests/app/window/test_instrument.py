@@ -317,9 +317,9 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_
     assert bar.filtered.isVisible() and bar.filtered.text() == f"{len(browser.listed)} of {browser.total}  ✕"
     bar.filtered.click()
     assert not bar.filtered.isVisible() and len(browser.listed) == browser.total
-    bar.next_asked.emit()
+    bar.step_asked.emit(1)
     assert guitar.patch.name != "Mandolin"
-    bar.previous_asked.emit()
+    bar.step_asked.emit(-1)
     patches.change("knobs.decay", 3.0)
     changed = guitar.patch
     guitar.session.play_string()

@@ -492,7 +492,7 @@ def test_a_note_is_in_the_mixer_before_the_window_knows_and_rings_on_at_another_
     w.wait(lambda: (w.choices.position, w.choices.amplitude_mm) == (0.6, 5.0))
     w.wait(lambda: w.performance.moving and bool(w.notes.latencies_s))
     devices.append(AudioDevice("Other", "Test API", 44_100))
-    w.controller.sound.open(devices[-1])
+    w.controller.sound.open(devices[-1].choice)
     w.wait(lambda: w.controller.sound.mixer is not mixer and w.struck[-1].mixer is w.controller.sound.mixer)
     here_s = w.performance.position_s
     assert here_s > 0

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED as PATCHES
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
+from app.views.background import Background
 from app.views.look import Look
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
@@ -124,7 +124,8 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
 class Desk:
     """What is to be remembered of one instance; the test says when it looks."""
 
-    def __init__(self, path: Path, owner: QObject) -> None:
+    def __init__(self, qtbot: QtBot, path: Path, owner: QObject) -> None:
+        self.qtbot = qtbot
         self.now, self.failed = load_settings(path)[0], list[str]()
         self.keeper = SettingsSaver(path, self.now, lambda: self.now, owner)
         self.keeper.failed.connect(self.failed.append)
@@ -135,16 +136,15 @@ class Desk:
 
     def look(self) -> None:
         self.keeper.look()
-        for thread in threading.enumerate():
-            if thread.name == "settings":
-                thread.join()
+        (background,) = self.keeper.findChildren(Background)
+        self.qtbot.waitUntil(lambda: not background.busy)
 
 
 def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner, path, folder = QObject(), tmp_path / "settings.json", tmp_path / "folder"
-    desk = Desk(path, owner)
+    desk = Desk(qtbot, path, owner)
     desk.place(0.41)
     for written in (False, True):  # it may be under way
         desk.look()
@@ -155,7 +155,7 @@ def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(
     desk.keeper.close()
     assert path.stat().st_mtime_ns == before, "nothing new, nothing written"
     folder.write_text("in the way, as a full disk is for a moment")
-    desk = Desk(folder / "settings.json", owner)
+    desk = Desk(qtbot, folder / "settings.json", owner)
     for position in (0.42, 0.43):
         desk.place(position)
         desk.look()

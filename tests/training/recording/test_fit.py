@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.result_file import WriteError
 from engine.schema import SchemaError
+from engine.whole_file import WriteError
 from tests.training.recording.synthetic import figures_at_rest, modelled_note
 from training.recording.fit import LearnedNote, fit_note, fit_takes
 from training.recording.report import errors_of

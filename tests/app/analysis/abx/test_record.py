@@ -13,8 +13,8 @@ from app.analysis.abx.record import AbxRecord, material_of, p_text, save_record
 from app.presets.library import list_presets
 from app.session.choices import Choices
 from app.session.slots import sound_of
-from engine.result_file import WriteError
 from engine.values.string import StringParameters
+from engine.whole_file import WriteError
 
 
 def read(path: Path) -> AbxRecord:

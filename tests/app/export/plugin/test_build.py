@@ -20,7 +20,7 @@ from app.export.plugin.image import Image, image_of
 from app.export.plugin.objects import ObjectError, digest, objects_of, reason_of
 from engine.kernels import cache as kernel_cache
 from engine.python_process import python_command, python_environment
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 from tests.app.export.plugin import lv2_host
 from tests.app.export.plugin.host import Browser, Library
 from tests.app.export.plugin.pieces import LEARNED, patch_of, preset_of

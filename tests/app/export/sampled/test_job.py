@@ -13,7 +13,7 @@ from app.export.sampled.plan import SampledPlan
 from app.export.wav import quantised
 from app.patches.patch import Patch
 from app.shared.worker import Cancelled
-from engine.result_file import WriteError
+from engine.whole_file import WriteError
 
 Render = Callable[..., np.ndarray]
 KINDS = pytest.mark.parametrize("kind", ["sfz", "sf2"])

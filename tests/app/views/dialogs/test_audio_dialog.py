@@ -8,13 +8,16 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
-from app.views.dialogs.audio_dialog import AudioDialog, AudioState
+from app.audio.devices import AudioDevice
+from app.audio.sound import SoundStatus
+from app.views.dialogs.audio_dialog import AudioDialog
+from engine.voices import Gap
 from tests.app.gestures import named, reported
 
 LOUD, SOFT = DeviceChoice(name="Loud", host_api="ALSA"), DeviceChoice(name="Soft", host_api="JACK")
-GAPS = ("1.2 s: device", "3.4 s: rendering", "5.6 s: runaway")
-PLAYING = AudioState("“Loud” (ALSA)", "48 kHz, buffer 12 ms", "", GAPS, 0.254)
-SILENT = AudioState("", "", "It is in use by another program.", (), 0.0)
+GAPS = {"1.2 s: device": Gap(1.2, "device", 1.0), "5.6 s: runaway": Gap(5.6, "runaway", 1.0)}
+PLAYING = SoundStatus(AudioDevice("Loud", "ALSA", 48_000), 48_000, 0.012, tuple(GAPS.values()), 0.254)
+SILENT = SoundStatus(problem="It is in use by another program.")
 
 
 @pytest.fixture
@@ -48,17 +51,17 @@ def test_what_is_chosen_is_shown_and_asked_for(qtbot: QtBot, dialog: AudioDialog
 
 
 def test_the_state_is_shown_with_a_way_to_try_again_and_tones_and_counters(qtbot: QtBot, dialog: AudioDialog) -> None:
-    dialog.show_state(PLAYING)
-    for words in ("“Loud” (ALSA)", "buffer 12 ms", "3, the last at 5.6 s: runaway", "25 %"):
+    dialog.show_status(PLAYING)
+    for words in ("“Loud” (ALSA)", "buffer 12 ms", "2, the last at 5.6 s: runaway", "25 %"):
         assert words in shown(dialog)
-    gaps = next(each for each in dialog.findChildren(QLabel) if each.text().startswith("3, the last"))
+    gaps = next(each for each in dialog.findChildren(QLabel) if each.text().startswith("2, the last"))
     assert all(gap in gaps.toolTip() for gap in GAPS)
-    asked = reported(dialog.tone_asked, dialog.gaps_reset, dialog.rescan_asked)
+    asked = reported(dialog.tone_asked, dialog.rescan_asked)
     for text in ("Right", "Reset", "Rescan"):
         named(dialog, text, QPushButton).click()
-    assert asked == ["right", (), ()]
-    dialog.show_state(SILENT)
+    assert asked == ["right", ()] and gaps.text() == "0"
+    dialog.show_status(SILENT)
     for words in ("No audio output", "in use by another program"):
         assert words in shown(dialog)
-    assert (gaps.text(), GAPS[0] in gaps.toolTip()) == ("0", False)
+    assert (gaps.text(), "device" in gaps.toolTip()) == ("0", False)
     assert not named(dialog, "Left", QPushButton).isEnabled()

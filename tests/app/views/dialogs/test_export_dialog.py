@@ -56,7 +56,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
 
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
-        dialog = ExportDialog(ExportChoices.model_validate(settings), SampledChoices())
+        dialog = ExportDialog((ExportChoices.model_validate(settings), SampledChoices()))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         dialog.show_subjects({"note": note(heard or {})})
@@ -110,20 +110,20 @@ def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made, tmp_pa
     with soundfile.SoundFile(tmp_path / names[0]) as file:
         recipe = json.loads(file.comment)
         assert (file.channels, recipe["listen_right"], recipe["pickup"]) == (2, 0.7, "velocity")
-    dialog.note.source.setCurrentIndex(0)
+    dialog.note["source"].setCurrentIndex(0)
     assert dialog.note.names.isHidden()
 
 
 def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made({"until_decayed": True, "decay_db": 100, "longest_s": 0.3})
-    assert dialog.note.decay.isVisible()
-    assert not dialog.note.seconds.isVisible()
+    assert dialog.note["decay_db"].isVisible()
+    assert not dialog.note["seconds"].isVisible()
     run(qtbot, dialog, "Not decayed at the maximum length")
     assert soundfile.info(tmp_path / "A small string B3 medium.wav").frames == 1200
 
 
 def test_what_a_rate_means_is_reported(dialog: ExportDialog) -> None:
-    rate = dialog.wav.rate
+    rate = dialog.wav["rate_hz"]
     rate.setCurrentIndex(rate.findData(96_000))
     assert dialog.wav.note.text() == "adds no bandwidth: the model ends at 2 kHz"
 
@@ -137,7 +137,7 @@ def test_a_folder_that_is_not_there_is_reported(qtbot: QtBot, dialog: ExportDial
 
 
 def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
-    dialog.note.seconds.setValue(600)
+    dialog.note["seconds"].setValue(600)
     dialog.save.click()
     assert dialog.close_button.text() == "Cancel"
     for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):
@@ -152,13 +152,13 @@ def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Pat
 
 def test_its_state_is_remembered(made, tmp_path: Path) -> None:
     dialog = made()
-    dialog.note.source.setCurrentIndex(dialog.note.source.findData("difference"))
-    dialog.note.gain.setValue(30)
+    dialog.note["source"].setCurrentIndex(dialog.note["source"].findData("difference"))
+    dialog.note["difference_gain_db"].setValue(30)
     assert "difference.wav" in dialog.note.file.edit.text()
-    choices = dialog.choices()
+    choices, _ = dialog.choices()
     assert (choices.source, choices.folder, choices.seconds) == ("difference", str(tmp_path), 0.5)
     assert choices.difference_gain_db == 30
-    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices() == choices
+    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices()[0] == choices
 
 
 @pytest.mark.parametrize(
@@ -177,10 +177,10 @@ def test_what_is_heard_is_offered_first(
     made, remembered: dict[str, object], heard: dict[str, object], source: str, preset: str
 ) -> None:
     page = made(remembered, heard).note
-    assert page.source.currentData() == source
+    assert page["source"].currentData() == source
     assert path_of(page.job().sound.preset).stem == preset
     if "solo" in heard:
-        assert (page.gain.isVisible(), page.gain.value()) == (True, 36)
+        assert (page["difference_gain_db"].isVisible(), page["difference_gain_db"].value()) == (True, 36)
         assert "All modes" in page.what.text()
 
 
@@ -189,7 +189,7 @@ def test_a_name_without_its_suffix_gets_it(made) -> None:
     dialog.note.file.edit.clear()
     QTest.keyClicks(dialog.note.file.edit, "guitar v1.2")
     assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2 model.wav", "guitar v1.2 truth.wav"]
-    dialog.note.source.setCurrentIndex(0)
+    dialog.note["source"].setCurrentIndex(0)
     assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2.wav"]
 
 
@@ -214,7 +214,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices().model_dump(), {"instrument": GUITAR})
+    again = made(dialog.choices()[0].model_dump(), {"instrument": GUITAR})
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
@@ -236,7 +236,7 @@ def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made) -> None:
     dialog, other = made(), made.note({"amplitude_mm": 0.01, "heard": "b"})
     dialog.show_subjects({"note": other})
     assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
-    dialog.note.seconds.setValue(600)
+    dialog.note["seconds"].setValue(600)
     dialog.save.click()
     dialog.show_subjects({"note": made.note({})})
     dialog.close_button.click()
@@ -249,7 +249,7 @@ def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplica
     sheet, font = qapp.styleSheet(), qapp.font()
     try:
         theme.apply_theme(qapp, "dark", 150)
-        dialog = made(None, {"instrument": read_patch(PATCHES / "concert_harp.json"), "preset": "studio_any_string"})
+        dialog = made(None, {"instrument": read_patch(PATCHES / "concert_harp.json")})
         texts = [dialog.note.what, dialog.note.through_words]
         for long in (False, True):  # as it opens, and as a text changes
             if long:

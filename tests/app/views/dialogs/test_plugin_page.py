@@ -53,7 +53,7 @@ def dialog(
     monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
     monkeypatch.setattr("app.export.plugin.image.image_of", lambda patch, preset: patch.name)
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
-    made = ExportDialog(ExportChoices(), SampledChoices())
+    made = ExportDialog((ExportChoices(), SampledChoices()))
     qtbot.addWidget(made)
     preset = list_presets(preset_folder)[0][0]
     made.show_subjects({"plugin": HeardInstrument(find_patch("Classical guitar").patch, preset)})
@@ -65,8 +65,8 @@ def dialog(
 
 def choose(dialog: ExportDialog, form: str, system: str) -> None:
     page = dialog.plugin
-    page.form.setCurrentIndex(page.form.findData(form))
-    page.system.setCurrentIndex(page.system.findData(system))
+    page["form"].setCurrentIndex(page["form"].findData(form))
+    page["system"].setCurrentIndex(page["system"].findData(system))
 
 
 def test_it_suggests_the_place_where_hosts_look(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:

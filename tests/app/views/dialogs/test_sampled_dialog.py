@@ -81,7 +81,7 @@ def made(
 
     def make(**choices: object) -> ExportDialog:
         remembered = SampledChoices.model_validate({"folder": str(folder), **SMALL, **choices})
-        dialog = ExportDialog(ExportChoices(), remembered)
+        dialog = ExportDialog((ExportChoices(), remembered))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         show(dialog, patch, preset)
@@ -136,19 +136,19 @@ def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
 ) -> None:
     dialog = made()
     form = dialog.sampler
-    form.layers.setValue(8)
+    form["layers"].setValue(8)
     says(qtbot, dialog, "24 samples (3 keys, 8 velocity layers)")
-    form.every.setValue(3)
+    form["every"].setValue(3)
     says(qtbot, dialog, "8 samples (1 key, each for 3 keys, 8 velocity layers)")
-    for box, value in ((form.highest, 60), (form.every, 1), (form.layers, 1), (form.seconds, 10)):
+    for box, value in ((form.highest, 60), (form["every"], 1), (form["layers"], 1), (form["seconds"], 10)):
         box.setValue(value)
     counted = "1 sample (1 key, 1 velocity layer)"
     pitch = pitch_words(SampledPlan(patch, (60, 60), layers=1).pitch_error_cents)
     says(qtbot, dialog, f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}")
-    form.form.setCurrentIndex(form.form.findData("sf2"))
+    form["form"].setCurrentIndex(form["form"].findData("sf2"))
     said = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
     says(qtbot, dialog, f"{said}; {pitch}")
-    assert not form.bits.isVisible()
+    assert not form["bits"].isVisible()
     dialog.close_button.click()
     assert not dialog.isVisible()
     assert list(folder.iterdir()) == [] and notes.rendered == []
@@ -163,7 +163,7 @@ def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch)
     assert patch.room.mix > 0
     dialog = made(keys=(60, 60), layers=1)
     run(qtbot, dialog, "Dry leaves the room to the sampler")
-    dialog.sampler.dry.setChecked(True)
+    dialog.sampler["dry"].setChecked(True)
     run(qtbot, dialog, "1 sample, ")
     assert "the room" not in dialog.state.text()
     assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
@@ -207,7 +207,7 @@ def test_what_the_choices_mean_is_computed_once_they_settle(
         export_pages, "planned", lambda plan, out: computed.append(len(plan.zones)) or planned(plan, out)
     )
     for layers in (3, 4, 5):
-        dialog.sampler.layers.setValue(layers)
+        dialog.sampler["layers"].setValue(layers)
         show(dialog, patch.with_value("knobs.decay", layers), preset)
     says(qtbot, dialog, "15 samples")
     assert computed == [15]
@@ -232,7 +232,7 @@ def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, fol
 
 def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes: Notes) -> None:
     dialog = made()
-    dialog.sampler.layers.setValue(1)
+    dialog.sampler["layers"].setValue(1)
     run(qtbot, dialog, "Saved")
     assert len(notes.rendered) == 3
     dialog.sampler.lowest.setValue(63)  # above the highest
@@ -247,7 +247,10 @@ def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes
         (lambda form, folder: form.lowest.setValue(63), "the lowest is above the highest"),
         (lambda form, folder: edit(form, ""), "choose where"),
         (lambda form, folder: edit(form, str(folder / "nowhere" / "x.sfz")), "make the folder first"),
-        (lambda form, folder: (form.form.setCurrentIndex(2), form.rate.setCurrentIndex(2)), "a SoundFont's rate"),
+        (
+            lambda form, folder: (form["form"].setCurrentIndex(2), form["rate_hz"].setCurrentIndex(2)),
+            "a SoundFont's rate",
+        ),
     ],
 )
 def test_what_cannot_be_is_reported_before_it_begins(
@@ -260,7 +263,7 @@ def test_what_cannot_be_is_reported_before_it_begins(
     assert not dialog.save.isEnabled()
     assert dialog.sampler.size_text.text() == ""
     edit(dialog.sampler, str(folder / f"y{dialog.sampler.file.suffix}"))
-    dialog.sampler.rate.setCurrentIndex(1)
+    dialog.sampler["rate_hz"].setCurrentIndex(1)
     dialog.sampler.lowest.setValue(60)
     qtbot.waitUntil(dialog.save.isEnabled)
 
@@ -299,19 +302,24 @@ def test_a_preset_that_cannot_be_read_ends_the_work(
 def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
     dialog = made()
     form = dialog.sampler
-    for box, data in ((form.form, "wav"), (form.bits, "16"), (form.rate, 44_100), (form.source, "truth")):
+    for box, data in (
+        (form["form"], "wav"),
+        (form["bits"], "16"),
+        (form["rate_hz"], 44_100),
+        (form["source"], "truth"),
+    ):
         box.setCurrentIndex(box.findData(data))
-    form.every.setValue(2)
-    form.dry.setChecked(True)
-    choices = dialog.sampled_choices()
+    form["every"].setValue(2)
+    form["dry"].setChecked(True)
+    choices = dialog.choices()[1]
     assert choices == SampledChoices(
         folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
     )
-    assert made(**choices.model_dump()).sampled_choices() == choices
+    assert made(**choices.model_dump()).choices()[1] == choices
     whole = made(keys=None)
     assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == patch.range
-    assert whole.sampled_choices().keys is None
-    assert made(keys=(0, 127)).sampled_choices().keys is None  # not of this patch
+    assert whole.choices()[1].keys is None
+    assert made(keys=(0, 127)).choices()[1].keys is None  # not of this patch
 
 
 def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
@@ -322,11 +330,11 @@ def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
     show(dialog, other, preset)
     assert dialog.sampler.file.path == folder / "Concert_harp.sfz"
     assert dialog.sampler.what.text().startswith("Concert harp")
-    assert dialog.sampled_choices().keys == (60, 62)
+    assert dialog.choices()[1].keys == (60, 62)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *words: (str(folder / "mine"), words[-1]))
     dialog.sampler.file.browse()
     assert dialog.sampler.file.path == folder / "mine.sfz"
-    dialog.sampler.form.setCurrentIndex(2)
+    dialog.sampler["form"].setCurrentIndex(2)
     assert dialog.sampler.file.path == folder / "mine.sf2"
     show(dialog, patch, preset)
     assert dialog.sampler.file.path == folder / "mine.sf2"

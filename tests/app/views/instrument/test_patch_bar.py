@@ -28,8 +28,8 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
 @pytest.mark.parametrize(
     ("name", "signal"),
     [
-        ("Previous instrument", "previous_asked"),
-        ("Next instrument", "next_asked"),
+        ("Previous instrument", "step_asked"),
+        ("Next instrument", "step_asked"),
         ("Instrument: Classical guitar, changed", "browse_asked"),
         ("Save the instrument", "save_asked"),
         ("Rename the instrument", "rename_asked"),
@@ -41,7 +41,7 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
 def test_each_button_asks(qtbot: QtBot, bar: PatchBar, name: str, signal: str) -> None:
     asked = reported(getattr(bar, signal))
     qtbot.mouseClick(named(bar, name, QAbstractButton), LEFT)
-    assert asked == [1 if signal == "octave_asked" else ()]
+    assert asked == [{"Previous instrument": -1, "Next instrument": 1, "Octave up": 1}.get(name, ())]
 
 
 def test_it_says_whether_it_was_changed_and_whose_it_is(bar: PatchBar, guitar: Patch) -> None:

@@ -95,6 +95,7 @@ def test_every_panel_of_the_decks_is_reached_and_operated_by_the_keyboard_alone(
         for kind in kinds:
             panel = deck.currentWidget()
             assert isinstance(panel, kind) and panel.isVisible()
+            lab.wait(lambda: not panel.background.busy)  # noqa: B023 - what is computed may bring or bar a control
             controls = [each for each in focusable(panel) if not by_arrows(each)]
             met = set[QWidget]()
             while not met or panel.isAncestorOf(lab.window.focusWidget()):
