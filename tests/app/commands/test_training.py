@@ -26,7 +26,6 @@ from tests.app.commands.conftest import CONFIGURATION, PLAN, FullDisk, Run
 from training.cell import Cell, configuration_of, load
 from training.cli import console
 from training.cli.sweep import Shown
-from training.cli.training import known_errors
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import FitProgress
@@ -85,13 +84,6 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run: Run, tiny_run
     assert "was trained with other settings; delete it" in run(*train(tiny_run, "a")).failure
     if not torch.cuda.is_available():
         assert "no CUDA device can be used here" in run(*train(tiny_run, "b"), "--device", "cuda").failure
-
-
-def test_known_errors_are_the_papers_and_the_projects() -> None:
-    koopman = known_errors(load("nylon_nonlinear_noise_4k_koopman_400"))
-    assert koopman["paper"] == (0.0036, 0.0353) and koopman["project"][0] < 0.0045
-    assert set(known_errors(load("nylon_nonlinear_noise_4k_koopman_integrated_400_blind"))) == {"project"}
-    assert known_errors(load("studio_nylon_b3")) == {}  # data of its own
 
 
 def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(

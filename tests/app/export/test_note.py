@@ -10,7 +10,7 @@ import pytest
 import soundfile
 
 from app.export.choices import ExportChoices
-from app.export.note import ExportedPluck, HeardNote, NoteExport, musical_name
+from app.export.note import ExportedPluck, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
 from app.export.sound import SoundRequest
 from app.export.struck import Struck
@@ -88,19 +88,6 @@ def test_a_room_rings_out_after_the_string() -> None:
     assert not dry[-silence:].any()
     assert len(tail) == round(effects.tail_s(48_000) * 48_000) and np.abs(tail[:4_800]).max() > 1e-4
     assert np.abs(tail[-4_800:]).max() < 0.01 * np.abs(wet).max()
-
-
-@pytest.mark.parametrize(
-    ("source", "another", "last", "chosen"),
-    [
-        ("truth", False, "model", "truth"),
-        ("model", False, "files", "files"),
-        ("difference", False, "files", "difference"),
-        ("model", True, "files", "model"),
-    ],
-)
-def test_what_is_heard_is_saved_and_both_again(source: str, another: bool, last: str, chosen: str) -> None:
-    assert HeardNote(a_note(), source, another, 20.0, "").chosen(last) == chosen  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

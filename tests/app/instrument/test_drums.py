@@ -157,11 +157,6 @@ def test_the_kernel_strikes_as_the_engine_does_at_any_place() -> None:
     assert np.isfinite(speeds((2.0, 2.0))).all(), "beyond the rim it is the nearest place"
 
 
-def test_every_pad_has_a_drum() -> None:
-    keys = DrumKeys(KIT, Ear((0.5,)))
-    assert [key for key in range(128) if keys.of_key(key) is not None] == list(range(36, 52))
-
-
 def test_the_pitch_drop_follows_velocity() -> None:
     """At the hardest between published ones of toms: almost 8 %, or 133 cents, and 160 cents (`docs/drums.md`)."""
     found = drum_of(TOM, 47)

@@ -29,7 +29,6 @@ from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
 from app.playing.sources import Sources
-from app.rendering import RenderRequest
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
@@ -552,26 +551,3 @@ def test_a_report_that_fails_stops_nothing(lab: Lab, monkeypatch: pytest.MonkeyP
 
 
 SOURCES = ("model", "truth", "preset:b")
-PLUCK = RenderRequest(Path("a"), Pluck(), 2.0, Ear((0.4,)), others=(Path("b.safetensors"),))
-
-
-def test_a_source_belongs_to_its_preset() -> None:
-    note = PluckVoices(PLUCK, SOURCES)
-    assert [note.subject(source) for source in SOURCES] == [Path("a"), Path("a"), Path("b.safetensors")]
-
-
-@pytest.mark.parametrize(
-    ("changes", "same"),
-    [
-        ({"seconds": 5.0}, True),
-        ({"speed": 0.5}, True),
-        ({"pluck": Pluck(0.5)}, False),
-        ({"preset": Path("c")}, False),
-        ({"ear": Ear((0.4,), "velocity")}, False),
-        ({"others": (Path("elsewhere/b.safetensors"),)}, False),
-    ],
-)
-def test_levels_depend_on_all_that_is_heard(changes: dict[str, object], same: bool) -> None:
-    other = replace(PLUCK, **changes)  # type: ignore[arg-type]
-    assert (PluckVoices(other, SOURCES).matching_key == PluckVoices(PLUCK, SOURCES).matching_key) == same
-    assert PluckVoices(PLUCK, SOURCES[:2]).matching_key != PluckVoices(PLUCK, SOURCES).matching_key

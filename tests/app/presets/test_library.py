@@ -16,7 +16,7 @@ from app.export.choices import ExportChoices
 from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
 from app.presets.install import install_preset
-from app.presets.library import Library, PresetEntry, display_title, list_presets
+from app.presets.library import Library, PresetEntry, list_presets
 from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
@@ -186,22 +186,6 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
 def entry(**changes: object) -> PresetEntry:
     (one, *_), _ = list_presets()
     return replace(one, name=str(changes.pop("name", one.name)), info=replace(one.info, **changes))  # type: ignore[arg-type]
-
-
-def test_a_preset_of_the_tables_is_titled_by_its_facts_and_any_other_by_its_file() -> None:
-    info = entry(
-        title="old", model="lru", rate_hz=4000, tension_modulated=True, initial="noise", horizon_steps=400
-    ).info
-    assert display_title("nylon_nonlinear_noise_4k_lru_400", info) == (
-        "Nylon B3, random shapes, 4 kHz — LRU, trained on 100 ms"
-    )
-    for name in (
-        "nylon_nonlinear_noise_4k_s5_400",
-        "nylon_nonlinear_noise_4k_lru",
-        "mine",
-        "nylon_linear_noise_4k_x",
-    ):
-        assert display_title(name, info) == "old", name
 
 
 def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first() -> None:

@@ -8,7 +8,7 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication, QCheckBox, QInputDialog, QLineEdit
+from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
@@ -68,16 +68,6 @@ def test_the_choice_is_put_on_and_a_checked_box_has_a_tick_that_is_seen(qtbot: Q
         assert QColor(chosen.background).rgb() in seen  # and the tick stands out from it
         box.setChecked(False)
         assert picture(box) != image
-
-
-def test_a_question_for_a_name_has_room_for_one(qtbot: QtBot, own_look: QApplication) -> None:
-    theme.apply_theme(own_look, "dark")
-    dialog = QInputDialog()
-    qtbot.addWidget(dialog)
-    dialog.setTextValue("Steel-string acoustic, felt, tuned to D")
-    dialog.show()
-    field = dialog.findChild(QLineEdit)
-    assert field.fontMetrics().horizontalAdvance(field.text()) < field.width()
 
 
 def test_plots_take_on_another_theme_and_come_back(

@@ -283,21 +283,6 @@ def test_one_picture_is_shown_at_a_time_by_turns_and_fewer_while_nothing_moves(
     lab.wait(idle)
 
 
-def test_only_changes_of_the_sound_are_reported_to_the_notes(lab: Window, monkeypatch: pytest.MonkeyPatch) -> None:
-    lab.wait_for_take()
-    reported: list[object] = []
-    monkeypatch.setattr(lab.notes, "set_monitor", lambda monitor, compared: reported.append((monitor, compared)))
-    monkeypatch.setattr(lab.notes, "listen", reported.append)
-    lab.change(left_view="waveform", speed=0.1, position=0.4)
-    assert reported == []
-    lab.change(heard="b")
-    heard = lab.choices
-    lab.change(listen=0.2)
-    ear = lab.choices.ear
-    lab.change(face="play")
-    assert reported == [(heard, True), ear, (lab.choices, False)]
-
-
 def test_a_window_without_device_or_with_faults_says_so_and_continues(
     lab: Window, opened: Open, preset_folder: Path, tmp_path: Path
 ) -> None:

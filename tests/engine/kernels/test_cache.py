@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from engine import warm
 
 # no folder but the temporary one can be written, as of a program in a read-only image without a home
@@ -64,34 +62,6 @@ def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_no
 def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
     code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
     assert reported(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
-
-
-@pytest.mark.parametrize("whole", [True, False])
-def test_all_is_compiled_once_by_two_processes(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    done: list[str] = []
-    monkeypatch.setattr("engine.kernels.cache.is_whole", lambda: whole)
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    monkeypatch.setattr("subprocess.Popen", Beside(done))
-    for name in ("engine.warm.models", "engine.warm.unheard", "engine.warm.voices", "engine.kernels.cache.set_whole"):
-        monkeypatch.setattr(name, lambda name=name: done.append(name.rpartition(".")[2]))
-    warm.warm()
-    assert done == ([] if whole else ["playing", "models", "unheard", "waited", "voices", "set_whole"])
-
-
-class Beside:
-    """A process that notes the work that it is given, and that somebody waits for it."""
-
-    def __init__(self, done: list[str]) -> None:
-        self.done = done
-
-    def __call__(self, command: list[str], **_: object) -> Beside:
-        self.done.append(command[-1].rpartition(".")[2].removesuffix("()"))
-        return self
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, *_: object) -> None:
-        self.done.append("waited")
 
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numba
-import pytest
 from numba import njit
-from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
-from numba.core.types.misc import unliteral
 
 from engine.kernels import numba_internals
 from engine.kernels.compiled import COMPILED
@@ -25,20 +19,6 @@ READ = "read engine/kernels/numba_internals.py beside its source"
 def test_the_version_is_the_one_that_was_read() -> None:
     installed = ".".join(numba.__version__.split(".")[:2])
     assert installed == numba_internals.VERSION, f"Numba is {numba.__version__}: {READ}, then raise VERSION"
-
-
-@pytest.mark.parametrize(
-    ("replaced", "parameters"),
-    [
-        (CPUCodeLibrary._optimize_functions, ["self", "ll_module"]),
-        (CPUCodeLibrary.finalize, ["self"]),
-        (JITCodeLibrary.get_pointer_to_function, ["self", "name"]),
-        (JITCPUCodegen.set_env, ["self", "env_name", "env"]),
-        (unliteral, ["lit_type"]),
-    ],
-)
-def test_what_is_replaced_is_called_as_it_was(replaced: Callable[..., Any], parameters: list[str]) -> None:
-    assert list(inspect.signature(replaced).parameters) == parameters, f"{replaced.__qualname__}: {READ}"
 
 
 def test_a_function_is_compiled_once_for_all_numbers_that_calls_state() -> None:

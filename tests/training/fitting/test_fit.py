@@ -20,7 +20,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Diverged, FitProgress, Seed, fit_seeds, horizon_at, learning_rate_at
+from training.fitting.fit import Diverged, FitProgress, Seed, fit_seeds
 from training.fitting.losses import training_loss
 from training.fitting.start import new_model
 
@@ -242,20 +242,6 @@ def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
     assert isinstance(found.model, DMD)
     assert len(seen) == 1 and seen[0].validation == found.validation.total()
     assert found.validation.total().rel_mae < 0.3  # 10 ms of a string that is nearly linear
-
-
-def test_learning_rates_follow_the_recipe() -> None:
-    cycle = Recipe(epochs=1, peak_learning_rate=1.0, start_share=0.1, warm_up=0.25)
-    assert [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)] == pytest.approx(
-        [0.1, 0.55, 1, 0.5, 0]
-    )
-    assert learning_rate_at(Recipe(epochs=1, schedule="constant", peak_learning_rate=3e-3), 0.9) == 3e-3
-
-
-def test_the_horizon_grows_geometrically() -> None:
-    recipe = Recipe(epochs=1, first_horizon=100, grow_until=0.5)
-    assert [horizon_at(recipe, share, 1600) for share in (0, 0.125, 0.25, 0.5, 0.9)] == [100, 200, 400, 1600, 1600]
-    assert horizon_at(recipe, 0, 40) == 40
 
 
 class Shifted(torch.nn.Module):

@@ -45,10 +45,3 @@ def test_engine_and_training_alone_sweep(tmp_path: Path) -> None:
     assert {(row.status, row.device, row.commit) for row in rows} == {("done", "cpu", "abc")}
     assert {row.string for row in rows} == {"linear", "nonlinear"}
     assert all(row.hardware and row.torch for row in rows)
-
-
-def test_the_script_names_what_it_installs_and_a_plan_that_there_is() -> None:
-    script = (CODE / "training" / "sweeping" / "piece.sh").read_text(encoding="utf-8")
-    assert 'packages="numba numpy pydantic safetensors typer"' in script
-    assert (CODE / "training" / "sweeping" / "plans" / "published.toml").is_file()
-    assert "published --device cuda --minutes 9" in script

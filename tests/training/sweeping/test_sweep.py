@@ -18,10 +18,10 @@ from filelock import FileLock
 from engine.schema import SchemaError, read, write
 from tests.training.sweeping.conftest import plan_in, row_of
 from training.fitting.fit import FitProgress
-from training.results import RESULTS, Row, add_rows, read_results
+from training.results import Row, add_rows, read_results
 from training.sweeping.plan import Plan
 from training.sweeping.processes import Layout, fitted, process_workers
-from training.sweeping.sweep import Options, Watch, is_finished, results_of, sweep, unfinished
+from training.sweeping.sweep import Options, Watch, is_finished, sweep, unfinished
 from training.sweeping.task import Task, TaskRun, Workers, WorkersError, perform
 
 MEASURED = [name for name in Row.__dataclass_fields__ if name not in ("seconds", "finished", "commit")]
@@ -206,15 +206,6 @@ def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(pl
     with pytest.raises(SchemaError, match="not an ordinary file"):
         sweep(plan(), workers, options, Mock())
     assert workers.started == []
-
-
-def test_trials_are_kept_apart(plan, tmp_path: Path) -> None:
-    options, trial = Options(runs=tmp_path), plan()
-    for made, results, group in (
-        (trial, tmp_path / "trial" / "results.csv", "trial"),
-        (replace(trial, trial=False), RESULTS, ""),
-    ):
-        assert (results_of(made, tmp_path), options.task(made, made.runs[0]).group) == (results, group)
 
 
 # --- whole sweeps

@@ -115,15 +115,6 @@ def test_many_strings_or_one_are_a_fan_of_the_keys(
     assert [key for what, key in notes if what == "on"] == [40, 63, 86]
 
 
-@pytest.mark.parametrize("levels", [{}, {20: 1.0, 127: 0.5}, {40: 0.2, 64: 2.0}])
-def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) -> None:
-    for strings in (GUITAR, ()):
-        neck.set_strings(strings)
-        neck.show_sounding(levels)
-        neck.show_notes([SoundingNote(key, level, key % 7 - 1, 0.3) for key, level in levels.items()])
-        assert not picture(neck).isNull()
-
-
 def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
     pressed, chord = reported(neck.pressed), [42, 47, 52, 57, 61, 66]
     qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
@@ -190,14 +181,3 @@ def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Ne
     assert [what for what, _ in notes] == ["on"] * 6 + ["off"] * 6
     press_keys(neck, up, up)
     assert neck.chosen == (58, 2), "the same fret of another string"
-
-
-def test_the_cursor_on_the_neck_is_seen_on_its_string(qtbot: QtBot, neck: Neck) -> None:
-    neck.activateWindow()
-    neck.setFocus()
-    qtbot.waitUntil(neck.hasFocus)
-    seen = []
-    for arrow in (Key.Key_Down, Key.Key_Down, Key.Key_Right, Key.Key_Left):
-        press_keys(neck, arrow)
-        seen.append(picture(neck))
-    assert seen[0] != seen[1] != seen[2] and seen[3] == seen[1]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shutil
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from app.analysis import error_plane
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
 from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
-from app.window.panels import compare as compare_module
 from engine.pluck import Pluck
 from tests.app.window.driver import KEY, LEFT, Window, choose, find, press
 from tests.app.window.panels.conftest import at, items
@@ -241,25 +239,3 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
     lab.change(amplitude_mm=lab.choices.amplitude_mm + 0.5)  # or have read it
     lab.wait(lambda: "second.safetensors" in figures(panel)["second"][-1])
-
-
-def test_a_pluck_that_comes_back_while_it_is_compared_is_computed(
-    lab: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    panel = lab.panel("compare")
-    lab.wait(lambda: computed(panel) == {"first", "second"})
-    begun, held, compare = list[object](), Event(), compare_module.compare
-
-    def slow(missing: Any, basis: Any, job: Any) -> object:
-        begun.append(basis)
-        while not held.wait(0.01):
-            job.check()
-        return compare(missing, basis, job)
-
-    monkeypatch.setattr(compare_module, "compare", slow)
-    lab.change(position=0.6)
-    lab.wait(lambda: len(begun) == 1)
-    for position in (0.61, 0.6):
-        lab.change(position=position)
-    held.set()
-    lab.wait(lambda: computed(panel) == {"first", "second"})
