@@ -279,6 +279,3 @@ def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path: Path) -> None:
     with pytest.raises(UnusableFile, match="larger than"):
         read_bounded(tmp_path / "a", 10)
     assert read_bounded(tmp_path / "a", 11) == b"12345678901"
-
-
-# The attack itself: or it would show nothing

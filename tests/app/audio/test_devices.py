@@ -107,6 +107,11 @@ def test_outputs_are_listed_with_the_default_first(portaudio: FakeSoundDevice) -
     assert find(None).name == "Speakers"
     portaudio.default.device["output"] = -1
     assert find(None).name == "HDMI"
+    portaudio.entries[:] = [("Microphone", 0, 0)]
+    assert output_devices() == []
+    with pytest.raises(AudioProblem, match="No audio output") as caught:
+        find(None)
+    assert caught.value.kind is ProblemKind.NO_DEVICE
 
 
 @pytest.mark.parametrize(("buffer_s", "latency_s", "block"), [(0.05, 0.05, 600), (0.005, 0.01, 64), (0.0, 0.01, 64)])
@@ -225,14 +230,6 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
     assert all(stream.asked == ["abort", "close"] for stream in portaudio.streams)
     output_devices(rescan=True)
     assert portaudio.restarts == 1, "no stream counts as open"
-
-
-def test_no_output_at_all(portaudio: FakeSoundDevice) -> None:
-    portaudio.entries[:] = [("Microphone", 0, 0)]
-    assert output_devices() == []
-    with pytest.raises(AudioProblem, match="No audio output") as caught:
-        find(None)
-    assert caught.value.kind is ProblemKind.NO_DEVICE
 
 
 def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,6 @@ from training.cell import Cell, configuration_of, load
 from training.cli import console
 from training.cli.sweep import Shown
 from training.data.dataset import load_dataset
-from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import FitProgress
 from training.heard_file import read_heard
 from training.heard_words import heard_sentence
@@ -55,10 +54,6 @@ def train(configuration: Path, name: str) -> list[Any]:
 def log(configuration: Path, name: str) -> list[dict[str, str]]:
     with (configuration.parent / name / "tiny" / "log.csv").open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
-
-
-def weights(path: Path) -> dict[str, torch.Tensor]:
-    return load_preset(path).model.state_dict()
 
 
 def equal(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
@@ -103,31 +98,6 @@ def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(
     for again in (words, [*words[:4], "--seed", 0, *words[6:]]):  # its own seed: the same run
         assert "finished earlier, nothing was trained now" in run(*again).out
     assert "--output" in run(*train(tiny_run, "one"), "--seeds", 2).usage
-
-
-def test_a_killed_run_continues_to_the_same_weights(
-    run: Run, tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
-    assert run(*train(tiny_run, "whole")).status == 0
-    save = Checkpoint.save
-
-    def save_and_kill(self: Checkpoint, path: Path) -> None:
-        if self.facts["step"] == 4:
-            raise KeyboardInterrupt  # epoch 2 is in the log, and its checkpoint is not written
-        save(self, path)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Checkpoint, "save", save_and_kill)
-        killed = run(*train(tiny_run, "cut"))
-    assert killed.status == 130 and "the same command continues with" in killed.err
-    assert not (tmp_path / "cut.safetensors").exists()
-
-    assert run(*train(tiny_run, "cut")).status == 0
-    assert equal(weights(tmp_path / "whole.safetensors"), weights(tmp_path / "cut.safetensors"))
-    rows = log(tiny_run, "cut")
-    assert [row["epoch"] for row in rows] == ["1", "2", "3"]
-    assert [row["loss"] for row in rows] == [row["loss"] for row in log(tiny_run, "whole")]
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])

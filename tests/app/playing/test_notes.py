@@ -245,15 +245,6 @@ def test_a_note_rings_until_it_is_silent(lab: Lab) -> None:
 # What must be loaded
 
 
-def test_a_preset_that_is_not_there_yet_is_loaded_and_sounds(lab: Lab, tmp_path: Path) -> None:
-    path = Path(shutil.copy(lab.bank, tmp_path))
-    note = lab.strike(path)
-    assert (lab.notes.ringing, note.seconds) == (1, 0)
-    lab.wait(lambda: not note.pending)
-    assert np.abs(lab.hear(0.05)).max() > 0.01
-    assert not lab.strike(path, position=0.6).pending
-
-
 def test_what_waits_hears_of_switches_and_of_stop(lab: Lab, tmp_path: Path) -> None:
     holding, done = threading.Event(), threading.Event()
     lab.notes.in_background(lambda: holding.wait(20) and None)

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel, QMenu, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QMenu
 from pytestqt.qtbot import QtBot
 
-from app.presets.library import PresetEntry
-from app.session.choices import Choices
 from app.views.controls.app_menu import ENTRIES, MENUS, AppMenu
 from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
 from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
-from app.views.controls.slot_buttons import NARROW_WIDTH, WIDTH, SlotButtons
-from engine.presets import read_info
 from tests.app.gestures import Paints, picture
 
 
@@ -99,29 +92,3 @@ def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(bar: NoticeB
     for number in range(MOST_KEPT + 5):
         bar.inform(f"Fact {number}.")
     assert (len(bar.notices), label.objectName()) == (MOST_KEPT, "")
-
-
-def test_the_slots_say_what_they_hold_with_much_room_and_with_little(qtbot: QtBot, small_preset: Path) -> None:
-    slots = SlotButtons()
-    qtbot.addWidget(slots)
-    info = replace(read_info(small_preset), title="Steel E4")
-    slots.set_entries([PresetEntry("studio_steel_e4", small_preset, info)])
-    slots.show_choices(Choices(a="preset:studio_steel_e4", b="difference"))
-    slots.show_gains({"a": -1.2, "b": 20.0})
-
-    def shown() -> list[str]:
-        return [button.text() for button in slots.findChildren(QPushButton) if button.text()[:1] in "AB"]
-
-    first, second = (each for each in slots.findChildren(QPushButton) if each.text()[:1] in "AB")
-    assert first.text().startswith("A  Steel E4") and "studio_steel_e4" not in first.accessibleName()
-    assert (second.width(), second.text()) == (WIDTH, "B  DIFF.  +20 dB")
-    slots.set_narrow(True)
-    assert second.width() == NARROW_WIDTH and second.text().endswith("+20")
-    slots.set_narrow(False)
-    assert (second.width(), second.text()) == (WIDTH, "B  DIFF.  +20 dB")
-    slots.show_choices(Choices(a="model", b="truth"))
-    slots.show_gains({"a": 0.1, "b": -12.3})
-    assert shown() == ["A  MODEL  +0.1 dB", "B  TRUTH  -12.3 dB"]
-    slots.show_gains({})
-    slots.set_narrow(True, tight=True)
-    assert shown() == ["A  MODEL", "B  TRUTH"]

@@ -158,26 +158,6 @@ def test_more_than_there_is_room_for_is_reported(made, monkeypatch: pytest.Monke
     assert "; 0.1 MB are free there" in made().sampler.size_text.text()
 
 
-def test_progress_is_shown_and_the_choices_wait(
-    qtbot: QtBot, made, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.shared.worker.REPORT_EVERY_S", 0.0)
-    notes.last = 3
-    dialog = made()
-    dialog.save.click()
-    assert not dialog.sampler.isEnabled()
-    assert not dialog.save.isEnabled()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
-    qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
-    fourth = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
-    assert f"C♯4, velocity {fourth.velocity}, about " in dialog.state.text()
-    assert " s left. You can play on meanwhile." in dialog.state.text()
-    notes.gate.set()
-    qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
-    assert dialog.sampler.isEnabled()
-    assert dialog.bar.isHidden()
-
-
 @pytest.mark.parametrize("form", ["flac", "sf2"])
 def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
     notes.last = 3

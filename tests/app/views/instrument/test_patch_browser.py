@@ -62,15 +62,6 @@ def chosen(browser: Browser) -> list[str]:
     return reported(browser.chosen)
 
 
-def test_all_are_listed_under_their_categories_favourites_first(browser: Browser) -> None:
-    assert browser.listed == ["steel", "nylon", "mine", "harp of brass"]
-    model = browser.list.model()
-    rows = [[model.index(row, column).data() for column in range(2)] for row in range(model.rowCount())]
-    lines = [" ".join(filter(None, texts)) for texts in rows]
-    assert lines == ["GUITAR", "★ steel", "☆ nylon", "☆ mine   (own)", "HARP", "☆ harp of brass"]
-    assert browser.accessibleName() == "Browser of instruments"
-
-
 @pytest.mark.parametrize(
     ("words", "category", "bank", "starred", "listed"),
     [
@@ -140,20 +131,6 @@ def test_a_hit_by_its_name_is_better_than_one_by_its_description(
     assert (browser.listed, browser.selected) == (["bass", "brass harp"], "brass harp"), "although bass is loaded"
     qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place(browser, 1).center())
     assert browser.selected == "bass" and "<b>bass</b>" in browser.card.text()
-
-
-@pytest.mark.parametrize("loads", ["arrow", "click", "Enter"])
-def test_the_first_hit_is_loaded_although_it_is_selected_already(
-    qtbot: QtBot, browser: Browser, chosen: list[str], loads: str
-) -> None:
-    browser.search.setText("harp")
-    if loads == "click":
-        where = browser.list.visualRect(browser.list.currentIndex()).center()
-        qtbot.mouseClick(browser.list.viewport(), LEFT, pos=where)
-    else:
-        press_keys(browser.search, Key.Key_Down if loads == "arrow" else Key.Key_Return)
-    assert chosen == ["harp of brass"]
-    assert browser.isVisible() == (loads != "Enter")
 
 
 def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: QtBot, browser: Browser) -> None:
