@@ -164,11 +164,3 @@ def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:
     entries, problems = list_patches()
     assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
     assert len(problems) == 1 and "exists already; rename the file" in problems[0]
-
-
-def test_an_unknown_name_lists_the_known_ones(make_patch: Make) -> None:
-    save_patch(make_patch(name="Mine"))
-    with pytest.raises(PatchError, match=r"no instrument 'other'; .*mine"):
-        find_patch("other")
-    with pytest.raises(PatchError, match="absent"):
-        find_patch("absent.json")

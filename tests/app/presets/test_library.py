@@ -23,7 +23,6 @@ from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, load_preset, preset_digest
-from engine.result_file import WriteError
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
@@ -93,12 +92,6 @@ def test_what_is_no_preset_is_refused_and_leaves_nothing(
     with pytest.raises(PresetError, match=r"bad\.safetensors: not a whole safetensors file"):
         install_preset(given, own, [])
     assert not own.exists()
-
-
-def test_a_folder_that_cannot_be_made_is_reported(small_preset: Path, own: Path) -> None:
-    own.write_text("in the way")
-    with pytest.raises(WriteError, match="cannot be written"):
-        install_preset(small_preset, own, [])
 
 
 def test_a_dropped_preset_that_is_there_is_chosen_and_reported(

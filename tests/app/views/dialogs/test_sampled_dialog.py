@@ -153,11 +153,6 @@ def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
     assert list(folder.iterdir()) == [] and notes.rendered == []
 
 
-def test_more_than_there_is_room_for_is_reported(made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.views.dialogs.export_pages.disk_usage", lambda path: SimpleNamespace(free=100_000))
-    assert "; 0.1 MB are free there" in made().sampler.size_text.text()
-
-
 @pytest.mark.parametrize("form", ["flac", "sf2"])
 def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
     notes.last = 3

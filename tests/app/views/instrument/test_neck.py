@@ -62,25 +62,6 @@ def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck, no
     assert len(notes) == 10, "beyond the range nothing is played"
 
 
-def test_lower_in_a_row_is_harder_and_the_velocity_is_shown(qtbot: QtBot, neck: Neck) -> None:
-    assert neck.cell(5, 3).top() == 0 < neck.cell(0, 3).top(), "the highest string is above"
-    pressed = reported(neck.pressed)
-    assert neck.figure == ""
-    for share in (0.15, 0.85):
-        before = picture(neck)
-        qtbot.mouseMove(neck, on(neck, 2, 4, share))
-        hovered = neck.figure
-        assert picture(neck) != before
-        qtbot.mousePress(neck, LEFT, pos=on(neck, 2, 4, share))
-        assert neck.figure == hovered == f"velocity {pressed[-1][1]}"
-        qtbot.mouseMove(neck, on(neck, 3, 4))  # a strum keeps it
-        assert neck.figure == hovered
-        qtbot.mouseRelease(neck, LEFT, pos=on(neck, 3, 4))
-    assert pressed[0][1] + 40 < pressed[-1][1]
-    qtbot.mouseMove(neck, NUMBERS)
-    assert neck.figure == ""
-
-
 def lit_x(neck: Neck, string: int) -> float:
     """The share of the width left of the dot of a string; not a number where there is none."""
     image = picture(neck)

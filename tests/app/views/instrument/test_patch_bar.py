@@ -48,19 +48,6 @@ def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, g
         assert bar.macros[0].toolTip().splitlines()[0] == words
 
 
-def test_body_and_mixes(bar: PatchBar, guitar: Patch) -> None:
-    asked = reported(bar.body_chosen, bar.changed)
-    assert bar.body.currentText() == "Guitar"
-    bar.body.activated.emit(0)
-    press_keys(bar.knobs["room.mix"], Qt.Key.Key_End)
-    assert asked == ["", ("room.mix", 1.0)]
-    unknown = guitar.model_copy(update={"body": guitar.body.model_copy(update={"name": "a lost one"})})
-    bar.show_patch(unknown, own=True)
-    assert (bar.body.currentText(), bar.body.currentData()) == ("a lost one", "a lost one")
-    bar.set_bodies([("", "none"), ("guitar", "Guitar")])
-    assert [bar.body.itemData(row) for row in range(bar.body.count())].count("") == 1
-
-
 def test_the_record_button_shows_its_time_and_saves_or_discards_what_is_not_saved(
     qtbot: QtBot, bar: PatchBar
 ) -> None:
