@@ -15,8 +15,9 @@ from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
     from app.export.files import WavReport
-    from app.export.sound import SoundRequest
     from app.export.wav import WavSettings
+    from app.rendering.note_sound import NoteSound
+    from engine.presets import Preset
 
 Value = TypeVar("Value")
 SILENT_DB = -120.0  # peak below which a note says that the file is silent
@@ -104,8 +105,11 @@ def render(
     position, amplitude_mm = _require("--position", position), _require("--amplitude-mm", amplitude_mm)
     seconds = _require("--seconds", seconds)
     pluck = options.check_pluck(position, amplitude_mm, shape, width)
-    from app.export.sound import DECAY_RANGE_DB, LONGEST_S, SoundRequest
-    from app.export.wav import RATE_RANGE_HZ, WavSettings
+    from app.export.sound import IN_ONE_FILE, LONGEST_S
+    from app.export.wav import DECAY_RANGE_DB, RATE_RANGE_HZ, WavSettings
+    from app.rendering.note_sound import NoteSound
+    from app.rendering.subject import StringOf, Subject
+    from engine.values.ear import Ear
 
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     options.check(listen=listen, listen_right=listen_right, difference_gain_db=difference_gain_db)
@@ -115,13 +119,15 @@ def render(
         arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     loaded = arguments.open_preset_to_render(preset, string, rate, modes)
     options.check_shortest(seconds, loaded.info.rate_hz)
-    try:
-        request = SoundRequest(
-            loaded, pluck, listen, seconds, source, listen_right, pickup, difference_gain_db, decay_db
-        )
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--source") from error
-    _write(request, out, WavSettings(bits, rate, normalise))
+    if source == "both" and listen_right is not None:
+        raise typer.BadParameter(IN_ONE_FILE, param_hint="--source")
+    info, points = loaded.info, (listen,) if listen_right is None else (listen, listen_right)
+    subject: Subject = loaded.path
+    if info.family is not None:
+        subject = StringOf(loaded.path, info.string, info.rate_hz, info.modes)
+    sound = NoteSound(subject, pluck, seconds, Ear(points, pickup))
+    settings = WavSettings(bits, rate, normalise, decay_db=decay_db, difference_gain_db=difference_gain_db)
+    _write(sound, loaded, source, out, settings)
 
 
 def _check_alone(context: typer.Context) -> None:
@@ -158,10 +164,9 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
 
 def _render_again(file: Path, out: Path | None) -> None:
     from app.export.files import default_file_name
-    from app.export.recipe import changed_notices, preset_of, read_recipe, request_of
+    from app.export.recipe import changed_notices, preset_of, read_recipe
     from app.shared.version import program_version
     from engine.folders import usable_files
-    from engine.presets import load_preset
 
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, usable_files())
@@ -169,39 +174,31 @@ def _render_again(file: Path, out: Path | None) -> None:
         out = Path(default_file_name(path.stem, recipe.pluck, recipe.rate_hz, recipe.source))
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
-    request = request_of(recipe, load_preset(path), file)
+    sound = recipe.sound(path, file)
     for notice in changed_notices(recipe, exact):
         say(f"note: {notice}")
     if recipe.version != program_version():
         say(f"note: {file} was made by version {recipe.version}, this is {program_version()}: bytes may differ")
-    _write(request, out, recipe.settings)
+    _write(sound, sound.load(), recipe.source, out, recipe.settings)
 
 
-def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
+def _write(sound: NoteSound, preset: Preset, source: Source, out: Path, settings: WavSettings) -> None:
+    """Write the file; then, so that a failure is the only line, print what is to be known of it."""
     from app.export.files import export_sounds
-
-    with progress("render") as report:
-        (written,) = export_sounds(request, {request.source: out}, settings, progress=report)
-    for note in _notes(request, written):  # after the work, so that a failure is the only line
-        say(note)
-    if written.peak_db < SILENT_DB:
-        say("note: the file is silent; amplitude 0, or the string does not move at the listening point")
-    print(_summary(written, settings.bits))
-
-
-def _notes(request: SoundRequest, written: WavReport) -> list[str]:
     from engine.plain_text import duration
     from engine.presets import outside_training
 
-    info = request.preset.info
-    notes = []
-    if request.source != "truth":
-        notes += [f"warning: {words}" for words in outside_training(info, request.pluck)]
+    with progress("render") as report:
+        (written,) = export_sounds(sound, preset, {source: out}, settings, report)
+    for words in outside_training(preset.info, sound.pluck) if source != "truth" else ():
+        say(f"warning: {words}")
     if written.past_training_s > 0:
-        notes.append(f"note: from {duration(info.horizon_s)} on, the model is past its training")
+        say(f"note: from {duration(preset.info.horizon_s)} on, the model is past its training")
     if not written.decayed:
-        notes.append(f"note: the sound had not fallen by {request.decay_db:g} dB after {duration(written.seconds)}")
-    return notes
+        say(f"note: the sound had not fallen by {settings.decay_db:g} dB after {duration(written.seconds)}")
+    if written.peak_db < SILENT_DB:
+        say("note: the file is silent; amplitude 0, or the string does not move at the listening point")
+    print(_summary(written, settings.bits))
 
 
 def _summary(written: WavReport, bits: Bits) -> str:

@@ -37,4 +37,10 @@ class ExportChoices(BaseModel):
 
     @property
     def wav(self) -> WavSettings:
-        return WavSettings(bits=self.bits, rate_hz=self.rate_hz or None, normalise=self.normalise)
+        return WavSettings(
+            bits=self.bits,
+            rate_hz=self.rate_hz or None,
+            normalise=self.normalise,
+            decay_db=self.decay_db if self.until_decayed else None,
+            difference_gain_db=self.difference_gain_db,
+        )

@@ -1,4 +1,4 @@
-"""Export: the sound of a pluck as WAV files with their recipes, each written whole or not at all.
+"""Export: the sound of a note as WAV files with their recipes, each written whole or not at all.
 
 The window and the command line both write through this module.
 """
@@ -15,11 +15,14 @@ from typing import BinaryIO
 
 from app.export.recipe import SoundRecipe
 from app.export.recording import SoundSamples
-from app.export.sound import Mixed, SoundRequest, Source, render_voices
+from app.export.sound import Mixed, check_sources, render_voices
 from app.export.wav import WavSettings, WrittenSound, write_wav
+from app.rendering.note_sound import NoteSound
 from app.shared.version import PROGRAM, program_version
+from app.shared.vocabulary import Source
 from app.shared.worker import Progress
 from engine.pluck import Pluck
+from engine.presets import Preset
 from engine.result_file import WriteError, explain, whole_file
 
 LONGEST_NAME = 150  # characters of a preset's name in a file's name
@@ -41,16 +44,16 @@ class WavReport(WrittenSound):
 
 
 def export_sounds(
-    request: SoundRequest,
+    sound: NoteSound,
+    preset: Preset,
     paths: Mapping[Source, Path],
     settings: WavSettings,
-    *,
     progress: Progress = lambda *_: None,
 ) -> list[WavReport]:
-    """Render a pluck once and write a file for each source, model and truth with one gain.
+    """Render a note once and write a file for each source, model and truth with one gain.
 
     Args:
-        request: its own `source` is ignored.
+        preset: plays it, as `sound.load` gives it.
         paths: the file of each source; a difference, which is heard without body and room, has none beside it where
             an instrument is heard.
 
@@ -58,36 +61,33 @@ def export_sounds(
         The reports in the order of `paths`.
 
     Raises:
+        ValueError: see `check_sources`.
         WriteError: a file cannot be written; none is left.
         PresetError: the preset's file cannot be read any more.
         Cancelled: `progress` raised it; no file is left.
         Runaway: the model's output grew without bound or is not finite.
     """
-    if request.decay_db is not None:  # it ends by its decay, behind a longer fade-out
+    if settings.decay_db is not None:  # it ends by its decay, behind a longer fade-out
         settings = replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
-    requests = {source: replace(request, source=source) for source in paths}
-    if request.struck is not None and "difference" in paths and len(paths) > 1:
-        raise ValueError("through an instrument, export the difference by itself")
-    request = next(iter(requests.values()))
-    info = request.preset.info
+    info = preset.info
+    check_sources(sound, paths, info.rate_hz)
     with ExitStack() as files:
-        recipes = {source: SoundRecipe.of(source_request, settings) for source, source_request in requests.items()}
+        recipes = {source: SoundRecipe.of(sound, preset, source, settings) for source in paths}
         # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
-            voices = render_voices(request, paths, rate_hz, all_voices=settings.normalise, progress=progress)
+            voices = render_voices(sound, preset, paths, settings, progress)
         except OSError as error:  # the recordings lie in temporary files
             raise WriteError(explain(Path(tempfile.gettempdir()), error)) from error
-        sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
         # of each file the gain follows from its own recipe, whatever else is written beside it
         beside: list[SoundSamples] = list(voices.sounds.values()) if settings.normalise else []
         reports = []
         for source, file in opened.items():
-            path, sound = paths[source], sounds[source]
+            path, samples = paths[source], Mixed(voices, source, settings.difference_gain_db)
             with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
-                written = write_wav(file, sound, rate_hz, settings, tags, beside)
+                written = write_wav(file, samples, rate_hz, settings, tags, beside)
             past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
             reports.append(WavReport(**asdict(written), path=path, past_training_s=past_s, decayed=voices.ended))
     return reports

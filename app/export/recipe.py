@@ -6,30 +6,36 @@ MIDI file.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from app.audio.sound_file import UnreadableSound, open_sound
-from app.export.sound import LONGEST_S, SoundRequest
-from app.export.struck import StruckKey
-from app.export.wav import RATE_RANGE_HZ, WavSettings
-from app.patches.fields import String
+from app.export.sound import LONGEST_S, check_sources
+from app.export.wav import DECAY_RANGE_DB, RATE_RANGE_HZ, WavSettings
+from app.instrument.bodies import body_digest
+from app.instrument.events import KEYS, NoteOn
+from app.patches.fields import Name, String
+from app.patches.library import list_patches
+from app.patches.patch import Patch
+from app.rendering.note_sound import NoteSound, Struck
+from app.rendering.subject import StringOf
 from app.shared.value import Value
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE, Bits, PlayedSource, Source
+from app.shared.vocabulary import DIFFERENCE, DIFFERENCE_GAIN_RANGE_DB, Bits, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.levels import FULL_SCALE_M
 from engine.plain_text import name_text, one_line
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetError, of_string, preset_digest
+from engine.presets import Preset, PresetError, preset_digest
 from engine.schema import explained, parse_json
-from engine.values.ear import Pickup
+from engine.values.ear import Ear, Pickup
 
-# fields of `SoundRequest`
-REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source")
+Side = Annotated[float, Field(ge=-1, le=1)]
 
 
 class RecipeError(Exception):
@@ -86,8 +92,49 @@ def source_words(source: str, difference_gain_db: float) -> str:
     return f"the difference of model and truth at {difference_gain_db:+g} dB"
 
 
+class StruckKey(Value):
+    """Names the instrument, as the library has it, and says how its key is struck.
+
+    Attributes:
+        instrument_sha256: of its content and of the file of its body.
+        channel: of MIDI, which chooses the string of a guitar; `KEYS`: none.
+        place, pluck: of a drum and of a string, as in `NoteOn`.
+    """
+
+    instrument: Name
+    instrument_sha256: str
+    key: int = Field(ge=0, le=127)
+    velocity: int = Field(ge=1, le=127)
+    channel: int = Field(KEYS, ge=0, le=KEYS)
+    place: tuple[Side, Side] | None = None
+    string: int | None = Field(None, ge=0, le=127)
+    pluck: Pluck | None = None
+
+    @classmethod
+    def of(cls, struck: Struck) -> StruckKey:
+        patch = struck.patch
+        return cls(instrument=patch.name, instrument_sha256=_digest(patch), **asdict(struck.event))
+
+    def found(self) -> tuple[Struck, bool]:
+        """The instrument of that name with this key, and whether it is the same to the last value.
+
+        Raises:
+            ValueError: there is none.
+        """
+        for entry in list_patches()[0]:
+            if entry.patch.name == self.instrument:
+                event = NoteOn(**{field.name: getattr(self, field.name) for field in fields(NoteOn)})
+                return Struck(entry.patch, event), _digest(entry.patch) == self.instrument_sha256
+        raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
+
+
+def _digest(patch: Patch) -> str:
+    content = patch.model_dump_json() + body_digest(patch.body.name)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
 class SoundRecipe(Value):
-    """Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
+    """A `NoteSound` and its `WavSettings`, as a file has them; a field that is absent has its default.
 
     Attributes:
         preset_rate_hz: the rate at which the model played.
@@ -107,9 +154,9 @@ class SoundRecipe(Value):
     listen_right: float | None = Field(None, ge=0, le=1)
     pickup: Pickup = "displacement"
     seconds: float = Field(gt=0, le=LONGEST_S)
-    decay_db: float | None = None
+    decay_db: float | None = Field(None, ge=DECAY_RANGE_DB[0], le=DECAY_RANGE_DB[1])
     source: Source
-    difference_gain_db: float = 0.0
+    difference_gain_db: float = Field(0.0, ge=DIFFERENCE_GAIN_RANGE_DB[0], le=DIFFERENCE_GAIN_RANGE_DB[1])
     preset_rate_hz: int = Field(ge=1, le=HIGHEST_RATE_HZ)
     horizon_s: float
     full_scale_m: float
@@ -123,21 +170,27 @@ class SoundRecipe(Value):
     struck: StruckKey | None = None
 
     @classmethod
-    def of(cls, request: SoundRequest, settings: WavSettings) -> SoundRecipe:
-        """The recipe of a request that is written with these settings.
+    def of(cls, sound: NoteSound, preset: Preset, source: Source, settings: WavSettings) -> SoundRecipe:
+        """The recipe of a sound that `preset` plays, and that is written with these settings.
 
         Raises:
             PresetError: the preset's file cannot be read any more.
         """
-        info = request.preset.info
-        many = info.family is not None and request.struck is None
+        info, ear = preset.info, sound.ear
+        many = info.family is not None and sound.struck is None
         return cls(
             program=PROGRAM,
             version=program_version(),
-            preset=request.preset.name,
-            preset_sha256=preset_digest(request.preset.path),
-            **{name: getattr(request, name) for name in REQUESTED},
-            difference_gain_db=request.difference_gain_db if request.source == "difference" else 0.0,
+            preset=preset.name,
+            preset_sha256=preset_digest(preset.path),
+            pluck=sound.pluck,
+            listen=ear.points[0],
+            listen_right=ear.points[1] if len(ear.points) > 1 else None,
+            pickup=ear.pickup,
+            seconds=sound.seconds,
+            decay_db=settings.decay_db,
+            source=source,
+            difference_gain_db=settings.difference_gain_db if source == DIFFERENCE else 0.0,
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
             full_scale_m=FULL_SCALE_M,
@@ -147,12 +200,34 @@ class SoundRecipe(Value):
             fade_out_s=settings.fade_out_s,
             string=info.string if many else None,
             modes=info.modes if many else None,
-            struck=None if request.struck is None else StruckKey.of(request.struck),
+            struck=None if sound.struck is None else StruckKey.of(sound.struck),
         )
 
     @property
     def settings(self) -> WavSettings:
-        return WavSettings(self.bits, self.rate_hz, self.normalise, self.fade_out_s)
+        """The settings of its file."""
+        return WavSettings(**{field.name: getattr(self, field.name) for field in fields(WavSettings)})
+
+    def sound(self, preset: Path, file: Path) -> NoteSound:
+        """The sound that it describes, checked.
+
+        Args:
+            preset: the file that plays it.
+            file: that has this recipe.
+
+        Raises:
+            RecipeError: values do not go together, or the instrument is not here.
+        """
+        points = (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+        string, rate_hz = self.string, self.preset_rate_hz
+        subject = preset if string is None else StringOf(preset, string, rate_hz, self.modes)
+        try:
+            struck = None if self.struck is None else self.struck.found()[0]
+            sound = NoteSound(subject, self.pluck, self.seconds, Ear(points, self.pickup), struck=struck)
+            check_sources(sound, (self.source,), sound.load().info.rate_hz)
+        except ValueError as error:
+            raise _unusable_error(file, str(error)) from error
+        return sound
 
 
 def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
@@ -197,25 +272,6 @@ def read_recipe(path: Path) -> SoundRecipe:
             f" its notes are in the MIDI file {origin.midi}, beside it unless it was moved"
         )
     return origin
-
-
-def request_of(recipe: SoundRecipe, preset: Preset, path: Path) -> SoundRequest:
-    """The request that renders the sound of the file at `path` again.
-
-    Args:
-        preset: as loaded from its file; if it is of many strings, the recipe's string is chosen here.
-
-    Raises:
-        RecipeError: values do not go together, or the instrument is not here.
-    """
-    try:
-        if recipe.string is not None:
-            preset = of_string(preset, recipe.string, recipe.preset_rate_hz, recipe.modes)
-        requested = {name: getattr(recipe, name) for name in REQUESTED}
-        struck = None if recipe.struck is None else recipe.struck.found()[0]
-        return SoundRequest(preset, **requested, difference_gain_db=recipe.difference_gain_db, struck=struck)
-    except ValueError as error:
-        raise _unusable_error(path, str(error)) from error
 
 
 def _unusable_error(path: Path, why: str) -> RecipeError:

@@ -17,11 +17,13 @@ import soundfile
 from numpy.typing import NDArray
 
 from app.export.recording import SoundSamples, blocks
-from app.shared.vocabulary import BITS, Bits
+from app.shared.vocabulary import BITS, DIFFERENCE_GAIN_RANGE_DB, Bits
 from engine import bounds
 
 T = TypeVar("T")
 RATE_RANGE_HZ = (1_000, 384_000)
+DECAY_RANGE_DB = (10.0, 120.0)
+RANGES = {"rate_hz": RATE_RANGE_HZ, "decay_db": DECAY_RANGE_DB, "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB}
 LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
 
@@ -39,6 +41,9 @@ class WavSettings:
         rate_hz: at which the sound is rendered; None: the preset's own rate.
         normalise: to -1 dBFS, by one gain for all channels and for the sounds that belong together.
         fade_out_s: the length of the fade at the end, so that a decay that is cut off does not click.
+        decay_db: a note ends where both model and truth have fallen this far below their maximum. So all files of a
+            note have the same length. None: it lasts as long as its sound says.
+        difference_gain_db: gain of a note's difference.
 
     Raises:
         ValueError: a value is out of its range; the message names it.
@@ -48,10 +53,12 @@ class WavSettings:
     rate_hz: int | None = None
     normalise: bool = False
     fade_out_s: float = 0.010
+    decay_db: float | None = None
+    difference_gain_db: float = 0.0
 
     def __post_init__(self) -> None:
         bounds.check_choice("bits", self.bits, BITS)
-        bounds.check_all(self, {"rate_hz": RATE_RANGE_HZ})
+        bounds.check_all(self, RANGES)
         if not self.fade_out_s >= 0:
             raise ValueError(f"fade_out_s must not be negative, not {self.fade_out_s}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from app.playing.ahead import AheadVoice
+from app.playing.ahead import AheadSamples
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER
@@ -24,10 +24,9 @@ class PluckVoices:
         begin_frame: the frame of the mixer at which it begins; 0: at once.
         struck_s: the time of its gesture by the sound's clock; 0: it is none.
         voices: by source.
-        ahead: those of its voices that are rendered ahead.
+        ahead: the samples of those of its voices that are rendered ahead.
         match: by source, the factor that brings it to the level of the truth; None until it is known.
         pending: it was not handed to a mixer yet.
-        handed_over: it was, or is about to be.
         released: whether it was asked to fade out.
         mixer: to which it was handed, or whose frame it waits for.
         cut: it is not heard any more: its mixer was replaced, or it could not be played.
@@ -41,11 +40,10 @@ class PluckVoices:
     begin_frame: int = 0
     struck_s: float = 0.0
     voices: dict[str, Voice] = field(default_factory=dict)
-    ahead: list[AheadVoice] = field(default_factory=list)
+    ahead: list[AheadSamples] = field(default_factory=list)
     match: Mapping[str, float] | None = None
     mixer: Mixer | None = None
     pending: bool = True
-    handed_over: bool = False
     released: bool = False
     cut: bool = False
     timed: bool = False
@@ -85,7 +83,12 @@ class PluckVoices:
     def waits_s(self) -> float:
         """The seconds that it will still be rendered before it sounds; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
-        return max((voice.waits_s for voice in self.ahead), default=0.0) if waits else 0.0
+        return max((samples.waits_s for samples in self.ahead), default=0.0) if waits else 0.0
+
+    @property
+    def unfinished(self) -> list[AheadSamples]:
+        """The samples of which more are wanted."""
+        return [samples for samples in self.ahead if not (samples.finished or samples.voice.over)]
 
     @property
     def began_frame(self) -> int:
@@ -107,12 +110,6 @@ class PluckVoices:
         skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
         starved_s = min(voice.starved_s for voice in self.voices.values())
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
-
-    def set_begin(self) -> None:
-        """Give its voices the time of their gesture, and the frame they begin at."""
-        for voice in self.voices.values():
-            voice.set_struck(self.struck_s)
-            voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
         """Let the note fade out from a frame of the mixer on; 0: not any more."""

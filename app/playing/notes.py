@@ -20,11 +20,11 @@ from typing import TypeVar
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
-from app.playing.ahead import Ahead, AheadVoice
+from app.playing.ahead import Ahead, AheadSamples
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
-from app.playing.levels import Levels
+from app.playing.levels import MATCHED_S, level_match
 from app.playing.note import PluckVoices
 from app.playing.playback import Due
 from app.playing.sources import Sources
@@ -48,6 +48,8 @@ BUSY = 0.75  # load of the device: above it the oldest notes end, so that the ot
 LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
 LEAST_RELIEF = 2  # notes that end then
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
+KEPT_MATCHES = 256
+MOST_MATCHING = 8  # level matches that wait to be computed
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
@@ -90,14 +92,14 @@ class Notes:
         self._chosen: RenderRequest | None = None
         self._reach: PluckRange | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
-        self._ahead = Ahead()
+        self._ahead = Ahead(self._hand_over, self._cannot_render)
         self._latencies_s: deque[float] = deque(maxlen=100)
         self._loads: deque[float] = deque(maxlen=LOOKS)
         self._frames_looked = 0  # of the mixer, when its load was looked at
         self._helper = ThreadPoolExecutor(1, "notes-helper", lower_priority, (Rank.BACKGROUND,))
-        self._levels = Levels(sources, self.in_background)
+        self._matches: dict[tuple[object, ...], Mapping[str, float]] = {}  # by `matching_key`
+        self._matching: set[tuple[object, ...]] = set()  # keys of those that are being computed
         self._closed = False
-        self._wished_plucks: object = None
         self.keys = Keys(sources, find, lambda: sound.mixer, self.in_background, report, set_effects)
         self._set_gains_of_keys()
         sound.watch(self._bound_load)
@@ -146,12 +148,8 @@ class Notes:
         """
         with self._lock:
             self._monitor = monitor
-            notes = self._plucks()
-            self._do_for_each(notes, self._apply_monitor)
+            self._do_for_each(self._plucks(), self._apply_monitor)
         self._set_gains_of_keys(compared)
-        for note in notes:
-            if not note.pending and not note.over:
-                self._ask_match(note)
 
     def hear_dry(self, dry: bool) -> None:
         """Leave out body and room, or not; beside a single string, nothing rings on in them."""
@@ -279,19 +277,6 @@ class Notes:
             if not self._sources.has(subject, rate_hz):
                 self.in_background(partial(self._sources.prepare, subject, rate_hz))
 
-    def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
-        """Compute in the background where voices of these plucks start; the latest call counts."""
-        rate_hz = self._sound.rate_hz
-        wish = self._wished_plucks = object()
-
-        def work() -> None:
-            for pluck in plucks:
-                for source in SOURCES:
-                    if not self._closed and wish is self._wished_plucks:
-                        self._sources.begin(subject, source, rate_hz, pluck)
-
-        self.in_background(work)
-
     def compute(self, work: Callable[[int], Made], rate_hz: int) -> Future[Made]:
         """Compute what `work` makes at a rate, in the helper's thread, after what waits there."""
         return self._helper.submit(work, rate_hz)
@@ -312,7 +297,7 @@ class Notes:
     def match(self) -> Mapping[str, float] | None:
         """The factor by source that brings the chosen pluck to the level of the truth. None: not known yet."""
         note = self._chosen_note()
-        return None if note is None else self._levels.of(note)
+        return None if note is None else self._matches.get(note.matching_key)
 
     @property
     def ringing(self) -> int:
@@ -363,8 +348,7 @@ class Notes:
 
     def _follow(self, note: PluckVoices) -> None:
         """Let a note be heard where all are, and as loud as the truth once that is known."""
-        if note.ahead and note.match is None and not note.pending:
-            self._ask_match(note)
+        self._take_match(note)
         if self._ear is not None:
             for voice in note.voices.values():
                 voice.listen(self._ear)
@@ -438,58 +422,34 @@ class Notes:
 
     def _begin(self, note: PluckVoices) -> None:
         """Make the voices and hand them over, at once or when those that are rendered ahead are far enough."""
-        self._make_voices(note, self._sound.mixer.rate_hz)
-        note.set_begin()
-        for voice in note.ahead:
-            self._ahead.render(voice)
-        if not note.ahead:
-            self._hand_over(note)
-
-    def _make_voices(self, note: PluckVoices, rate_hz: int) -> None:
-        request, voices = note.request, dict[str, Voice]()
-        ahead: list[AheadVoice] = []
+        request, rate_hz = note.request, self._sound.mixer.rate_hz
+        voices, ahead = dict[str, Voice](), list[AheadSamples]()
         for source in note.sources:
             subject = note.subject(source)
             try:
-                program = self._sources.program(subject, source, rate_hz)
-                initial_m, begin = self._sources.begin(subject, source, rate_hz, request.pluck)
-                model = self._sources.load(subject).model if program.rendered else None
+                loaded = self._sources.load(subject)
+                voice = loaded.voice(source, request.pluck, request.ear, rate_hz, request.seconds, gain=0.0)
             except ValueError:
                 if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why
-            if model is None:
-                voices[source] = Voice(program, initial_m, request.ear, 0.0, begin=begin)
-                continue
-            voice = voices[source] = Voice(
-                program, initial_m, request.ear, 0.0, request.seconds, model.rate_hz, begin
-            )
-            voice.fade_out_by(request.seconds)  # behind it there are no samples
-            ahead.append(
-                AheadVoice(
-                    voice,
-                    model,
-                    initial_m,
-                    program.grid_weights(request.ear),
+            voices[source] = voice
+            voice.set_struck(note.struck_s)
+            voice.begin_at(note.begin_frame)
+            if voice.program.rendered:
+                voice.fade_out_by(request.seconds)  # behind it there are no samples
+                initial_m, key = (
+                    loaded.initial_m(request.pluck),
                     (subject, request.pluck, request.ear, request.seconds),
-                    lambda: self._hand_over_rendered(note, ahead),
-                    lambda error: self._cannot_render(note, error),
-                    lambda: note.over,
-                    note.from_s,
                 )
-            )
-        note.ahead, note.voices = ahead, voices
-
-    def _hand_over_rendered(self, note: PluckVoices, ahead: list[AheadVoice]) -> None:
-        """Hand the note over once all its models are rendered far enough. Any thread."""
-        with self._lock:
-            if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
-                return
-            note.handed_over = True  # or two that are ready at the same time would both do it
-        self._hand_over(note)
+                ahead.append(AheadSamples(voice, loaded.model, initial_m, key, note.from_s))
+        note.voices, note.ahead = voices, ahead
+        if ahead:
+            self._ahead.render(note)
+        else:
+            self._hand_over(note)
 
     def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
-        note.cut = True
         self._report(f"This pluck cannot be rendered: {error}", "")
 
     def _hand_over(self, note: PluckVoices) -> None:
@@ -501,7 +461,7 @@ class Notes:
             mixer = self._sound.mixer
             if note.over:
                 return
-            note.match = self._levels.of(note)
+            note.match = self._matches.get(note.matching_key)
             self._apply_monitor(note, at_once=note.from_s == 0)
             rates_hz = {voice.program.rate_hz for voice in note.voices.values()}
             if rates_hz - {mixer.rate_hz} or note.mixer not in (None, mixer):
@@ -510,11 +470,10 @@ class Notes:
             mixer.add(*note.voices.values())
             note.mixer, note.pending = mixer, False
             self._make_room(MOST_NOTES)
-        self._ask_match(note)
 
     def _begin_again(self, note: PluckVoices) -> None:
         """Begin a note in another mixer, which counts its own frames."""
-        note.pending, note.handed_over = True, False
+        note.pending, note.ahead = True, []
         note.begin_frame, note.mixer = 0, None
         self.in_background(partial(self._begin, note), note)
 
@@ -549,13 +508,28 @@ class Notes:
             if at_once:
                 voice.start_with_gain(gain)
 
-    def _ask_match(self, note: PluckVoices) -> None:
-        if self._monitor.level_match:
-            self._levels.ask(note, self._sound.rate_hz, self._take_match)
+    def _take_match(self, note: PluckVoices) -> None:
+        """Let a note be as loud as the truth once that is known; compute it where nobody has asked for it yet."""
+        if not self._monitor.level_match or note.match is not None or note.pending:
+            return
+        key = note.matching_key
+        note.match = self._matches.get(key)
+        if note.match is not None:
+            self._apply_monitor(note)
+        elif key not in self._matching and len(self._matching) < MOST_MATCHING and _enough_for_match(note):
+            self._matching.add(key)
+            self.in_background(partial(self._match, note))
 
-    def _take_match(self, key: tuple[object, ...], match: Mapping[str, float]) -> None:
-        with self._lock:
-            notes = [note for note in self._plucks() if note.matching_key == key]
-            for note in notes:
-                note.match = match
-            self._do_for_each(notes, self._apply_monitor)
+    def _match(self, note: PluckVoices) -> None:
+        """Compute the level match of a note, for all of the same pluck and ear."""
+        key = note.matching_key
+        try:
+            self._matches[key] = level_match(self._sources, note, self._sound.rate_hz)
+            if len(self._matches) > KEPT_MATCHES:
+                del self._matches[next(iter(self._matches))]
+        finally:
+            self._matching.discard(key)
+
+
+def _enough_for_match(note: PluckVoices) -> bool:
+    return all(samples.finished or samples.rendered_s >= MATCHED_S for samples in note.ahead)

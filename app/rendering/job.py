@@ -41,10 +41,7 @@ class PluckJob(Rendering[RenderRequest, Take]):
         request, loaded = self.request, self._load(self.request.preset)
         info, stride = loaded.preset.info, _stride(loaded.model)
         take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-        self._lines = {
-            "model": SourceLine(take, loaded.model, loaded.model_program, take.motions["model"], info, stride),
-            "truth": SourceLine(take, loaded.truth, loaded.truth_program, take.motions["truth"], info, stride),
-        }
+        self._lines = {name: SourceLine(take, name, loaded, take.motions[name], stride) for name in SOURCES}
         take.listened = self._listened(request.ear)
         return take
 
@@ -54,16 +51,14 @@ class PluckJob(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride = take.info, take.stride
-            source = program = None
+            info, stride, loaded = take.info, take.stride, None
             try:
-                loaded = self._load(path)
-                source, program = loaded.model, loaded.model_program
-                info, stride = loaded.preset.info, _stride(source)
+                other = self._load(path)
+                info, stride, loaded = other.preset.info, _stride(other.model), other
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
             motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(take, source, program, motion, info, stride)
+            line = self._lines[name] = SourceLine(take, name, loaded, motion, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened

@@ -2,55 +2,42 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.listening import Listening
 from app.rendering.strobe import Flashes, Strobe
+from app.rendering.subject import Loaded
 from app.rendering.take import Pictures, Signal, Take
-from engine.pluck import Pluck
-from engine.presets import PresetInfo
 from engine.resonators.base import Array
-from engine.resonators.sine_transform import project
 from engine.sources import Runaway, SourceState, StringSource
 from engine.values.ear import Ear
-from engine.voices import Program
 
 
 class SourceLine:
     """The rendering of a source into its motion and its signal.
 
     Args:
-        source: None for a string at rest.
-        program: of its voice, at the preset's rate; None where `source` is.
+        name: of the source.
+        loaded: its preset; None for a string at rest.
         motion: filled with the pictures, `stride` samples apart.
-        info: of the source's preset.
 
     Attributes:
         frames: samples in all, the initial displacement first.
         done: samples whose pictures have been rendered.
     """
 
-    def __init__(
-        self,
-        take: Take,
-        source: StringSource | None,
-        program: Program | None,
-        motion: Pictures,
-        info: PresetInfo,
-        stride: int,
-    ) -> None:
-        self.rate_hz = info.rate_hz
+    def __init__(self, take: Take, name: str, loaded: Loaded | None, motion: Pictures, stride: int) -> None:
+        self.rate_hz = take.rate_hz if loaded is None else loaded.preset.info.rate_hz
         self.stride = stride
         self.motion = motion
-        self.frames = int(take.seconds * info.rate_hz + 1e-6) + 1
-        self._seconds = take.seconds
-        self._source = source
-        self._program = program
-        self._initial = _initial_m(take.pluck, info.grid_points, info.modes)
-        self._pictures = _Frames(source, self._initial)
+        self.frames = int(take.seconds * self.rate_hz + 1e-6) + 1
+        self._take = take
+        self._name = name
+        self._loaded = loaded
+        self._source = None if loaded is None else loaded.source(name)
+        self._initial = np.zeros((1, motion.places)) if loaded is None else loaded.initial_m(take.pluck)[None]
+        self._pictures = _Frames(self._source, self._initial)
         self._flashes: Flashes | None = None
         self._shown: _Frames | None = None  # renders flashes that were requested after the pictures
         self._listening: Listening | None = None  # until its signal is complete
@@ -90,13 +77,13 @@ class SourceLine:
 
     def listen(self, ear: Ear) -> Signal:
         """Begin a new signal for these listening points, and return it; the present one is not continued."""
-        signal = Signal(self.rate_hz, len(ear.points), self._seconds)
-        if self._source is None or self._program is None:
+        signal = Signal(self.rate_hz, len(ear.points), self._take.seconds)
+        if self._source is None or self._loaded is None:
             signal.end_in_silence()
             self._listening = None
         else:
-            frames = None if self._source.any_frame else self.motion
-            self._listening = Listening(signal, self._source, self._program, self._initial, ear, frames)
+            motion = None if self._source.any_frame else self.motion
+            self._listening = Listening(signal, self._loaded, self._name, self._take.pluck, ear, motion)
         return signal
 
     def advance(self, samples: int) -> None:
@@ -146,8 +133,7 @@ class _Frames:
         """Frames of these ascending numbers in `done` … stop - 1, (frames, grid_points) in m; passes up to `stop`."""
         out = np.zeros((len(numbers), self._initial.shape[1]), np.float32)
         following = int(len(numbers) > 0 and numbers[0] == 0)
-        if self._source is not None:
-            out[:following] = self._initial
+        out[:following] = self._initial
         if self._state is not None and len(numbers) > following:
             assert self._source is not None
             ahead = numbers[following:] - self._state.frame
@@ -158,9 +144,3 @@ class _Frames:
                 self._state, self.ends = None, max(self.done - 1, 0)
         self.done = stop
         return out
-
-
-@lru_cache(maxsize=8)  # the same for every source of a take
-def _initial_m(pluck: Pluck, grid_points: int, modes: int) -> Array:
-    """The string at its release, (1, grid_points) in m."""
-    return project(pluck.displacement(grid_points), modes)[None]

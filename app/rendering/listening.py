@@ -1,96 +1,92 @@
-"""The signal of a source at the listening points, sample by sample, read from its voice.
+"""The signal of a source at the listening points, sample by sample: its voice is read, as a file of it would be.
 
-A compiled voice renders itself; any other is given its samples. They are rendered at the listening points alone where
-the model can compute any frame, and read from the motion where that has every frame.
+A compiled voice renders itself. Any other is given samples: the model's where that can compute any frame, else those
+of the motion, which has every frame.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from app.rendering.subject import Loaded
 from app.rendering.take import Pictures, Signal
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import REACH
-from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.resonators.base import Array
-from engine.sources import Runaway, SourceState, StringSource
+from engine.sources import Runaway
 from engine.values.ear import Ear
-from engine.voices import OfflineVoice, Program
+from engine.voices import ModelSamples, OfflineVoice
 
 FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
 BLOCK_FRAMES = 32_768  # up to this one
 RENDERED_FRAMES = 2_048  # a block of any other voice
 BEHIND = 4 * QUANTUM  # frames that a voice with given samples reads ahead at most
-MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the differentiator of a velocity reads
+BEYOND = 2 * REACH + 2 * QUANTUM  # samples after the end, which the differentiator of a velocity reads
 
 
 class Listening:
-    """A reader of a source's voice into `signal`.
+    """A reader of the voice of a source into `signal`.
 
     Args:
-        program: of the voice.
-        initial_m: the string at its release, (1, grid_points).
+        source: its name.
         motion: with every frame of the source, where it cannot be rendered at the listening points alone; else None.
     """
 
     def __init__(
-        self,
-        signal: Signal,
-        source: StringSource,
-        program: Program,
-        initial_m: Array,
-        ear: Ear,
-        motion: Pictures | None,
+        self, signal: Signal, loaded: Loaded, source: str, pluck: Pluck, ear: Ear, motion: Pictures | None
     ) -> None:
         self.signal = signal
-        self._source = source
-        self._program = program
-        self._initial = initial_m
         self._ear = ear
-        self._motion = motion
-        seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
-        self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
-        self._offline.voice.begin_at_once()
-        self._weights = program.grid_weights(ear)
-        self._given = 0  # samples that the voice was given
-        self._last = np.zeros((0, len(ear.points)), np.float32)  # the last of them
-        self._state: SourceState | None = None
+        voice = loaded.voice(source, pluck, ear, signal.rate_hz, (signal.frames + BEYOND) / signal.rate_hz)
+        voice.begin_at_once()
+        self._offline = OfflineVoice(voice)
+        self._samples: ModelSamples | None = None
+        if voice.program.rendered:
+            model = loaded.model if motion is None else _Motion(motion)
+            self._samples = ModelSamples(voice, model, loaded.initial_m(pluck))
 
     def advance(self) -> None:
         """Append a block to the signal, or less where less is available; silence where the source runs away."""
         signal = self.signal
         readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
         try:
-            if self._program.rendered:
-                self._give(self._more())
-                readable = signal.frames if self._given == signal.frames else self._given - BEHIND
+            if self._samples is not None:
+                readable = self._render(self._samples)
             count = min(readable, signal.frames) - signal.ready_frames
             if count > 0:
                 signal.append(self._offline.read(count) * np.float32(self._ear.full_scale))
         except Runaway:
             signal.end_in_silence()
 
-    def _more(self) -> NDArray[np.float32]:
-        """The next samples to give to the voice, in m, (frames, points)."""
-        stop = min(self._given + RENDERED_FRAMES, self.signal.frames)
-        if self._motion is not None:
-            return np.asarray(self._motion.read(self._given, stop) @ self._weights.astype(np.float32))
-        if self._state is None:
-            self._state = self._source.start(self._initial)
-            return (self._initial @ self._weights).astype(np.float32)
-        if stop == self._given:
-            return self._last[:0]
-        frames, self._state = self._source.advance(self._state, stop - self._given, self._weights)
-        return frames[0].astype(np.float32)
+    def _render(self, samples: ModelSamples) -> int:
+        """Give the voice a block of samples; the number of frames up to which it can be read."""
+        stop = samples.done + RENDERED_FRAMES
+        while samples.voice.room and samples.done < stop and len(samples.advance()):
+            pass
+        return samples.done - BEHIND if samples.voice.room else self.signal.frames
 
-    def _give(self, samples_m: NDArray[np.float32]) -> None:
-        voice = self._offline.voice
-        if len(samples_m):
-            voice.append(samples_m / np.float32(FULL_SCALE_M))
-            self._given += len(samples_m)
-            self._last = np.concatenate([self._last, samples_m])[-MIRRORED - 1 :]
-            if self._given == self.signal.frames:  # a point reflection about its end keeps the signal's slope there
-                mirrored = 2 * self._last[-1:] - self._last[-2::-1]
-                voice.append(mirrored / np.float32(FULL_SCALE_M))
-                voice.end_here()
+
+class _Motion:
+    """The source that has the frames of a motion; a point reflection about the last one continues it."""
+
+    def __init__(self, motion: Pictures) -> None:
+        self._motion = motion
+
+    def start(self, displacement_m: Array) -> int:
+        """The state: the number of the next frame."""
+        return 1
+
+    def advance(self, state: int, steps: int, readout: Array) -> tuple[NDArray[np.floating[Any]], int]:
+        """The next frames as far as they are ready, (1, frames, points)."""
+        motion, last = self._motion, self._motion.frames - 1
+        weights = readout.astype(np.float32)
+        if state <= last:
+            samples = motion.read(state, state + steps) @ weights
+        else:
+            mirrored = np.maximum(2 * last - np.arange(state, state + steps), 0)
+            samples = (2 * motion.read(last) - motion.read()[mirrored]) @ weights
+        return samples[None], state + len(samples)

@@ -11,28 +11,20 @@ from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from app.rendering.blow import BlowRequest, BlowTake
+from app.rendering.note_sound import NoteSound
 from app.rendering.subject import Loaded, Subject
 from app.rendering.take import Listened, Take
-from engine.pluck import Pluck
-from engine.values.ear import Ear
 
 
 @dataclass(frozen=True)
-class RenderRequest:
-    """The pictures and signals of a pluck.
+class RenderRequest(NoteSound):
+    """The sound of a pluck, and how it is drawn.
 
     Attributes:
-        preset: the file, with another string for one of many.
-        seconds: the duration.
-        ear: listening points, pick-up and soloed mode.
         speed: of slow motion; 1 is real time.
         others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
     """
 
-    preset: Subject
-    pluck: Pluck
-    seconds: float
-    ear: Ear
     speed: float = 1.0
     others: tuple[Path, ...] = ()
 

@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from engine.pluck import Pluck
 from engine.presets import Preset, load_preset
 from engine.presets.of_string import of_string
-from engine.sources import ModelSource, TruthSource
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource, StringSource, TruthSource
+from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices import Program, model_program, truth_program
-
-# the voice of the truth takes a quarter of the default sub-steps: an error of 1e-6, for drawing alone
-SUBSTEP_DIVISOR = 4
+from engine.voices import Program, Voice, model_program, truth_program
 
 
 @dataclass(frozen=True)
 class StringOf:
-    """A preset of many strings, played as this one."""
+    """A preset of many strings, played as this one; rate and modes as of `of_string`."""
 
     path: Path
     string: StringParameters
+    rate_hz: int | None = None
+    modes: int | None = None
 
 
 Subject = Path | StringOf
 
 
-def load_subject(subject: Subject) -> Preset:
-    """Load and check the preset.
+def load_subject(subject: Subject, rate_hz: int | None = None) -> Preset:
+    """Load and check the preset, of many strings at a rate where the subject gives none; None: its own.
 
     Raises:
         PresetError: the file cannot be used, or it is not of many strings, or this string is not possible.
     """
+    preset = load_preset(path_of(subject))
     if isinstance(subject, StringOf):
-        return of_string(load_preset(subject.path), subject.string)
-    return load_preset(subject)
+        return of_string(preset, subject.string, subject.rate_hz or rate_hz, subject.modes)
+    return preset if preset.info.family is None else of_string(preset, None, rate_hz)
 
 
 def path_of(subject: Subject) -> Path:
@@ -49,14 +54,15 @@ def string_of(subject: Subject) -> StringParameters | None:
 
 
 class Loaded:
-    """Model and truth of a preset, and the programs of their voices at its own rate, each made when first used.
+    """Model and truth of a preset with the programs of their voices, each made when first used; for any thread.
 
-    Sources have no state, so that all plucks share them.
+    What is heard and what is drawn are voices of these. Sources and programs have no state: all plucks share them.
     """
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
-        self.programs: dict[tuple[str, int], Program] = {}  # by kind, model or truth, and rate of a device
+        self._lock = threading.Lock()
+        self._programs: dict[tuple[bool, int], Program] = {}  # by whether it is the truth's, and rate
 
     @cached_property
     def model(self) -> ModelSource:
@@ -67,10 +73,33 @@ class Loaded:
     def truth(self) -> TruthSource:
         return TruthSource(self.preset.info)
 
-    @cached_property
-    def model_program(self) -> Program:
-        return model_program(self.preset, self.preset.info.rate_hz)
+    def source(self, name: str) -> StringSource:
+        """The truth, or for any other name the model."""
+        return self.truth if name == "truth" else self.model
 
-    @cached_property
-    def truth_program(self) -> Program:
-        return truth_program(self.preset.info, self.preset.info.rate_hz, SUBSTEP_DIVISOR)
+    def program(self, source: str, rate_hz: int) -> Program:
+        """The program of the voices of a source at a rate."""
+        key = source == "truth", rate_hz
+        if (program := self._programs.get(key)) is None:
+            with self._lock:
+                if (program := self._programs.get(key)) is None:
+                    preset = self.preset
+                    program = truth_program(preset.info, rate_hz) if key[0] else model_program(preset, rate_hz)
+                    self._programs[key] = program
+        return program
+
+    def sounds_at(self, rate_hz: int) -> bool:
+        """Return True if the programs of both sources are there."""
+        return all((truth, rate_hz) in self._programs for truth in (True, False))
+
+    def initial_m(self, pluck: Pluck) -> Array:
+        """The string at its release, (grid_points,)."""
+        info = self.preset.info
+        return project(pluck.displacement(info.grid_points), info.modes)
+
+    def voice(
+        self, source: str, pluck: Pluck, ear: Ear, rate_hz: int, seconds: float = 0.0, gain: float = 1.0
+    ) -> Voice:
+        """The voice of a pluck; `seconds`: how many there will be of samples that are rendered."""
+        program = self.program(source, rate_hz)
+        return Voice(program, self.initial_m(pluck), ear, gain, seconds, self.preset.info.rate_hz)

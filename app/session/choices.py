@@ -1,14 +1,10 @@
-"""The session: what the user has chosen, without any widget.
-
-All choices are one immutable, validated value; the session replaces it and signals which fields have changed.
-"""
+"""The choices of the user, as one immutable, validated value."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from psygnal import Signal
 from pydantic import Field, ValidationError, model_validator
 
 from app.patches.drums import Drums
@@ -16,7 +12,6 @@ from app.patches.fields import String, parameter
 from app.patches.patch import Patch
 from app.session.listener import Listener, points_of
 from app.session.monitor import Monitor
-from app.shared.parameters import OF_CHOICES
 from app.shared.value import Value
 from app.shared.vocabulary import Face
 from engine.pluck import Pluck, Shape
@@ -117,10 +112,10 @@ class Choices(Monitor, Listener, ShownString):
         choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
         if choices.preset != self.preset and "string" not in changes:
             choices = choices.model_copy(update={"string": None})
-        return _with_one_pickup(choices, changes)
+        return with_one_pickup(choices, changes)
 
 
-OBSERVED = (*Choices.model_fields, "preset")  # names that `Session.changed` carries
+OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
 
 
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
@@ -149,77 +144,11 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-class Session:
-    """The present choices.
-
-    Signals carry the set of the names of the fields that have new values, of `OBSERVED`. `changed` is emitted after
-    every change, `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
-
-    While a patch is played, its pick-up and `listen`, `listen_right`, `stereo` and `pickup` agree: each follows the
-    other. So the sound is saved, recorded and exported as it is heard.
-    """
-
-    changed = Signal(frozenset)
-    played = Signal(frozenset)
-
-    def __init__(self, choices: Choices | None = None) -> None:
-        self._choices = _with_one_pickup(choices or Choices(), ())
-
-    @property
-    def choices(self) -> Choices:
-        return self._choices
-
-    def update(self, **changes: Any) -> None:
-        """Take new values, all or none, as `Choices.changed`; the preset of the patch chooses the patch.
-
-        Raises:
-            ValueError: a value is out of its range or a field is unknown; nothing has changed then.
-        """
-        patch = self._choices.patch
-        if patch is not None and changes.get("preset") == patch.preset:
-            changes = {**changes, "single": None}
-            del changes["preset"]
-        if names := self._take(changes):
-            self.changed.emit(names)
-
-    def play(self, **changes: Any) -> None:
-        """Take the values that a note brings: as `update`, but no step of undo."""
-        if names := self._take(changes):
-            self.played.emit(names)
-            self.changed.emit(names)
-
-    def _take(self, changes: Mapping[str, Any]) -> frozenset[str]:
-        """Return the names that have new values."""
-        before, self._choices = self._choices, self._choices.changed(changes)
-        return frozenset(name for name in OBSERVED if getattr(before, name) != getattr(self._choices, name))
-
-    def play_patch(self) -> None:
-        """Make the patch that is there the instrument: keys are pitches."""
-        if self._choices.patch is not None:
-            self.update(single=None)
-
-    def play_string(self) -> None:
-        """Make the string that is shown the instrument: keys are places along it."""
-        choices = self._choices
-        self.update(single=choices.preset, string=choices.string)
-
-    def move_pluck(self, position: float, amplitude_mm: float) -> None:
-        """Take the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
-        self.update(
-            position=OF_CHOICES["position"].clamped(position),
-            amplitude_mm=OF_CHOICES["amplitude_mm"].clamped(amplitude_mm),
-        )
-
-    def move_listening_point(self, listen: float) -> None:
-        self.update(listen=OF_CHOICES["listen"].clamped(listen))
-
-    def switch_source(self) -> None:
-        """Switch the sound from slot A to slot B, or back."""
-        self.update(heard="b" if self._choices.heard == "a" else "a")
-
-
-def _with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
+def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
     """The choices in which a patch that is played is heard where its own pick-up says.
+
+    Its pick-up and `listen`, `listen_right`, `stereo` and `pickup` agree: each follows the other. So the sound is
+    saved, recorded and exported as it is heard.
 
     Args:
         asked: the fields that were asked to change. Of these the patch counts before listening points and pick-up,

@@ -8,6 +8,7 @@ from pathlib import Path
 from app.instrument.effects import added_words
 from app.presets.library import Library, PresetEntry
 from app.rendering import RenderRequest
+from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
 from app.shared.vocabulary import DIFFERENCE, OTHER
@@ -45,6 +46,11 @@ def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
 def subject_of(choices: Choices, preset: Path) -> Subject:
     """The string that is shown: the preset's own, or the one that is chosen for a preset of many."""
     return preset if choices.string is None else StringOf(preset, choices.string)
+
+
+def sound_of(choices: Choices, preset: Path, struck: Struck | None = None) -> NoteSound:
+    """The sound of the chosen pluck, or of the key `struck`, played by a preset."""
+    return NoteSound(subject_of(choices, preset), choices.pluck, choices.seconds, choices.ear, struck=struck)
 
 
 def request_of(choices: Choices, library: Library) -> RenderRequest | None:

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QUrl
 from PySide6.QtGui import QDesktopServices
 
 from app.presets.library import Library
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import BrowserRow
 from app.views.controls.preset_bar import PresetBar

@@ -21,13 +21,14 @@ from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
 from app.audio.sound import Sound
+from app.export.sound import compared_sounds
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
-from app.session.choices import OBSERVED, Session
-from app.session.history import History
-from app.session.slots import missing_presets, through_words
+from app.session.choices import OBSERVED
+from app.session.slots import missing_presets, sound_of, through_words
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
+from app.stage.session import Session
 from app.views.controls.app_menu import ENTRIES
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
@@ -41,7 +42,7 @@ from app.window.about import about_text
 from app.window.audio_control import AudioControl, MakeSound
 from app.window.browsing import PresetDesk
 from app.window.dropped_files import Dropped, receive, receive_body
-from app.window.exports import Exports, all_modes_words, note_of, note_words
+from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
@@ -54,7 +55,8 @@ from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
 if TYPE_CHECKING:
-    from app.instrument.learned import Kept
+    from app.export.sound import compared_sounds
+from app.instrument.learned import Kept
 
 LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
 IDLE_LOOK_MS = 50  # while nothing moves
@@ -76,7 +78,7 @@ class Controller(QObject):
     ) -> None:
         super().__init__(window)
         self.window = window
-        self.session = Session(settings.choices)
+        self.session = Session(settings.choices, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._settings = settings
         self._settings_path = settings_path
         self.audio = AudioControl(window, make_sound, settings.device, settings.sound)
@@ -104,22 +106,17 @@ class Controller(QObject):
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
         if self.performance.entry is None and (first := self.library.first()):
-            self.session.update(preset=first.name)
+            self.session.play(preset=first.name)
         for slot, name in missing_presets(self.session.choices, self.library).items():
-            self.session.update(**{slot: "model" if slot == "a" else "truth"})
+            self.session.play(**{slot: "model" if slot == "a" else "truth"})
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
-        self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
-        self._connect_history()
+        self._connect_undo()
         self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance)
-        self.performance.by_hand = self.instruments.by_hand
         self.instruments.begun.connect(self._wake)
-        self.instruments.played.connect(self.performance.follow)
-        self.instruments.played.connect(self._show_struck)
         self.instruments.midi.start()
         self.patches = PatchDesk(
             window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
-        self.instruments.played.connect(self.patches.show_played)
         window.show_keys(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
@@ -128,7 +125,6 @@ class Controller(QObject):
             self.session,
             self.library,
             self.patches.recordings,
-            self.instruments,
             (settings.export, settings.sampled),
         )
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
@@ -139,9 +135,8 @@ class Controller(QObject):
         self.keeper.failed.connect(window.notices.report)
         for problem in problems:
             self.window.notices.report(problem)
-        everything = frozenset(OBSERVED)
-        self.session.changed.connect(self._choices_changed)
-        self._choices_changed(everything)
+        self.session.changed.connect(self._stage_changed)
+        self._stage_changed(frozenset(OBSERVED))
         self._timer.start()
         window.closing.disconnect(self.sound.close)
         window.closing.connect(self.close)
@@ -191,14 +186,13 @@ class Controller(QObject):
         """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
         window = self.window
         session = self.session
-        history = self.history
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
-            "undo": lambda: self._step(history.undo, history.undo_words, "Undone", "Nothing to undo"),
-            "redo": lambda: self._step(history.redo, history.redo_words, "Redone", "Nothing to redo"),
+            "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
+            "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
@@ -219,9 +213,9 @@ class Controller(QObject):
         for name, do in does.items():
             window.action[name].triggered.connect(lambda _=False, do=do: do())
 
-    def _connect_history(self) -> None:
-        window, history = self.window, self.history
-        window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
+    def _connect_undo(self) -> None:
+        window, session = self.window, self.session
+        window.menu.aboutToShow.connect(lambda: window.menu.show_steps(session.undo_words, session.redo_words))
         strip = window.instrument
         knobs = window.transport.knobs.values()
         draggable: tuple[StageView | PatchBar | StringKnobs | Knob, ...] = (
@@ -232,8 +226,8 @@ class Controller(QObject):
             *knobs,
         )
         for dragged in draggable:
-            dragged.drag_started.connect(history.hold)
-            dragged.drag_ended.connect(history.release)
+            dragged.drag_started.connect(session.hold)
+            dragged.drag_ended.connect(session.release)
 
     def _change(self, field: str, value: object) -> None:
         try:
@@ -276,19 +270,17 @@ class Controller(QObject):
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
         entry = self.performance.entry
         choices = self.session.choices
-        struck = self.instruments.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
+        sound = sound_of(choices, entry.path, self.session.stage.struck)
         try:
-            words = note_words(entry.title, choices) if struck is None else struck.words + all_modes_words(choices)
-            material = material_of(entry, choices, words, struck)
+            material = material_of(sound, sound.words(entry.title), choices.volume_db)
         except PresetError as error:
             self.window.notices.report(str(error))
             return
         self.performance.stop()
-        note = note_of(choices, entry, struck)
-        render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
+        render = partial(self.performance.notes.compute, partial(compared_sounds, sound))
         self.performance.compare(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
@@ -402,10 +394,16 @@ class Controller(QObject):
 
     # Session → everything
 
-    def _choices_changed(self, names: frozenset[str]) -> None:
-        self.performance.choices_changed(names)
-        self.instruments.choices_changed(names)
-        self._choices_shown(names)
+    def _stage_changed(self, names: frozenset[str]) -> None:
+        if not names.isdisjoint(OBSERVED):
+            self.performance.choices_changed(names)
+            self.instruments.choices_changed(names)
+            self._choices_shown(names)
+        if names & {"note", "known"} and self.session.stage.known:
+            self.performance.follow()
+            self._show_struck()
+            self.patches.show_played()
+            self.exports.refresh()
 
     def _choices_shown(self, names: frozenset[str]) -> None:
         choices, window = self.session.choices, self.window
@@ -433,7 +431,7 @@ class Controller(QObject):
     def _show_kind(self) -> None:
         """Show the string or the drum; views of a string say that they do not show drums."""
         drums = self.session.choices.drums
-        if (key := self.instruments.drum_key) is not None:
+        if (key := self.session.stage.drum_key) is not None:
             self.drum.show_key(key)
         stage_panel = self.string if drums is None else self.drum
         self.window.show_on_stage(stage_panel, stage_panel.view)
@@ -443,7 +441,7 @@ class Controller(QObject):
 
     def _show_struck(self) -> None:
         """Show the drum that was struck last, and where."""
-        latest, drums = self.instruments.latest, self.session.choices.drums
+        latest, drums = self.session.stage.note, self.session.choices.drums
         if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum:
             return
         if (drum := drums.of_key(latest.event.key)) is not None:

@@ -9,19 +9,18 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
 from app.export.choices import ExportChoices
-from app.export.note import ExportedPluck, HeardNote, musical_name, struck_name
+from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
-from app.export.struck import Struck
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
-from app.presets.words import shape_word
-from app.session.choices import Choices, Session
-from app.session.slots import other_preset
+from app.rendering.note_sound import Struck
+from app.session.choices import Choices
+from app.session.slots import other_preset, sound_of
+from app.stage.session import Session
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
-from app.window.instruments import Instruments
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
@@ -41,19 +40,17 @@ class Exports(QObject):
         session: Session,
         library: Library,
         recordings: Recordings,
-        instruments: Instruments,
         choices: tuple[ExportChoices, SampledChoices],
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
         self._window = window
-        self._recordings, self._instruments = recordings, instruments
+        self._recordings = recordings
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
-        instruments.played.connect(self.refresh)
         window.installEventFilter(self)
 
     @property
@@ -115,7 +112,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._instruments.struck),
+            "note": heard_note(choices, self._library, self._session.stage.struck),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,
@@ -144,27 +141,19 @@ def heard_note(choices: Choices, library: Library, struck: Struck | None = None)
     entry = library.find(choices.preset)
     if entry is None:
         return None
-    note = note_of(choices, entry, struck)
-    saved, words = played_source(choices), note_words(entry.title, choices)
-    return HeardNote(note, saved, another is not None, choices.difference_gain_db, words)
-
-
-def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> ExportedPluck:
-    """The chosen pluck, or the key `struck`, played by a preset."""
-    return ExportedPluck(
-        entry.path,
+    sound = sound_of(choices, entry.path, struck)
+    return HeardNote(
+        sound,
+        played_source(choices),
+        another is not None,
+        choices.difference_gain_db,
+        sound.alone.words(entry.title),
+        _pluck_name(choices, entry) if struck is None else struck_name(struck),
         entry.info.rate_hz,
-        choices.pluck,
-        choices.listen,
-        choices.listen_right if choices.stereo else None,
-        choices.pickup,
-        choices.string,
-        struck,
-        _name(choices, entry) if struck is None else struck_name(struck),
     )
 
 
-def _name(choices: Choices, entry: PresetEntry) -> str:
+def _pluck_name(choices: Choices, entry: PresetEntry) -> str:
     """The name for a file: of the instrument whose key was played, else of the preset."""
     string = choices.string or entry.info.string
     title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
@@ -172,22 +161,3 @@ def _name(choices: Choices, entry: PresetEntry) -> str:
         pluck = choices.instrument.pluck
         title, amplitudes_mm = choices.instrument.name, (pluck.softest_mm, pluck.hardest_mm)
     return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)
-
-
-def note_words(title: str, choices: Choices) -> str:
-    """The pluck and where it is heard, for people."""
-    width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
-    string = f", a string of {choices.string.undamped_frequency(1) / math.tau:.1f} Hz" if choices.string else ""
-    pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:.3g} mm"
-    pickup_words = f"heard at {choices.listen:.2f}"
-    if choices.stereo:
-        pickup_words += f" (left) and {choices.listen_right:.2f} (right)"
-    if choices.pickup == "bridge":
-        pickup_words = "heard at the bridge"
-    kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
-    return f"{title}{string}: {pluck}, {pickup_words}{kind}{all_modes_words(choices)}"
-
-
-def all_modes_words(choices: Choices) -> str:
-    """The remark that files and listening tests have all modes; "" where none is soloed."""
-    return f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""

@@ -11,7 +11,6 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.bodies import body_titles
-from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.facts import (
     facts_of,
@@ -21,7 +20,6 @@ from app.instrument.facts import (
     outside_of_key,
 )
 from app.instrument.midi_file import MidiFileError, read_song
-from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.library import (
     SUFFIX,
@@ -41,10 +39,10 @@ from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letter
 from app.playing.note import PluckVoices
 from app.playing.playback import Playback
 from app.presets.library import Library
-from app.session.choices import Session
 from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
+from app.stage.session import Session
 from app.views.controls.browser_rows import BrowserRow
 from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
@@ -183,7 +181,7 @@ class PatchDesk(BrowserDesk):
             self.choose(name)
         self._session.play_patch()
         if self.patch is not None:
-            drum = self._instruments.drum_key
+            drum = self._session.stage.drum_key
             key = sum(self.patch.range) // 2 if drum is None else drum
             self._song.stop()
             self._playback.play(_note(key))
@@ -211,7 +209,7 @@ class PatchDesk(BrowserDesk):
         if patch is None:
             return
         try:
-            self.change(field, knob_for(patch, self._instruments.shown_key(patch), field, figure))
+            self.change(field, knob_for(patch, self._session.stage.shown_key(patch), field, figure))
         except ValueError as error:
             self._notices.report(one_line(str(error)))
 
@@ -442,17 +440,9 @@ class PatchDesk(BrowserDesk):
         if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
-    @property
-    def _latest(self) -> PluckVoices | KeyNote | None:
-        """The latest note, where it is of the instrument that is played."""
-        latest, instrument = self._instruments.latest, self._session.choices.instrument
-        if not isinstance(latest, KeyNote):
-            return latest
-        return latest if isinstance(instrument, Patch) and not is_another(instrument, latest.patch) else None
-
     def _judge_again(self) -> None:
         """Say soon what of the latest note lies outside the training with the knobs as they are now."""
-        if self._latest is not None:
+        if self._session.stage.note_played is not None:
             self.show_played()
             return
         self._note_timer.stop()
@@ -461,7 +451,7 @@ class PatchDesk(BrowserDesk):
     def _show_latest_note(self) -> None:
         if self.patch is not None:
             self._show_string(self.patch)
-        latest = self._latest
+        latest = self._session.stage.note_played
         is_outdated = isinstance(latest, KeyNote) and latest.patch != self.patch
         self._say(self._outside(latest), of_shown=not is_outdated)
 
@@ -485,12 +475,12 @@ class PatchDesk(BrowserDesk):
         facts: dict[str, str] = {}
         figures: dict[str, str] = {}
         if isinstance(patch.strings, Drums):
-            key = self._instruments.drum_key
+            key = self._session.stage.drum_key
             drum = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
             facts = facts_of_drum(drum)
         else:
             try:
-                key_string = Strings(patch).of_key(*self._instruments.shown_key(patch))
+                key_string = self._session.stage.shown_string(patch)
             except ValueError as error:
                 facts = {"string": str(error)}
             else:

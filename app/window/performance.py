@@ -7,7 +7,7 @@ pluck, and the views show it at the note's own time. All but `play_preset` runs 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QObject, Signal
@@ -17,7 +17,6 @@ from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
@@ -26,19 +25,19 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowRequest, BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import Session, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
 from app.shared.vocabulary import DIFFERENCE
+from app.stage.session import Session
+from app.stage.stage import Turned
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from engine.plain_text import name_text
 from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-PLACED = {"single", *ShownString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 @dataclass
@@ -105,7 +104,6 @@ class Performance(QObject):
     """The owner of the notes and the render worker. Times are in s from the pluck or blow.
 
     Attributes:
-        by_hand: the chosen pluck as an event, which loops play.
         compared: a blind test is open: no other note begins, and all is heard without body and room.
     """
 
@@ -118,7 +116,6 @@ class Performance(QObject):
         self._library = library
         self._sound = sound
         self._panels = panels
-        self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self.compared = False
         self._asked: RenderRequest | BlowRequest | None = None  # the motion that is to be shown
         self._blow: KeyNote | None = None  # the note of a blow that is asked for
@@ -258,10 +255,11 @@ class Performance(QObject):
         self._shown.park(position_s)
         if not self._plays_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
             self.notes.latest = self._shown.note = note
+            self._session.send(Turned(note))
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
-        choices, entry = self._session.choices, self.entry
+        choices = self._session.choices
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
@@ -271,9 +269,6 @@ class Performance(QObject):
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         request = self._request()
-        if names & PLACED and isinstance(request, RenderRequest) and entry is not None and not choices.plays_patch:
-            plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
-            self.notes.prepare_plucks(request.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
         if request != self._asked:  # else an event may have chosen another pluck, which the session takes later
@@ -373,15 +368,14 @@ class Performance(QObject):
         if note is None or take is None or note.request is None or not note.began:
             return
         if turn is not None:
-            if turn.began and not turn.cut:
-                self.notes.latest = turn
-                if self._is_chosen(turn):
-                    self._shown.note = turn
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
                 self._next_turn = None
+                if not turn.cut:
+                    self.notes.latest = turn
+                    self._session.send(Turned(turn))
             return
         if not (note.cut or note.released):
-            self._next_turn = self.notes.turn(note, take.seconds, self.by_hand())
+            self._next_turn = self.notes.turn(note, take.seconds, self._session.stage.by_hand())
 
     def _forget_turn(self) -> None:
         turn, self._next_turn = self._next_turn, None

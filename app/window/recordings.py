@@ -14,9 +14,10 @@ from app.export.played import Played
 from app.instrument.events import NoteOn, PatchTurned
 from app.playing.keys import Keys
 from app.playing.recorder import EventRecorder
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.stage.session import Session
 from app.views.background import Background
 from app.views.dialogs.question import ask
 from app.window.main_window import MainWindow

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from engine import bounds
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
 
 Pickup = Literal["displacement", "velocity", "bridge"]
@@ -22,11 +23,19 @@ class Ear:
         pickup: "velocity" is what a magnetic pick-up senses, brighter by 6 dB an octave. "bridge" is the force on the
             end at 0, which drives an instrument's body; it is the same whatever the points are.
         solo: above 0, this mode alone is heard.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it and the range.
     """
 
     points: tuple[float, ...]
     pickup: Pickup = "displacement"
     solo: int = 0
+
+    def __post_init__(self) -> None:
+        for name, point in zip(("listening point", "right listening point"), self.points, strict=False):
+            bounds.check(name, point, (0, 1))
+        bounds.check_choice("pickup", self.pickup, PICKUPS)
 
     @property
     def full_scale(self) -> float:

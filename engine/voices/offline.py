@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects import Effects
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
@@ -26,35 +26,27 @@ AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # of a block of samples that are rendered
 FILLING = 0.9  # share of the work that these samples are
 
 
+class SampleSource(Protocol):
+    """The methods of `ModelSource` that samples need."""
+
+    def start(self, displacement_m: Array) -> Any: ...
+
+    def advance(self, state: Any, steps: int, readout: Array) -> tuple[NDArray[np.floating[Any]], Any]: ...
+
+
 class OfflineVoice:
     """A voice that is read block by block, without a limiter.
 
     Args:
-        seconds: of one whose samples are rendered: how many of them there will be.
-        source_rate_hz: their rate.
-        gain: a factor of its samples.
-        effects: body and room that it sounds through.
+        voice: the voice, which never ends by itself.
     """
 
-    def __init__(
-        self,
-        program: Program,
-        initial_m: Array,
-        ear: Ear,
-        seconds: float = 0.0,
-        source_rate_hz: int = 0,
-        gain: float = 1.0,
-        effects: Effects | None = None,
-    ) -> None:
-        self.voice = Voice(program, initial_m, ear, gain, seconds, source_rate_hz)
-        self.voice.never_ends()
-        self.voice.sound_through_effects()
-        self._mixer = Mixer(program.rate_hz, limited=False)
-        self._mixer.set_effects(effects)
-        self._mixer.add(self.voice)
-        self.tail_s = effects.tail_s(program.rate_hz) if effects else 0.0
-        wide = effects.impulse(program.rate_hz).shape[1] if effects else 1
-        self.channels = max(wide, len(ear.points))
+    def __init__(self, voice: Voice) -> None:
+        self.voice = voice
+        voice.never_ends()
+        self._mixer = Mixer(voice.program.rate_hz, limited=False)
+        self._mixer.add(voice)
+        self.channels = len(voice.ear.points)
 
     def read(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), ±1 being full scale.
@@ -66,6 +58,44 @@ class OfflineVoice:
         if self.voice.ran_away:
             raise Runaway(self.voice.seconds)
         return block[:, : self.channels]
+
+
+class ModelSamples:
+    """The samples of a voice that is not compiled: its model renders them block by block, for ears and files alike.
+
+    Attributes:
+        done: samples that the voice was given.
+    """
+
+    def __init__(self, voice: Voice, source: SampleSource, initial_m: Array) -> None:
+        self.voice, self._source, self._initial_m = voice, source, initial_m
+        self._weights = voice.program.grid_weights(voice.ear)
+        self._state: Any = None
+        self.done = 0
+
+    def advance(self) -> NDArray[np.float32]:
+        """Give the voice its next block, and return that (frames, points).
+
+        Two short ones let it begin soon: the first prepares the model, the second shows its speed.
+
+        Raises:
+            Runaway: the output stopped being a string's; the voice ends before.
+        """
+        if self._state is None:
+            self._state = self._source.start(self._initial_m[None])
+            block = (self._initial_m @ self._weights)[None]
+        else:
+            steps = min(AHEAD_FIRST if self.done < 2 * AHEAD_FIRST else AHEAD_FRAMES, self.voice.room)
+            try:
+                frames, self._state = self._source.advance(self._state, steps, self._weights)
+            except Runaway:
+                self.voice.end_here()
+                raise
+            block = frames[0].astype(np.float64)
+        samples = (block / FULL_SCALE_M).astype(np.float32)
+        self.voice.append(samples)
+        self.done += len(samples)
+        return samples
 
 
 def render_voice(
@@ -91,29 +121,30 @@ def voice_blocks(
     seconds: float,
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
-    gain: float = 1.0,
-    effects: Effects | None = None,
 ) -> Iterator[NDArray[np.float32]]:
     """The first seconds of a pluck in blocks (frames, channels), ±1 being full scale; no limiter.
 
-    A channel is a listening point; a room or a wide body gives two of one.
+    A channel is a listening point.
 
     Args:
         source: what renders the samples of a program that is not compiled.
         advanced: receives the share that is done now and then; may raise, to end it.
         until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
-            voice is over; body and room then ring out.
-        gain, effects: see `OfflineVoice`.
+            voice is over.
 
     Raises:
         Runaway: the output stopped being a string's.
     """
     initial_m = project(pluck.displacement(info.grid_points), info.modes)
     filled_s = seconds + 0.1 if program.rendered else 0.0
-    offline = OfflineVoice(program, initial_m, ear, filled_s, info.rate_hz, gain, effects)
+    voice = Voice(program, initial_m, ear, 1.0, filled_s, info.rate_hz)
+    offline = OfflineVoice(voice)
     if program.rendered:
         assert source is not None
-        _fill(offline.voice, source, initial_m, ear, advanced)
+        samples, total = ModelSamples(voice, source, initial_m), voice.room
+        while voice.room:
+            samples.advance()
+            advanced(FILLING * (1 - voice.room / total))
     frames = max(1, round(seconds * program.rate_hz))
     loudest_db = -math.inf
     for first in range(0, frames, BLOCK_FRAMES):
@@ -124,27 +155,6 @@ def voice_blocks(
         level_db = offline.voice.level_db
         loudest_db = max(loudest_db, level_db)
         if until_db is not None and (level_db < loudest_db - until_db or offline.voice.over):
-            rest = min(round((offline.tail_s or SILENCE_S) * program.rate_hz), frames - done)
-            yield offline.read(rest) if effects else np.zeros((rest, offline.channels), np.float32)
+            rest = min(round(SILENCE_S * program.rate_hz), frames - done)
+            yield np.zeros((rest, offline.channels), np.float32)
             return
-
-
-def ahead_frames(rendered: int) -> int:
-    """The frames of the next block of a voice that is rendered ahead, after so many: for ears and files alike.
-
-    Two short ones let it begin soon: the first prepares the model, the second shows its speed.
-    """
-    return AHEAD_FIRST if rendered < 2 * AHEAD_FIRST else AHEAD_FRAMES
-
-
-def _fill(voice: Voice, source: ModelSource, initial_m: Array, ear: Ear, advanced: Callable[[float], None]) -> None:
-    """Render all samples of a voice beforehand."""
-    weights = voice.program.grid_weights(ear)
-    state = source.start(initial_m[None])
-    voice.append((initial_m @ weights)[None] / FULL_SCALE_M)
-    total = voice.room
-    while voice.room:
-        steps = min(ahead_frames(total - voice.room), voice.room)
-        frames, state = source.advance(state, steps, weights)
-        voice.append(frames[0].astype(np.float64) / FULL_SCALE_M)
-        advanced(FILLING * (1 - voice.room / total))

@@ -47,7 +47,6 @@ class Voice(KernelMemory):
         displacement_m: at its release, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
         seconds: of a rendered voice: how much room there is for its samples, of which none is needed after its end.
-        begin: what `program.start` gives for this displacement, where it is known.
     """
 
     layout = VOICE
@@ -60,7 +59,6 @@ class Voice(KernelMemory):
         gain: float = 1.0,
         seconds: float = 0.0,
         source_rate_hz: int = 0,
-        begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
         rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
@@ -80,9 +78,8 @@ class Voice(KernelMemory):
         record["silent"] = SILENT_DB * math.log(10) / 20
         record["peak"] = max(float(np.abs(displacement_m).max()), LEAST_PEAK_M)
         record["limit"] = RUNAWAY_FACTOR * largest(ear, displacement_m, program.force) / FULL_SCALE_M
-        first, second = program.start(displacement_m) if begin is None else begin
         if n:
-            self.rows[0], self.rows[1] = first, second
+            self.rows[0], self.rows[1] = program.start(displacement_m)
         self._samples: NDArray[np.float32] | None = None
         self._source_rate_hz = source_rate_hz
         if program.resonator is not None:

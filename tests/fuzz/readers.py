@@ -14,14 +14,14 @@ import soundfile
 import torch
 
 from app.audio.impulse_file import ImpulseError, read_impulse
-from app.export.recipe import InstrumentSound, RecipeError, SoundRecipe, read_recipe, request_of
-from app.export.sound import SoundRequest
+from app.export.recipe import InstrumentSound, RecipeError, SoundRecipe, read_recipe
 from app.export.wav import WavSettings
 from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi, read_song
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
 from app.patches.tuning import Tuning, TuningChoice, read_scala
+from app.rendering.note_sound import NoteSound
 from app.window.settings import Settings, load_settings
 from engine.effects import Body, Effects
 from engine.pluck import Pluck
@@ -120,7 +120,8 @@ def wav(folder: Path, comment: str) -> bytes:
 
 
 def recipe_text(preset: Path) -> str:
-    return SoundRecipe.of(SoundRequest(load_preset(preset), Pluck(), 0.37, 0.1), WavSettings()).model_dump_json()
+    sound = NoteSound(preset, Pluck(), 0.1, Ear((0.37,)))
+    return SoundRecipe.of(sound, sound.load(), "model", WavSettings()).model_dump_json()
 
 
 def played_text() -> str:
@@ -265,7 +266,7 @@ HEARD = f"{','.join(COLUMNS)}\na,{'0' * 64},4,0.5,-1,0,0.1,,,1\n".encode()
 def recipe(preset: Path) -> Callable[[Path], None]:
     def read(path: Path) -> None:
         found = read_recipe(path)
-        request_of(found, load_preset(preset), path)
+        found.sound(preset, path)
         assert found.settings.fade_out_s <= 600
 
     return read

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,15 +11,14 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
-from app.export.struck import Struck, StruckKey
-from app.presets.library import PresetEntry
-from app.session.choices import Choices, ShownString
-from app.session.listener import Listener
+from app.export.recipe import StruckKey
+from app.rendering.note_sound import NoteSound
+from app.rendering.subject import path_of, string_of
 from app.shared.version import program_version
+from engine.plain_text import name_text
 from engine.presets import preset_digest
 from engine.result_file import WriteError, explain, whole_file
 
-PLUCK_FIELDS = {"seconds", *ShownString.model_fields, *Listener.model_fields} - {"listen_right", "stereo", "solo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
     f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "
@@ -95,25 +95,25 @@ class AbxRecord(BaseModel):
         return "This test did not show that you can tell them apart."
 
 
-def material_of(entry: PresetEntry, choices: Choices, words: str, struck: Struck | None = None) -> AbxRecord:
-    """Model (A) and truth (B) of a preset, plucked and heard as chosen.
+def material_of(sound: NoteSound, words: str, volume_db: float) -> AbxRecord:
+    """Model (A) and truth (B) of a note.
 
     Args:
         words: for people.
-        struck: the key of an instrument that is compared; None: the chosen string by itself.
 
     Raises:
-        PresetError: its file cannot be read.
+        PresetError: its preset's file cannot be read.
     """
-    digest = preset_digest(entry.path)
-    a, b = (Candidate(label=label, preset=entry.name, preset_sha256=digest) for label in ("Model", "Truth"))
-    through = {"volume_db": choices.volume_db}
-    if struck is None:
-        fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
-        pluck = choices.model_dump(mode="json", include=fields)
+    path, string, points = path_of(sound.preset), string_of(sound.preset), sound.ear.points
+    name, digest = name_text(path.stem), preset_digest(path)
+    a, b = (Candidate(label=label, preset=name, preset_sha256=digest) for label in ("Model", "Truth"))
+    pluck: dict[str, object] = {"seconds": sound.seconds}
+    if sound.struck is not None:
+        pluck |= StruckKey.of(sound.struck).model_dump(mode="json")
     else:
-        pluck = {"seconds": choices.seconds, **StruckKey.of(struck).model_dump(mode="json")}
-    return AbxRecord(a=a, b=b, words=words, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
+        pluck |= {"string": string and asdict(string), **asdict(sound.pluck), "pickup": sound.ear.pickup}
+        pluck |= dict(zip(("listen", "listen_right"), points, strict=False))
+    return AbxRecord(a=a, b=b, words=words, pluck=pluck, through={"volume_db": volume_db}, planned_trials=1, seed=0)
 
 
 def p_text(p_value: float) -> str:

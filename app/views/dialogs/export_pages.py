@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QWidget
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
-from app.export.note import ExportedPluck, HeardNote, NoteExport
+from app.export.note import HeardNote, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
 from app.export.plugin.formats import PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
@@ -22,11 +22,13 @@ from app.export.sampled.choices import SampledChoices
 from app.export.sampled.job import SampledExport, plain_stem, planned
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
-from app.export.sound import DECAY_RANGE_DB, LONGEST_S
+from app.export.sound import LONGEST_S
+from app.export.wav import DECAY_RANGE_DB
 from app.instrument.effects import added_words, body_problem
 from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
+from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
 from app.views.controls.form import FilePicker, Rows, check_box, filled_form, row_of
 from app.views.controls.number_box import CountBox, NoteBox, NumberBox
@@ -223,7 +225,7 @@ class NotePage(ExportPage):
     def job(self) -> NoteExport:
         if self._subject is None:
             raise ValueError(self.missing)
-        return NoteExport(self._subject.note, self.paths(), self.choices())
+        return NoteExport(self._subject.sound, self.paths(), self.choices())
 
     def offer(self) -> tuple[str, str]:
         there = any(path.is_file() for path in self.job().paths.values())
@@ -235,19 +237,20 @@ class NotePage(ExportPage):
             spin.setVisible(visible)
         if self._subject is None:
             return
-        note = self._subject.note
+        subject, sound = self._subject, self._subject.sound
         source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
         self.gain.setVisible(source == "difference")
-        alone = note.can_be_alone and not self.through.isChecked()
-        self.through.setVisible(note.can_be_alone)
-        self.through_words.setText(_through_words(note, alone, source))
-        struck = None if alone else note.struck
+        can_be_alone = sound.alone != sound
+        alone = can_be_alone and not self.through.isChecked()
+        self.through.setVisible(can_be_alone)
+        self.through_words.setText(_through_words(sound, alone, source))
+        struck = None if alone else sound.struck
         key_words = struck and f"Note: {struck.words}, held, with the present settings"
-        self.what.setText(key_words or self._subject.words)
-        beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
-        model_rate = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
-        self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else model_rate)
-        self.file.suggest(note.file_name("model" if source == "files" else source))
+        self.what.setText(key_words or subject.words)
+        beyond = f"adds no bandwidth: the model ends at {subject.preset_rate_hz / 2000:g} kHz"
+        model_rate = "" if rate_hz else f"{subject.preset_rate_hz / 1000:g} kHz"
+        self._wav.note.setText(beyond if rate_hz > subject.preset_rate_hz else model_rate)
+        self.file.suggest(subject.file_name("model" if source == "files" else source))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
         self._form.setRowVisible(self.names, two)
@@ -481,15 +484,16 @@ def _this_system() -> str:
         return next(iter(SYSTEM_NAMES))
 
 
-def _through_words(note: ExportedPluck, alone: bool, source: Chosen) -> str:
+def _through_words(sound: NoteSound, alone: bool, source: Chosen) -> str:
     """The parts of an instrument that are in the file."""
-    if note.struck is None:
+    if sound.struck is None:
         return "None: the string alone, as it is heard"
+    patch = sound.struck.patch
     if alone:
-        return f"The string alone, without {note.struck.patch.name}"
+        return f"The string alone, without {patch.name}"
     if source == "difference":
-        return f"{note.struck.patch.name}, without amplifier, body and room, as a difference is heard"
-    return f"{note.struck.patch.name} with {added_words(note.struck.patch)}, as it is heard"
+        return f"{patch.name}, without amplifier, body and room, as a difference is heard"
+    return f"{patch.name} with {added_words(patch)}, as it is heard"
 
 
 def _value_of(control: Control) -> Any:

@@ -19,9 +19,10 @@ from threadpoolctl import threadpool_limits
 
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
 from app.session.shown import ShownSource, full_scale_words, shown_sources
 from app.shared.worker import Job, Work
+from app.stage.session import Session
 from app.views.background import Background
 from app.views.controls.parts import lay_out_alone, words_label
 from app.views.controls.plain import Label

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QMenu, QToolButton
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets import words
 from app.presets.library import Library, PresetEntry
-from app.session.choices import Session
 from app.session.slots import other_preset
+from app.stage.session import Session
 from app.views.controls.parts import tool_button
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import ComputedPanel, Moment

@@ -7,8 +7,8 @@ from typing import ClassVar
 import pyqtgraph as pg
 
 from app.presets.library import Library
-from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES, LEGEND_FIELDS, ShownSource, part_words, shown_sources
+from app.stage.session import Session
 from app.views.plots.axis_label import UprightLabel
 from app.views.plots.legend import Legend, set_curves
 from app.window.panels.base import Panel

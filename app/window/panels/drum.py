@@ -7,12 +7,12 @@ import math
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
-from app.session.choices import Session
 from app.session.listener import Listener
 from app.session.shown import LEGEND_FIELDS, ShownSource
 from app.session.silence import why_silent
 from app.shared.key_names import note_name
 from app.shared.vocabulary import DIFFERENCE
+from app.stage.session import Session
 from app.views.drum.axes import Place
 from app.views.drum.ink import HeadFrame
 from app.views.drum.view import DrumView

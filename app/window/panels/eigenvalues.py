@@ -17,8 +17,8 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent
 from app.analysis.poles import PoleFigure, Poles, pole_figure
 from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject
-from app.session.choices import Session
 from app.session.slots import subject_of
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, combo_box, lay_out_view
 from app.views.controls.segments import SMALL

@@ -17,9 +17,9 @@ from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, Plane
 from app.presets.library import Library
 from app.presets.words import percent
 from app.rendering.subject import Subject, load_subject, string_of
-from app.session.choices import Session
 from app.session.slots import info_of, subject_of
 from app.shared.worker import Job
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, lay_out_view
 from app.views.plots.axis_label import UprightTicks

@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from app.presets import words
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.segments import SMALL, Segments

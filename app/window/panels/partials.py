@@ -7,7 +7,7 @@ import math
 from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views.controls.parts import combo_box
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import ComputedPanel

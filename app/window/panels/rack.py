@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.presets.library import Library
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views.controls.deck import Deck
 from app.views.plots.plots import dress_plots
 from app.window.main_window import MainWindow

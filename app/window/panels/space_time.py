@@ -10,8 +10,8 @@ from PySide6.QtCore import QRectF
 from app.analysis.space_time import Envelopes, Picture, picture
 from app.presets.library import Library
 from app.rendering import SOURCES, BlowTake, Sounding, Take
-from app.session.choices import Session
 from app.session.shown import readable_unit
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import combo_box
 from app.views.controls.segments import SMALL, Segments

@@ -13,7 +13,7 @@ from PySide6.QtCore import QRectF
 from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.parts import combo_box
 from app.views.controls.segments import SMALL, Segments

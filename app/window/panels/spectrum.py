@@ -16,8 +16,8 @@ from app.analysis.heard import HeardSignal
 from app.analysis.spectrogram import FrequencyRows
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Session
 from app.session.shown import ShownSource, shown_sources
+from app.stage.session import Session
 from app.views import theme
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view

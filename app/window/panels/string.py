@@ -12,13 +12,14 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
-from app.session.choices import Choices, Session, ShownString
+from app.session.choices import Choices, ShownString
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.shown import LEGEND_FIELDS
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
+from app.stage.session import Session
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView

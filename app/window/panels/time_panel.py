@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app.analysis.growing import Growing, keep_up
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.session.choices import Session
+from app.stage.session import Session
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import lay_out_view
 from app.views.plots.axis_label import UprightLabel, UprightTicks

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.session.choices import Session
 from app.session.shown import readable_unit, shown_sources
+from app.stage.session import Session
 from app.views.controls.parts import lay_out_alone
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment

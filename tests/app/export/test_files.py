@@ -17,15 +17,16 @@ from app.export.files import (
     export_sounds,
 )
 from app.export.recipe import SoundRecipe
-from app.export.sound import SoundRequest, Voices
+from app.export.sound import VOICES, Voices, check_sources
 from app.export.wav import WavSettings
 from app.playing.ahead import AheadVoice
+from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import BITS, Bits, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, PresetError, load_preset
+from engine.presets import SHIPPED, PresetError
 from engine.resonators.sine_transform import listening_weights, project
 from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
@@ -39,20 +40,20 @@ PLAIN = WavSettings("32f", fade_out_s=0)
 
 
 @pytest.fixture
-def request_(small_preset: Path) -> SoundRequest:
-    return SoundRequest(load_preset(small_preset), Pluck(0.35, 4.0), listen=0.37, seconds=0.2)
+def plucked(small_preset: Path) -> NoteSound:
+    return NoteSound(small_preset, Pluck(0.35, 4.0), 0.2, Ear((0.37,)))
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
-    request_: SoundRequest, kind: Source
+    plucked: NoteSound, kind: Source
 ) -> None:
-    preset = request_.preset
+    preset = plucked.load()
     source = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
-    start_m = project(request_.pluck.displacement(101), 10)
+    start_m = project(plucked.pluck.displacement(101), 10)
     frames, _ = source.advance(source.start(start_m[None]), 799)
     whole_m = np.concatenate([start_m[None], frames[0]]) @ listening_weights(np.array([0.37]), 101)[:, 0]
-    found = render_sound(replace(request_, source=kind))
+    found = render_sound(plucked, kind)
     assert len(found) == 800
     attack = round(ATTACK_S * preset.info.rate_hz)
     assert found[attack:] == pytest.approx(whole_m[attack:] / FULL_SCALE_M, abs=2e-5)
@@ -64,20 +65,19 @@ COMPILED = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors
 
 @pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
 def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
-    request_: SoundRequest, preset: str, kind: Source, tmp_path: Path
+    plucked: NoteSound, preset: str, kind: Source, tmp_path: Path
 ) -> None:
-    asked = replace(request_, source=kind)
-    if preset == "compiled":
-        asked = replace(asked, preset=load_preset(COMPILED))
-    info = asked.preset.info
-    export_sound(asked, tmp_path / "a.wav", WavSettings("32f", 48_000, fade_out_s=0))
+    sound = replace(plucked, preset=COMPILED) if preset == "compiled" else plucked
+    loaded = sound.load()
+    info = loaded.info
+    export_sound(sound, tmp_path / "a.wav", kind, WavSettings("32f", 48_000, fade_out_s=0))
     exported, _ = soundfile.read(tmp_path / "a.wav", dtype="float32")
-    program = truth_program(info, 48_000) if kind == "truth" else model_program(asked.preset, 48_000)
+    program = truth_program(info, 48_000) if kind == "truth" else model_program(loaded, 48_000)
     assert program.rendered == (preset == "small")
-    initial_m, ear = project(asked.pluck.displacement(101), info.modes), Ear((0.37,))
+    initial_m, ear = project(sound.pluck.displacement(101), info.modes), Ear((0.37,))
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
-        source = ModelSource(asked.preset)
+        source = ModelSource(loaded)
         ahead = AheadVoice(voice, source, initial_m, weights_of(ear, 101), (), lambda: None, lambda error: None)
         while not ahead.finished:
             ahead.advance()
@@ -89,11 +89,11 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
 
 
 @pytest.mark.parametrize("bits", BITS)
-def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: Bits, tmp_path: Path) -> None:
+def test_a_file_holds_the_sound_and_its_recipe(plucked: NoteSound, bits: Bits, tmp_path: Path) -> None:
     path = tmp_path / "a.wav"
     settings = WavSettings(bits, fade_out_s=0)
-    report = export_sound(request_, path, settings)
-    expected = render_sound(request_)
+    report = export_sound(plucked, path, settings=settings)
+    expected = render_sound(plucked)
     with soundfile.SoundFile(path) as file:
         found = file.read(dtype="float64")
         recipe = json.loads(file.comment)
@@ -102,34 +102,32 @@ def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: Bit
     assert np.abs(found - expected).max() < {"16": 5e-5, "24": 1e-7, "32f": 1e-7}[bits]
     assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
     assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
-    assert recipe == json.loads(SoundRecipe.of(request_, settings).model_dump_json())
-    assert recipe["preset_sha256"] == hashlib.sha256(request_.preset.path.read_bytes()).hexdigest()
-    assert Pluck(**recipe["pluck"]) == request_.pluck
+    assert recipe == json.loads(SoundRecipe.of(plucked, plucked.load(), "model", settings).model_dump_json())
+    assert recipe["preset_sha256"] == hashlib.sha256(plucked.load().path.read_bytes()).hexdigest()
+    assert Pluck(**recipe["pluck"]) == plucked.pluck
 
 
-def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(
-    request_: SoundRequest, tmp_path: Path
-) -> None:
-    request, settings = replace(request_, difference_gain_db=80.0), WavSettings("24", normalise=True)
+def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(plucked: NoteSound, tmp_path: Path) -> None:
+    settings = WavSettings("24", normalise=True, difference_gain_db=80.0)
     paths = {source: tmp_path / f"{source}.wav" for source in ("model", "difference")}
-    export_sounds(request, paths, settings)  # type: ignore[arg-type]
+    export_sounds(plucked, plucked.load(), paths, settings)  # type: ignore[arg-type]
     alone = tmp_path / "alone.wav"
     for source, path in paths.items():
-        export_sound(replace(request, source=source), alone, settings)  # type: ignore[arg-type]
+        export_sound(plucked, alone, source, settings)  # type: ignore[arg-type]
         assert (soundfile.read(alone)[0] == soundfile.read(path)[0]).all()
 
 
-def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> None:
+def test_cancelling_leaves_no_file(plucked: NoteSound, tmp_path: Path) -> None:
     def cancel(*_: object) -> None:
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        export_sound(request_, tmp_path / "a.wav", progress=cancel)
+        export_sound(plucked, tmp_path / "a.wav", progress=cancel)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_full_disk_leaves_what_was_there(
-    request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.wav"
     path.write_bytes(b"old")
@@ -139,45 +137,49 @@ def test_a_full_disk_leaves_what_was_there(
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(WriteError, match=r"a\.wav: cannot be written .*; free some space"):
-        export_sound(request_, path)
+        export_sound(plucked, path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_preset_that_vanished_is_reported(request_: SoundRequest, tmp_path: Path) -> None:
-    gone = replace(request_, preset=replace(request_.preset, path=tmp_path / "gone.safetensors"))
+def test_a_preset_that_vanished_is_reported(plucked: NoteSound, tmp_path: Path) -> None:
+    gone = replace(plucked.load(), path=tmp_path / "gone.safetensors")
     with pytest.raises(PresetError, match=r"gone\.safetensors: the preset cannot be read any more"):
-        export_sound(gone, tmp_path / "a.wav")
+        export_sounds(plucked, gone, {"model": tmp_path / "a.wav"}, PLAIN)
 
 
 def test_samples_that_are_not_finite_are_refused(
-    request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken = Voices({"model": np.array([[np.inf]])})
     monkeypatch.setattr("app.export.files.render_voices", lambda *_, **__: broken)
     with pytest.raises(WriteError, match=r"a\.wav: .*not finite"):
-        export_sound(request_, tmp_path / "a.wav")
+        export_sound(plucked, tmp_path / "a.wav")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"listen": 1.2}, "0 … 1, not 1.2"),
+        ({"points": (1.2,)}, "0 … 1, not 1.2"),
         ({"seconds": 0.0}, "at most 600, not 0"),
         ({"seconds": 601.0}, "at most 600, not 601"),
         ({"seconds": float("nan")}, "not nan"),
         ({"source": "all"}, "model, truth, difference, both"),
-        ({"source": "both", "listen_right": 0.5}, "choose two files, or mono"),
-        ({"listen_right": -0.1}, "right listening point must lie in 0 … 1"),
+        ({"source": "both", "points": (0.3, 0.5)}, "choose two files, or mono"),
+        ({"points": (0.3, -0.1)}, "right listening point must lie in 0 … 1"),
         ({"pickup": "magnet"}, "displacement, velocity, bridge"),
         ({"decay_db": 5.0}, "decay_db must lie in 10 … 120, not 5"),
         ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
     ],
 )
-def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict, message: str) -> None:
+def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, message: str) -> None:
+    wanted = {"points": (0.3,), "pickup": "displacement", "seconds": 0.2, "source": "model", **change}
     with pytest.raises(ValueError, match=message):
-        replace(request_, **change)
+        ear = Ear(wanted.pop("points"), wanted.pop("pickup"))
+        sound = replace(plucked, seconds=wanted.pop("seconds"), ear=ear)
+        check_sources(sound, [wanted.pop("source")], 4_000)
+        WavSettings(**wanted)
 
 
 def test_the_file_name_reports_what_is_in_it() -> None:
@@ -185,15 +187,16 @@ def test_the_file_name_reports_what_is_in_it() -> None:
     assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both") == "b_x0.1234_a0.25_4000_both.wav"
 
 
-def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: SoundRequest, tmp_path: Path) -> None:
-    model, truth = (render_sound(replace(request_, source=s)) for s in ("model", "truth"))  # type: ignore[arg-type]
-    assert (render_sound(replace(request_, source="both")) == np.stack([model, truth], axis=1)).all()
+def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(plucked: NoteSound, tmp_path: Path) -> None:
+    model, truth = (render_sound(plucked, source) for source in VOICES)
+    assert (render_sound(plucked, "both") == np.stack([model, truth], axis=1)).all()
     paths = {"model": tmp_path / "m.wav", "truth": tmp_path / "t.wav", "difference": tmp_path / "d.wav"}
-    reports = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
+    settings = WavSettings("32f", normalise=True, fade_out_s=0)
+    reports = export_sounds(plucked, plucked.load(), paths, settings)  # type: ignore[arg-type]
     assert [report.path for report in reports] == list(paths.values())
     assert len({report.gain_db for report in reports}) == 1
     difference, loud = (
-        render_sound(replace(request_, source="difference", difference_gain_db=gain_db)) for gain_db in (0.0, 20.0)
+        render_sound(plucked, "difference", WavSettings(difference_gain_db=gain_db)) for gain_db in (0.0, 20.0)
     )
     assert (difference == model - truth).all() and loud == pytest.approx(10 * difference)
     m, t, d = (soundfile.read(path)[0] for path in paths.values())
@@ -201,16 +204,16 @@ def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: Sou
     assert max(np.abs(m).max(), np.abs(t).max()) == pytest.approx(10 ** (-1 / 20), rel=1e-6)
 
 
-def test_a_right_listening_point_makes_stereo(request_: SoundRequest) -> None:
-    stereo = render_sound(replace(request_, listen_right=0.6))
-    assert stereo[:, 0] == pytest.approx(render_sound(request_), abs=1e-6)
-    assert stereo[:, 1] == pytest.approx(render_sound(replace(request_, listen=0.6)), abs=1e-6)
+def test_a_right_listening_point_makes_stereo(plucked: NoteSound) -> None:
+    stereo = render_sound(replace(plucked, ear=Ear((0.37, 0.6))))
+    assert stereo[:, 0] == pytest.approx(render_sound(plucked), abs=1e-6)
+    assert stereo[:, 1] == pytest.approx(render_sound(replace(plucked, ear=Ear((0.6,)))), abs=1e-6)
 
 
-def test_velocity_is_the_derivative_of_displacement(request_: SoundRequest) -> None:
-    displacement_m = render_sound(request_) * FULL_SCALE_M
+def test_velocity_is_the_derivative_of_displacement(plucked: NoteSound) -> None:
+    displacement_m = render_sound(plucked) * FULL_SCALE_M
     expected = np.gradient(displacement_m, 1 / 4000) / FULL_SCALE_M_S
-    found = render_sound(replace(request_, pickup="velocity"))
+    found = render_sound(replace(plucked, ear=Ear((0.37,), "velocity")))
     slow = np.convolve(found - expected, np.ones(16) / 16, "valid")  # central differences are low at high partials
     assert np.abs(slow[4:]).max() < 0.05 * np.abs(found).max()
     assert found[0] == pytest.approx(0, abs=1e-9)
@@ -225,12 +228,12 @@ def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
 
 
 def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_reported(
-    request_: SoundRequest, tmp_path: Path
+    plucked: NoteSound, tmp_path: Path
 ) -> None:
-    decaying = replace(request_, seconds=8.0, decay_db=10.0)
-    model = export_sound(decaying, tmp_path / "m.wav")
-    truth = export_sound(replace(decaying, source="truth"), tmp_path / "t.wav")
+    decaying, settings = replace(plucked, seconds=8.0), WavSettings(decay_db=10.0)
+    model = export_sound(decaying, tmp_path / "m.wav", settings=settings)
+    truth = export_sound(decaying, tmp_path / "t.wav", "truth", settings)
     assert model.frames == truth.frames < 8 * 4000
     assert model.decayed
     assert truth.past_training_s == 0 < model.past_training_s
-    assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav").decayed
+    assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav", settings=settings).decayed

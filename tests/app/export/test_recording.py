@@ -11,10 +11,10 @@ import pytest
 
 from app.export import recording, wav
 from app.export.recording import Recording, blocks
-from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
+from app.rendering.note_sound import NoteSound
 from engine.pluck import Pluck
-from engine.presets import load_preset
+from engine.values.ear import Ear
 from tests.app.sounds import export_sound
 
 
@@ -55,12 +55,12 @@ def test_a_disk_that_becomes_full_is_reported(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_memory_does_not_grow_with_the_duration(small_preset: Path, tmp_path: Path) -> None:
-    preset, settings = load_preset(small_preset), WavSettings("16", 192_000, normalise=True)
+    settings = WavSettings("16", 192_000, normalise=True)
     peaks = []
     for seconds in (0.5, 1.0, 4.0):  # the first also pays what is loaded once
-        request = SoundRequest(preset, Pluck(), 0.37, seconds, "truth", 0.6)
+        sound = NoteSound(small_preset, Pluck(), seconds, Ear((0.37, 0.6)))
         tracemalloc.start()
-        report = export_sound(request, tmp_path / "long.wav", settings)
+        report = export_sound(sound, tmp_path / "long.wav", "truth", settings)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert report.frames == seconds * 192_000

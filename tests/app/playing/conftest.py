@@ -21,7 +21,7 @@ from app.rendering import RenderRequest
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, read_info
 from engine.values.ear import Ear
-from engine.voices import Mixer, Voice
+from engine.voices import Mixer
 from tests.app.monitors import hears
 
 DEADLINE_S = 30.0
@@ -125,8 +125,7 @@ class Lab:
     def alone(self, pluck: RenderRequest, seconds: float, source: str = "model") -> np.ndarray:
         """The sound of one source of a pluck in a mixer of its own, (frames,)."""
         mixer = Mixer(48_000)
-        initial_m, begin = self.sources.begin(pluck.preset, source, 48_000, pluck.pluck)
-        mixer.add(Voice(self.sources.program(pluck.preset, source, 48_000), initial_m, pluck.ear, begin=begin))
+        mixer.add(self.sources.load(pluck.preset).voice(source, pluck.pluck, pluck.ear, 48_000))
         return mixer.render(round(48_000 * seconds))[:, 0]
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
+from app.playing.ahead import CARE, LEAST_S, Ahead, AheadSamples
+from app.playing.note import PluckVoices
+from app.rendering import RenderRequest
 from engine.levels import FULL_SCALE_M
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
-from engine.resonators.sine_transform import project
 from engine.voices import Mixer, Voice
-from engine.voices.ear import weights_of
 from tests.app.playing.conftest import EAR, Lab
 
 RATE_HZ = 4_000  # of the small preset and of the mixer: samples are heard as they are rendered
@@ -23,39 +24,36 @@ ADVANCE = KoopmanVar.advance
 
 
 class Ahead4k:
-    """Renders voices of the small preset, and notes what they report."""
+    """Renders voices of the small preset, and notes what is reported of them."""
 
     def __init__(self, lab: Lab) -> None:
-        self.ahead, self.wait = Ahead(), lab.wait
+        self.ahead, self.wait = Ahead(self._begin, lambda note, error: self.errors.append(error)), lab.wait
         self.model = lab.sources.load(lab.small_preset)
-        self.program = lab.sources.program(lab.small_preset, "model", RATE_HZ)
         self.begun_s: list[float] = []  # how much was rendered then
         self.errors: list[Exception] = []
-        self.given_up = False
+        self.notes: list[PluckVoices] = []
+
+    def _begin(self, note: PluckVoices) -> None:
+        note.pending = False
+        self.begun_s.append(note.ahead[0].rendered_s)
 
     def render(
         self, seconds: float = 1.0, from_s: float = 0.0, key: object = None, amplitude_mm: float = 3.0
-    ) -> AheadVoice:
-        info = self.model.preset.info
-        initial_m = project(Pluck(0.4, amplitude_mm).displacement(info.grid_points), info.modes)
-        voice = AheadVoice(
-            Voice(self.program, initial_m, EAR, 1.0, seconds, info.rate_hz),
-            self.model.model,
-            initial_m,
-            weights_of(EAR, info.grid_points),
-            (key or object(),),
-            lambda: self.begun_s.append(voice.rendered_s),
-            self.errors.append,
-            lambda: self.given_up,
-            from_s,
-        )
-        self.ahead.render(voice)
-        return voice
+    ) -> AheadSamples:
+        pluck = Pluck(0.4, amplitude_mm)
+        voice = self.model.voice("model", pluck, EAR, RATE_HZ, seconds)
+        note = PluckVoices(RenderRequest(Path(), pluck, seconds, EAR), ("model",), from_s, voices={"model": voice})
+        initial_m = self.model.initial_m(pluck)
+        samples = AheadSamples(voice, self.model.model, initial_m, (key or object(),), from_s)
+        note.ahead.append(samples)
+        self.notes.append(note)
+        self.ahead.render(note)
+        return samples
 
-    def finished(self, **options: Any) -> AheadVoice:
-        voice = self.render(**options)
-        self.wait(lambda: voice.finished and voice.begun)
-        return voice
+    def finished(self, **options: Any) -> AheadSamples:
+        samples = self.render(**options)
+        self.wait(lambda: samples.finished and not self.notes[-1].pending)
+        return samples
 
 
 @pytest.fixture
@@ -88,7 +86,8 @@ def test_it_begins_when_a_little_is_there_and_is_the_models_signal(at: Ahead4k) 
     voice = at.finished()
     (begun_s,) = at.begun_s
     assert LEAST_S <= begun_s < 1.0 and voice.waits_s == 0
-    frames, _ = voice.source.advance(voice.source.start(voice.initial_m[None]), 2_000, voice.weights)
+    model, initial_m = at.model.model, at.model.initial_m(Pluck(0.4, 3.0))
+    frames, _ = model.advance(model.start(initial_m[None]), 2_000, voice.voice.program.grid_weights(EAR))
     attack, expected = 16, frames[0, :, 0] / FULL_SCALE_M
     assert heard(voice.voice, 2_001)[1 + attack :] == pytest.approx(expected[attack:], abs=1e-5)
 
@@ -106,8 +105,8 @@ def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
 def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
     first = at.finished(key="a")
     at.finished(key="b")  # the first is remembered by now: one thread renders both
-    again = at.render(key="a")
-    assert again.begun and again.finished
+    again = at.finished(key="a")
+    assert at.begun_s[-1] == first.rendered_s, "with all of it"
     np.testing.assert_array_equal(heard(again.voice, 3_000), heard(first.voice, 3_000))
 
 
@@ -127,7 +126,7 @@ def test_a_model_that_runs_away_ends_there_and_is_not_remembered(
 
     monkeypatch.setattr(KoopmanVar, "advance", faulty)
     voice = at.finished(key="wild")
-    assert voice.ends_s == pytest.approx(voice.rendered_s, abs=1 / RATE_HZ)
+    assert voice.ran_away
     samples = heard(voice.voice, 4_000)
     assert np.abs(samples[voice.done - 200 : voice.done]).max() > 0.01
     assert not samples[voice.done + 128 :].any() and at.errors == []
@@ -148,7 +147,7 @@ def test_what_nobody_wants_is_rendered_no_further(at: Ahead4k, monkeypatch: pyte
     slow_down(monkeypatch, speed=4.0)
     voice = at.render(seconds=60.0)
     at.wait(lambda: voice.done > 1_000)
-    at.given_up = True
+    at.notes[-1].cut = True
     done = -1
     while voice.done != done:  # a block may be under way
         done = voice.done
@@ -160,7 +159,7 @@ def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pyte
     """A new pluck does not wait for all of those before it."""
     slow_down(monkeypatch, speed=5.0)
     first, second = (at.render(seconds=20.0) for _ in range(2))
-    at.wait(lambda: first.begun and second.begun)
+    at.wait(lambda: not any(note.pending for note in at.notes))
     assert not first.finished and first.done < 10 * second.done + 10 * RATE_HZ
 
 

@@ -29,6 +29,7 @@ from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
 from app.playing.sources import Sources
+from app.rendering.subject import Loaded
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
@@ -304,7 +305,13 @@ def test_levels_are_matched_once_they_are_known(lab: Lab, tmp_path: Path, loudne
     note = lab.strike(pluck)
     assert note.match is None
     lab.notes.set_monitor(hears("model", level_match=True))  # while it rings
-    lab.wait(lambda: note.match is not None and gains(note) == {"model": note.match["model"], "truth": 0.0})
+    lab.wait(
+        lambda: (
+            lab.notes.poll() is None
+            and note.match is not None
+            and gains(note) == {"model": note.match["model"], "truth": 0.0}
+        )
+    )
     assert note.match == {"truth": 1.0, "model": pytest.approx(gain, rel=0.02)}
     again = lab.strike(pluck)
     assert again.match == note.match and gains(again) == gains(note), "it is known from the start"
@@ -531,7 +538,7 @@ def test_a_report_that_fails_stops_nothing(lab: Lab, monkeypatch: pytest.MonkeyP
     notes = Notes(lab.sound, lab.sources, lambda name: None, lambda *_: 1 / 0)  # type: ignore[arg-type, return-value]
     notes.set_monitor(hears("model"))
     notes.choose(lab.pluck_of())
-    monkeypatch.setattr(Sources, "begin", once(Sources.begin, at=1))
+    monkeypatch.setattr(Loaded, "voice", once(Loaded.voice, at=1))
     first, second = notes.ring(), notes.ring()
     assert first is not None and first.cut
     assert second is not None and not second.over and is_loud(lab.sound)

@@ -6,14 +6,13 @@ import shutil
 import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.playing import sources as module
 from app.playing.sources import Sources
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, load_preset
-from engine.resonators.sine_transform import project
+from engine.values.ear import Ear
 
 RATE_HZ = 8_000
 
@@ -34,19 +33,13 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset: Path, loaded: list[Path]) -> None:
     made = Sources()
     assert not made.has(small_preset, RATE_HZ)
-    made.program(small_preset, "model", RATE_HZ)
+    program = made.load(small_preset).program("model", RATE_HZ)
     assert not made.has(small_preset, RATE_HZ), "the truth would be waited for"
     made.prepare(small_preset, RATE_HZ)
     assert made.has(small_preset, RATE_HZ) and not made.has(small_preset, 2 * RATE_HZ)
-    assert made.program(small_preset, "model", RATE_HZ) is made.program(small_preset, "model", RATE_HZ)
+    assert made.load(small_preset).program("model", RATE_HZ) is program
     made.prepare(small_preset, 2 * RATE_HZ)
     assert loaded == [small_preset]
-    initial_m, rows = made.begin(small_preset, "truth", RATE_HZ, Pluck(0.4, 3.0))
-    info = made.load(small_preset).preset.info
-    expected = project(Pluck(0.4, 3.0).displacement(info.grid_points), info.modes)
-    np.testing.assert_array_equal(initial_m, expected)
-    again, other = (made.begin(small_preset, "truth", RATE_HZ, Pluck(at, 3.0))[1] for at in (0.4, 0.5))
-    assert again is rows and other is not rows, "the beginning of a pluck is remembered"
 
 
 def test_the_presets_that_were_used_last_are_kept(
@@ -90,8 +83,7 @@ def test_what_is_there_waits_for_nothing_that_is_loaded(
     loading.start()
     assert begun.wait(20) and made.has(small_preset, RATE_HZ)
     for kind in ("model", "truth"):
-        made.program(small_preset, kind, RATE_HZ)
-        made.begin(small_preset, kind, RATE_HZ, Pluck(0.45))
+        made.load(small_preset).voice(kind, Pluck(0.45), Ear((0.3,)), RATE_HZ)
     assert loading.is_alive()
     go_on.set()
     loading.join()

@@ -13,16 +13,17 @@ import soundfile
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
-from app.export.sound import SoundRequest
 from app.instrument.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, list_presets
+from app.rendering.note_sound import NoteSound
 from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, PresetError, load_preset, preset_digest
+from engine.presets import SHIPPED, PresetError, preset_digest
+from engine.values.ear import Ear
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
@@ -110,11 +111,11 @@ def test_a_dropped_preset_that_is_there_is_chosen_and_reported(
 
 
 def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Path, tmp_path: Path) -> None:
-    preset = load_preset(preset_folder / "second.safetensors")
-    other_preset(preset_folder / "second.safetensors", preset_folder / "second.safetensors")
+    preset = preset_folder / "second.safetensors"
+    other_preset(preset, preset)
     pluck = Pluck(0.61, 2.5, "raised_cosine", 0.2)
-    request = SoundRequest(preset, pluck, 0.22, 0.7, "truth")
-    export_sound(request, tmp_path / "A.WAV")
+    sound = NoteSound(preset, pluck, 0.7, Ear((0.22,)))
+    export_sound(sound, tmp_path / "A.WAV", "truth")
     (tmp_path / "A.WAV").rename(tmp_path / "b.WAV")
     dropped = receive(tmp_path / "b.WAV", library)
     assert dropped.notice == ""
@@ -137,7 +138,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))
     assert "is not the one that made this file" in receive(tmp_path / "b.WAV", library).notice
-    export_sound(replace(request, seconds=0.1, source="difference"), tmp_path / "c.wav")
+    export_sound(replace(sound, seconds=0.1), tmp_path / "c.wav", "difference")
     dropped = receive(tmp_path / "c.wav", library)
     assert "its duration of 0.1 s" in dropped.notice
     assert "shown are 0.5 s" in dropped.notice
@@ -149,11 +150,11 @@ def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
     library: Library, preset_folder: Path, tmp_path: Path
 ) -> None:
     """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
-    export, preset = ExportChoices(), load_preset(preset_folder / "first.safetensors")
+    export = ExportChoices()
     assert export.until_decayed
     assert export.longest_s > OF_CHOICES["seconds"].limits[1]
-    request = SoundRequest(preset, Pluck(0.5, 2.0), 0.3, export.longest_s, decay_db=export.decay_db)
-    export_sound(request, tmp_path / "a.wav")
+    sound = NoteSound(preset_folder / "first.safetensors", Pluck(0.5, 2.0), export.longest_s, Ear((0.3,)))
+    export_sound(sound, tmp_path / "a.wav", settings=export.wav)
     dropped = receive(tmp_path / "a.wav", library)
     assert dropped.notice == ""
     assert "seconds" not in dropped.choices

@@ -3,7 +3,8 @@
 import pytest
 
 from app.patches.patch import Fretted, Patch, Pickup
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
+from app.stage.session import Session
 from engine.values.string import StringParameters
 
 STRING = {
@@ -104,18 +105,6 @@ def test_choices_of_two_kinds_of_instruments_are_understood() -> None:
     assert (beside.instrument, beside.single, beside.patch) == (None, "one", played_patch(0.2))
     assert beside.string is not None
     assert Choices.model_validate({"instrument": {"preset": "one"}, "kept": None}).patch is None
-
-
-def test_what_a_note_changes_is_reported_as_played_before_it_is_reported_as_changed() -> None:
-    session, reported = Session(), []
-    session.played.connect(lambda names: reported.append(("played", set(names), session.choices.position)))
-    session.changed.connect(lambda names: reported.append(("changed", set(names), session.choices.position)))
-    session.play(position=0.5)
-    session.play(position=0.5)  # nothing new
-    session.update(position=0.6)
-    assert reported == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
-    with pytest.raises(ValueError, match="position"):
-        session.play(position=2)
 
 
 def played_patch(*points: float, kind: str = "displacement") -> Patch:

@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
-from app.session.choices import Session
 from app.session.shown import ShownSource
+from app.stage.session import Session
 from app.views import theme
 from app.views.plots.colour_maps import displacement_map, error_map, level_map, share_map
 from app.views.plots.plots import recolour

@@ -10,8 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
 from app.presets.library import Library
-from app.session.choices import Session
 from app.session.shown import DEFAULT_SOURCES
+from app.stage.session import Session
 from app.views.string.view import StringView
 from app.window.panels.spectrum import COLUMNS, Analyser, SpectrumPanel
 from app.window.panels.waveform import WaveformPanel, extremes

@@ -116,7 +116,7 @@ class Window:
         """Return when the string of the key that was struck last is shown."""
 
         def shown() -> bool:
-            note = self.controller.instruments.latest
+            note = self.session.stage.note
             known = isinstance(note, KeyNote) and note.request is not None
             return known and string_of(note.request.preset) == self.choices.string  # type: ignore[union-attr]
 

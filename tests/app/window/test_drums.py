@@ -90,7 +90,7 @@ def test_pads_keys_and_channel_ten_strike_drums_that_ring_light_and_stop(
         kit.play(key, 110)
     kit.wait(lambda: {38, 45} <= kit.keys.sounding().keys() and max(levels, default=-99) > -40)
     kit.wait(lambda: kit.window.instrument.keys.level(45) > 0.1)
-    assert kit.controller.instruments.drum_key == 45 and kit.notes.ringing == 2
+    assert kit.session.stage.drum_key == 45 and kit.notes.ringing == 2
     kit.play(60, 110)  # no pad
     assert kit.notes.ringing == 2
     for sounding in (False, True, False):
@@ -161,7 +161,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window, tm
     assert kit.performance.take is None
     kit.wait_for_keys()
     kit.pluck()
-    kit.wait(lambda: kit.controller.instruments.drum_key in kit.keys.sounding())
+    kit.wait(lambda: kit.session.stage.drum_key in kit.keys.sounding())
     kit.qtbot.keyPress(window, KEY.Key_K)
     kit.wait(lambda: 72 in kit.keys.sounding())  # from C4 all keys sound
     kit.qtbot.keyRelease(window, KEY.Key_K)

@@ -20,12 +20,14 @@ from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
 from app.export.choices import ExportChoices
-from app.export.sound import SoundRequest
+from app.export.wav import WavSettings
 from app.instrument.events import NoteOn
 from app.patches.library import list_patches
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
+from app.rendering.note_sound import NoteSound
+from app.rendering.subject import StringOf, path_of
 from app.session.choices import Choices
 from app.shared.vocabulary import Source
 from app.views.dialogs.abx_dialog import AbxDialog
@@ -33,7 +35,7 @@ from app.window.controller import LOOK_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 from engine.kernels.constants import AHEAD, QUANTUM
-from engine.presets import SHIPPED, load_preset, of_string
+from engine.presets import SHIPPED
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
 from tests.app.sounds import render_sound
@@ -108,7 +110,7 @@ def play_instrument(qtbot: QtBot, lab: Controller, patch: Patch) -> None:
     qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.name == patch.name)
     lab.instruments.play(NoteOn(sum(patch.range) // 2, 100))
     take(lab, 0.05)
-    qtbot.waitUntil(lambda: isinstance(lab.instruments.latest, KeyNote) and lab.instruments.latest.known)
+    qtbot.waitUntil(lambda: isinstance(lab.session.stage.note, KeyNote) and lab.session.stage.known)
 
 
 def choose(qtbot: QtBot, lab: Controller, preset: str) -> None:
@@ -125,7 +127,7 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     """The sound of a pluck from slot A or B, from its beginning on."""
     lab.session.update(heard=slot)
     lab.pluck()
-    note = lab.instruments.latest
+    note = lab.performance.notes.latest
     assert isinstance(note, PluckVoices)
     qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
     sound = take(lab, SECONDS)
@@ -137,12 +139,8 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
 def rendered(lab: Controller, source: Source) -> Samples:
     """What the command `render` would write of the chosen pluck, (frames, channels)."""
     choices = lab.session.choices
-    preset = load_preset(SHIPPED / f"{choices.preset}.safetensors")
-    if preset.info.family is not None:
-        preset = of_string(preset, None, RATE_HZ)
-    right = choices.listen_right if choices.stereo else None
-    request = SoundRequest(preset, choices.pluck, choices.listen, SECONDS, source, right, choices.pickup)
-    return render_sound(request, RATE_HZ).reshape(round(SECONDS * RATE_HZ), -1)
+    sound = NoteSound(SHIPPED / f"{choices.preset}.safetensors", choices.pluck, SECONDS, choices.ear)
+    return render_sound(sound, source, WavSettings(rate_hz=RATE_HZ)).reshape(round(SECONDS * RATE_HZ), -1)
 
 
 def assert_same(found: Samples, expected: Samples, words: str, gain_counts: bool = True) -> None:
@@ -222,7 +220,7 @@ def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked
     """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
     play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
     lab.instruments.play(NoteOn(60, 100))
-    late = lab.instruments.latest
+    late = lab.performance.notes.latest
     lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
     take(lab, 0.1)
     qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known)
@@ -246,12 +244,10 @@ def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it
     qtbot.waitUntil(lambda: lab.performance.at_hand)
     while np.abs(take(lab, 0.1)).max() > 1e-8:
         pass
-    preset = of_string(load_preset(SHIPPED / "studio_any_string.safetensors"), string, RATE_HZ)
-    choices = lab.session.choices
-    right = choices.listen_right if choices.stereo else None
+    subject, choices = StringOf(SHIPPED / "studio_any_string.safetensors", string), lab.session.choices
     for slot, source in SOURCES.items():
-        request = SoundRequest(preset, choices.pluck, choices.listen, SECONDS, source, right, choices.pickup)
-        expected = render_sound(request, RATE_HZ).reshape(round(SECONDS * RATE_HZ), -1)
+        sound = NoteSound(subject, choices.pluck, SECONDS, choices.ear)
+        expected = render_sound(sound, source, WavSettings(rate_hz=RATE_HZ)).reshape(round(SECONDS * RATE_HZ), -1)
         assert_same(heard(qtbot, lab, slot), expected, slot)
 
 
@@ -308,7 +304,7 @@ def test_a_key_is_exported_with_its_instrument_also_where_a_slot_holds_another_p
     qtbot.waitUntil(lambda: lab.performance.at_hand)
     lab.pluck()
     qtbot.waitUntil(lambda: page.through_words.text() == "None: the string alone, as it is heard")
-    assert page.job().note.preset.stem == KINDS["koopman_var"]
+    assert path_of(page.job().sound.preset).stem == KINDS["koopman_var"]
     lab.exports.dialog.reject()
 
 

@@ -20,13 +20,12 @@ from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, MacroTarget, Patch, Pickup
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
 from app.playing.note import PluckVoices
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices
 from app.shared.key_names import note_name
 from app.views.controls.playing_keys import PlayingKeys
-from app.window.instruments import OWN_MS
 from engine.pluck import SHAPES, Pluck
 from engine.presets.finding import SHIPPED
 from tests.app.instrument.conftest import STEEL
@@ -107,24 +106,17 @@ def test_keys_of_computer_and_screen_play_pitches_and_the_window_shows_the_strin
     assert guitar.patch.knobs.tension == pytest.approx(16.0)
 
 
-def test_the_switch_of_keys_is_remembered_and_places_are_prepared_for_them_alone(
-    guitar: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    prepared: list[list[float]] = []
-    watch = lambda subject, plucks: prepared.append([pluck.position for pluck in plucks])  # noqa: E731
-    monkeypatch.setattr(guitar.notes, "prepare_plucks", watch)
+def test_the_switch_of_keys_is_remembered(guitar: Window) -> None:
     plays = guitar.window.instrument.plays
     pitches, places = plays.menu().actions()
     guitar.play(52)
     guitar.wait_for_string()
-    assert prepared == [] and plays.text().startswith("Keys play notes")
+    assert plays.text().startswith("Keys play notes")
     places.trigger()
     assert (
         plays.text().startswith("Keys set pluck position") and not guitar.window.instrument.bar.velocity.isVisible()
     )
     assert guitar.choices.preset == "studio_any_string" and not guitar.controller.settings().choices.plays_patch
-    guitar.change(amplitude_mm=3.3)
-    assert [len(set(positions)) for positions in prepared] == [PLACES, PLACES]
     guitar.wait(lambda: not guitar.keys.sounding())
     guitar.key(KEY.Key_A)
     assert isinstance(guitar.struck[-1], PluckVoices) and guitar.keys.sounding() == {}
@@ -135,10 +127,10 @@ def test_the_switch_of_keys_is_remembered_and_places_are_prepared_for_them_alone
 
 
 def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_preset(guitar: Window) -> None:
-    instruments = guitar.controller.instruments
     guitar.wait(lambda: guitar.choices.string is not None and guitar.performance.playable)
     guitar.pluck()
-    assert instruments.struck is not None and instruments.struck.event.pluck == guitar.choices.pluck
+    assert guitar.session.stage.struck is not None
+    assert guitar.session.stage.struck.event.pluck == guitar.choices.pluck
     guitar.play(52)
     guitar.wait_for_string()
     shown, other = guitar.choices.string, next(each for each in SHAPES if each != guitar.choices.shape)
@@ -154,9 +146,9 @@ def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_prese
     recorded = [each.event for each in guitar.keys.recorder.end()]
     assert NoteOn(52, note.event.velocity, KEYS, pluck=pluck) in recorded
     guitar.change(position=0.41)
-    assert instruments.struck.event.pluck == guitar.choices.pluck, "an export has the pluck that is shown"
+    assert guitar.session.stage.struck.event.pluck == guitar.choices.pluck, "an export has the pluck that is shown"
     guitar.change(b="preset:second")
-    assert instruments.struck is None and isinstance(guitar.pluck(), PluckVoices)
+    assert guitar.session.stage.struck is None and isinstance(guitar.pluck(), PluckVoices)
 
 
 def test_each_turn_of_a_loop_stays_with_the_instrument_when_pluck_and_string_change(
@@ -203,7 +195,7 @@ def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar:
 
 
 def test_knobs_change_the_patch_its_pluck_and_its_pick_up_and_undo_takes_them_back(guitar: Window) -> None:
-    history, start, knobs = guitar.controller.history, guitar.choices, guitar.window.instrument.knobs
+    history, start, knobs = guitar.session, guitar.choices, guitar.window.instrument.knobs
     turn(guitar, "knobs.stiffness", 2.0)
     assert guitar.patch.knobs.stiffness == 2.0
     turn(guitar, "knobs.stiffness", 99.0)
@@ -276,7 +268,7 @@ def test_a_patch_is_saved_renamed_compared_and_deleted(guitar: Window, named: Ca
     assert heard() == (True, saved) and guitar.patch == mine
     bar.compare.click()
     assert heard() == (False, mine)
-    for ends in (lambda: patches.change("level_db", -3.0), guitar.controller.history.undo, patches.revert):
+    for ends in (lambda: patches.change("level_db", -3.0), guitar.session.undo, patches.revert):
         bar.compare.click()
         ends()  # it is of the choice, not of the sound
         assert heard() == (False, guitar.patch)
@@ -425,7 +417,7 @@ def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_i
 def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restored(
     guitar: Window, preset_folder: Path
 ) -> None:
-    history = guitar.controller.history
+    history = guitar.session
     for name in ("classical_guitar", "concert_harp"):
         patch = read_patch(PATCHES / f"{name}.json")
         guitar.choose(name)
@@ -449,26 +441,21 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     assert guitar.choices.string == own
     guitar.change(position=0.45)
     guitar.change(patch=guitar.patch.with_value("knobs.decay", 2.0))
-    guitar.qtbot.wait(2 * OWN_MS)
     assert guitar.choices.position == 0.45, "a knob of the string leaves what was drawn"
     low = Strings(HARP).of_key(43)
     assert low is not None
     for string in (STEEL, low.parameters):
         guitar.change(instrument=HARP, string=string, position=0.2, shape=HARP.pluck.shape)
-        guitar.qtbot.wait(2 * OWN_MS)
         assert (guitar.choices.string, guitar.choices.position) == (string, 0.2)
         guitar.change(instrument=patch)
-        guitar.qtbot.wait(2 * OWN_MS)
     guitar.change(instrument=HARP, string=low.parameters)
     guitar.wait(lambda: guitar.performance.playable)
-    guitar.qtbot.wait(2 * OWN_MS)
     assert guitar.pluck().event.key == 43, "the string that was restored"
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder / "another.safetensors")
     guitar.controller.library.refresh()
     other = read_patch(PATCHES / "cimbalom.json").model_copy(update={"preset": "another"})
     guitar.change(instrument=patch)
     guitar.wait(lambda: guitar.choices.shape == patch.pluck.shape != other.pluck.shape)
-    guitar.qtbot.wait(2 * OWN_MS)
     before = guitar.choices.string, guitar.choices.shape
     guitar.change(instrument=other)
     guitar.wait(lambda: guitar.choices.shape == other.pluck.shape)
@@ -507,7 +494,7 @@ def test_notes_of_midi_choose_places_and_presets_and_a_pluck_after_them_is_of_th
 
 
 def test_the_menu_and_the_key_name_the_steps_of_undo_and_a_lost_release_ends_a_drag(lab: Window) -> None:
-    menu, history = lab.window.menu, lab.controller.history
+    menu, history = lab.window.menu, lab.session
 
     def words() -> list[str]:
         menu.aboutToShow.emit()

@@ -161,15 +161,15 @@ def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(
         lab.key(key)
         assert lab.choices.preset == lab.performance.entry.name == preset  # type: ignore[union-attr]
     lab.wait_for_take()
-    plucks, words = list[float](), lab.controller.history.undo_words
-    lab.controller.instruments.played.connect(lambda: plucks.append(lab.choices.position))
+    plucks, words = list[float](), lab.session.undo_words
+    lab.session.changed.connect(lambda names: names & {"note"} and plucks.append(lab.choices.position))
     for count, key in enumerate((KEY.Key_A, KEY.Key_Semicolon, KEY.Key_A, KEY.Key_A, KEY.Key_L), 1):
         before = len(lab.struck)
         lab.key(key)
         assert len(lab.struck) == before + 1, "it is struck before the window knows of it"
         lab.wait(lambda count=count: len(plucks) == count)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
-    assert lab.controller.history.undo_words == words
+    assert lab.session.undo_words == words
     lab.key(KEY.Key_9)
     assert lab.choices.amplitude_mm == pytest.approx(10)
     lab.key(KEY.Key_C)

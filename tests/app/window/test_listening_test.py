@@ -123,7 +123,7 @@ def test_a_key_is_compared_as_the_instrument_plays_it(
             guitar.wait(lambda: guitar.struck[-1].known)
         guitar.controller.listening_test()
         dialog, (_, material, _, render, *_) = guitar.window.findChildren(AbxDialog)[-1], made[-1]
-        struck, entry = guitar.controller.instruments.struck, guitar.controller.library.find("studio_any_string")
+        struck, entry = guitar.session.stage.struck, guitar.controller.library.find("studio_any_string")
         assert struck is not None and entry is not None and (struck.event.pluck is None) == bool(velocity)
         assert (material.pluck["instrument"], material.pluck["key"]) == (guitar.patch.name, struck.event.key)
         words = [each.text() for each in dialog.findChildren(QLabel)]

@@ -248,7 +248,7 @@ def test_midi_plays_the_window_and_what_it_learned_is_saved(backend: FakeBackend
     assert (note.request.pluck.position, note.request.pluck.amplitude_mm) == pytest.approx((0.7, 10))
     assert lab.choices.position == before.position, "the window has had no time yet"
     lab.wait(lambda: (lab.choices.position, lab.choices.amplitude_mm) == pytest.approx((0.7, 10)))
-    assert not lab.controller.history.undo_words
+    assert not lab.session.undo_words
     lab.wait(lambda: lab.performance.position_s > 0)
     find(dialog, QPushButton, WIDTH).click()
     backend.send(ControlChange(74, 0))

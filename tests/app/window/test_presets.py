@@ -13,16 +13,17 @@ import soundfile
 from PySide6.QtCore import QPoint, QRect
 
 from app.audio.sound import Sound
-from app.export.sound import SoundRequest
 from app.instrument.bodies import own_bodies
 from app.patches.library import find_patch
 from app.patches.tuning import Tuning
+from app.rendering.note_sound import NoteSound
 from app.views.controls.browser import Browser
 from app.views.dialogs.learn_dialog import LearnDialog
 from app.window.settings import FIRST_FAVOURITES, load_settings
 from engine.effects import BODIES, Effects
 from engine.pluck import Pluck
-from engine.presets import load_preset, preset_files
+from engine.presets import preset_files
+from engine.values.ear import Ear
 from tests.app.conftest import no_device
 from tests.app.sounds import export_sound
 from tests.app.window.conftest import Open
@@ -187,9 +188,8 @@ def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(
     assert lab.choices.preset == "new" and lab.window.presets.name.text().startswith("Another string")
     assert (own / "new.safetensors").is_file()
     wav = tmp_path / "a.wav"
-    export_sound(
-        SoundRequest(load_preset(preset_folder / "first.safetensors"), Pluck(0.5, 2.0), 0.3, 0.6, "truth"), wav
-    )
+    first = preset_folder / "first.safetensors"
+    export_sound(NoteSound(first, Pluck(0.5, 2.0), 0.6, Ear((0.3,))), wav, "truth")
     lab.drop(wav)
     choices = lab.choices
     assert (choices.pluck, choices.listen, choices.seconds) == (Pluck(0.5, 2.0), 0.3, 0.6)
@@ -212,7 +212,7 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
     guitar.change(pickup="displacement", stereo=True)
     before, entry = guitar.choices, guitar.performance.entry
     assert entry is not None and entry.name == before.patch.preset
-    export_sound(SoundRequest(load_preset(entry.path), Pluck(0.3, 2.0), 0.22, 0.6), tmp_path / "a.wav")
+    export_sound(NoteSound(entry.path, Pluck(0.3, 2.0), 0.6, Ear((0.22,))), tmp_path / "a.wav")
     guitar.drop(tmp_path / "a.wav")
     choices = guitar.choices
     assert (choices.pluck.position, choices.listen, choices.stereo) == (0.3, 0.22, False)
@@ -235,7 +235,7 @@ def test_scales_and_mappings_tune_the_patch_in_either_order_and_undo_takes_them_
         tuning = Tuning(guitar.patch.tuning)
         return pytest.approx(1200 * math.log2(tuning.hz(high) / tuning.hz(low)), abs=1e-3)
 
-    before, history, name = guitar.patch, guitar.controller.history, guitar.patch.name
+    before, history, name = guitar.patch, guitar.session, guitar.patch.name
     guitar.drop(written("Five.SCL", FIVE))
     assert cents(60, 61) == 240 and f"Five.SCL tunes {name}" in guitar.window.notices.text
     history.undo()
@@ -290,7 +290,7 @@ def test_sounds_are_bodies_of_the_patch_as_far_as_they_are_short(
         assert [box.itemData(row) for row in range(len(BODIES) + 1)] == ["", *BODIES]
         assert box.currentData() == guitar.patch.body.name == file.stem and guitar.patch.body.mix > 0
         assert f"now has the body {file.stem}" in guitar.window.notices.text
-        guitar.controller.history.undo()
+        guitar.session.undo()
         assert guitar.patch == before
     for ending in ("wav", "flac"):
         guitar.drop(knock(tmp_path / f"hall_{ending}.{ending}", 6.97))

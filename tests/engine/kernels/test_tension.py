@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -77,13 +79,18 @@ def ringing(info: PresetInfo, frames: int) -> tuple[Signal, Signal]:
     return state.amplitude[0], state.velocity[0]
 
 
+def setting_out(program: Program, q: np.ndarray, v: np.ndarray) -> Program:
+    """The program with voices that set out from these amplitudes and speeds."""
+    return replace(program, start=lambda _: (q, v))
+
+
 def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string(
     preset: Preset, program: Program, rung: Rung
 ) -> None:
     info, model = preset.info, preset.model
     assert isinstance(model, KoopmanTension)
     q, v = ringing(info, 301)
-    found = rung(16_000, Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v)), attack=False)
+    found = rung(16_000, Voice(setting_out(program, q, v), info.resonator.to_grid(q), STEREO), attack=False)
     points, steps = info.resonator.shapes @ weights_of(STEREO, info.grid_points), len(found) - 1
     true, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState(q[None], v[None]), steps)
     encoded = model.encode(
@@ -100,7 +107,7 @@ def test_what_is_set_out_comes_back(preset: Preset, program: Program) -> None:
     alike = np.sqrt(0.5 / resonator.relative_tension_rise(np.ones(resonator.modes))) * np.ones(resonator.modes)
     states = [*(ringing(preset.info, frames) for frames in (1, 301, 2_000)), (alike, alike * resonator.omega)]
     for q, v in states:
-        voice = Voice(program, resonator.to_grid(q), STEREO, begin=(q, v))
+        voice = Voice(setting_out(program, q, v), resonator.to_grid(q), STEREO)
         tension.prepare(voice.record, record_of(program.memory, TENSION_PROGRAM), q, v)
         tension.set_out(voice.record, q, v, False)
         assert relative(voice.rows[0], q) > 1e-6

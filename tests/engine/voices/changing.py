@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,12 +20,14 @@ Array = NDArray[np.float64]
 
 
 class ChangingVoice(Voice):
-    """A pluck of a program that never ends; `begin` as in `Voice`."""
+    """A pluck of a program that never ends; `begin`: the rows that it sets out from, as of `Program.start`."""
 
     def __init__(
         self, program: Program, displacement_m: Array, ear: Ear, begin: tuple[Array, Array] | None = None
     ) -> None:
-        super().__init__(program, displacement_m, ear, begin=begin)
+        if begin is not None:
+            program = replace(program, start=lambda _: begin)
+        super().__init__(program, displacement_m, ear)
         self.never_ends()
         self._blocks: list[Array] = []  # of modes, which the kernel may be reading
         self._before: ChangingVoice | None = None

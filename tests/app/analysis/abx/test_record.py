@@ -11,6 +11,7 @@ import pytest
 from app.analysis.abx.record import AbxRecord, material_of, p_text, save_record
 from app.presets.library import list_presets
 from app.session.choices import Choices
+from app.session.slots import sound_of
 from engine.values.string import StringParameters
 
 
@@ -51,7 +52,7 @@ def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     string = StringParameters()
     for stereo, chosen in ((False, None), (True, string)):
         choices = Choices(single=entry.name, position=0.3, string=chosen, stereo=stereo)
-        pluck = material_of(entry, choices, "").pluck
+        pluck = material_of(sound_of(choices, entry.path), "", 0.0).pluck
         assert pluck["position"] == 0.3
         assert pluck["string"] == (chosen and asdict(chosen))
         assert ("listen_right" in pluck) == stereo

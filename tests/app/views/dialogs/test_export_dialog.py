@@ -19,12 +19,13 @@ from app.export.choices import ExportChoices
 from app.export.note import HeardNote
 from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
-from app.export.struck import Struck
 from app.instrument.events import NoteOn
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Patch
 from app.presets.library import Library, list_presets
+from app.rendering.note_sound import Struck
+from app.rendering.subject import path_of
 from app.session.choices import Choices
 from app.views import theme
 from app.views.dialogs.export_dialog import ExportDialog
@@ -155,7 +156,7 @@ def test_what_is_heard_is_offered_first(
 ) -> None:
     page = made(remembered, heard).note
     assert page.source.currentData() == source
-    assert page.job().note.preset.stem == preset
+    assert path_of(page.job().sound.preset).stem == preset
     if "solo" in heard:
         assert (page.gain.isVisible(), page.gain.value()) == (True, 36)
         assert "All modes" in page.what.text()

@@ -16,7 +16,8 @@ from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
 from app.rendering import Take
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
+from app.stage.session import Session
 from app.views import theme
 from app.views.plots.plots import dress_plots
 from app.window.panels import Moment, Panel

@@ -14,8 +14,9 @@ from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
 from app.rendering import Take
-from app.session.choices import Choices, Session
+from app.session.choices import Choices
 from app.shared.worker import Job
+from app.stage.session import Session
 from app.window.panels import Moment, Panel, StringPanel, base
 from app.window.panels.drum import DrumPanel
 from app.window.panels.rack import LEFT, RIGHT

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -57,13 +57,11 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     return _join_words([words for name, words in CHOICES.items() if name in changed])
 
 
-def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """The changed fields: `names` of `Choices` and, of a patch that has kept its name, its own as "patch.PATH"."""
-    changed_names = set(names)
+def turned_fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
+    """The fields of a step, and of a patch that has kept its name its own as "patch.PATH"."""
     old, new = before.get("patch"), after.get("patch")
-    if "patch" in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
-        changed_names |= {f"patch.{path}" for path in _changed(old, new)}
-    return frozenset(changed_names)
+    is_turned = isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name
+    return frozenset(after) | ({f"patch.{path}" for path in _changed(old, new)} if is_turned else set())
 
 
 def _patch_words(before: Patch | None, after: Patch | None) -> str:

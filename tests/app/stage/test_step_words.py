@@ -8,8 +8,8 @@ import pytest
 
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import ASSIGNABLE, Patch
-from app.session.step_words import step_words
 from app.shared.parameters import OF_PATCHES
+from app.stage.step_words import step_words
 
 
 @pytest.fixture(scope="module")

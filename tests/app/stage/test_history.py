@@ -6,16 +6,16 @@ import pytest
 
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
-from app.session.choices import Choices, Session
-from app.session.history import GATHER_S, RECORDED, History
+from app.session.choices import Choices
+from app.stage.session import GATHER_S, RECORDED, Session
 
 
 class Hand:
     """A session with its history, and the time in s at which its changes come."""
 
     def __init__(self) -> None:
-        self.session, self.now_s = Session(), 10.0
-        self.history = History(self.session, lambda: self.now_s)
+        self.now_s = 10.0
+        self.session = Session(now_s=lambda: self.now_s)
 
     def change(self, after_s: float = 0.0, **choices: object) -> None:
         self.now_s += after_s
@@ -24,8 +24,8 @@ class Hand:
     def undone(self, field: str) -> list[object]:
         """The values of a field after each step back, until there is none."""
         values = []
-        while self.history.undo_words:
-            self.history.undo()
+        while self.session.undo_words:
+            self.session.undo()
             values.append(getattr(self.session.choices, field))
         return values
 
@@ -46,7 +46,7 @@ def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
     middle = hand.session.choices
     hand.change(1, shape="triangular")
     end = hand.session.choices
-    for act, states in ((hand.history.undo, (middle, start, start)), (hand.history.redo, (middle, end, end))):
+    for act, states in ((hand.session.undo, (middle, start, start)), (hand.session.redo, (middle, end, end))):
         for state in states:
             act()
             assert hand.session.choices == state
@@ -63,57 +63,57 @@ def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand
 
 def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand: Hand) -> None:
     for positions in ((0.4, 0.41, 0.44), (0.6, 0.5), (0.7, 0.5)):
-        hand.history.hold()
+        hand.session.hold()
         for moved, position in enumerate(positions):
             hand.change(3, position=position, amplitude_mm=4 + moved % 2)
         hand.change(amplitude_mm=4)
-        hand.history.release()
+        hand.session.release()
     assert hand.undone("position") == [0.44, 0.35]
 
 
 def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Hand) -> None:
     seen = {"heard": "b", "loop": True, "speed": 1, "left_view": "x", "motion": False, "envelope": False}
     hand.change(volume_db=-6, **seen)
-    assert not hand.history.undo_words
+    assert not hand.session.undo_words
     hand.change(position=0.6)
     hand.change(volume_db=-9)
-    hand.history.undo()
+    hand.session.undo()
     assert hand.session.choices == Choices(volume_db=-9, **seen)  # type: ignore[arg-type]
     assert set(Choices.model_fields) > RECORDED
 
 
 def test_a_new_change_forgets_what_was_undone(hand: Hand) -> None:
     hand.change(position=0.6)
-    hand.history.undo()
+    hand.session.undo()
     hand.change(width=0.3)
-    assert not hand.history.redo_words
+    assert not hand.session.redo_words
     assert hand.undone("width") == [0.06]
     assert hand.session.choices.position == 0.35
 
 
 def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:
-    session, history = hand.session, hand.history
+    session = hand.session
     session.play(position=0.2, amplitude_mm=6)
-    assert not history.undo_words
+    assert not session.undo_words
     hand.change(width=0.2)
     session.play(position=0.7, amplitude_mm=2)
-    history.undo()
+    session.undo()
     assert (session.choices.width, session.choices.position, session.choices.amplitude_mm) == (0.06, 0.7, 2)
-    assert not history.undo_words
+    assert not session.undo_words
     session.play(position=0.3)
-    history.redo()  # a note forgets nothing of what was undone
+    session.redo()  # a note forgets nothing of what was undone
     assert (session.choices.width, session.choices.position) == (0.2, 0.3)
 
 
 def test_a_drag_after_a_note_goes_back_to_where_the_note_was(hand: Hand) -> None:
-    session, history = hand.session, hand.history
+    session = hand.session
     session.play(position=0.7)
-    history.hold()
+    session.hold()
     hand.change(position=0.5, amplitude_mm=2)
     session.play(position=0.3)  # played while the knob is in the other hand
     hand.change(amplitude_mm=3)
-    history.release()
-    history.undo()
+    session.release()
+    session.undo()
     assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)
 
 
@@ -128,17 +128,17 @@ def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -
     for change in ({"pickup": "velocity"}, {"stereo": not hand.session.choices.stereo}, {"listen": 0.11}):
         hand.change(1, **change)
         states.append(pickup_of(hand.session))
-        words.append(hand.history.undo_words)
+        words.append(hand.session.undo_words)
     assert words == ["pick-up", "stereo", "listening point"]
-    for there, back in ((states[:-1][::-1], hand.history.undo), (states[1:], hand.history.redo)):
+    for there, back in ((states[:-1][::-1], hand.session.undo), (states[1:], hand.session.redo)):
         for state in there:
             back()
             assert pickup_of(hand.session) == state
-    assert not hand.history.redo_words
+    assert not hand.session.redo_words
 
 
 def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Patch) -> None:
-    session, history = hand.session, hand.history
+    session = hand.session
     session.update(instrument=guitar)
     own = pickup_of(session)
     hand.now_s += 1
@@ -149,13 +149,13 @@ def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand
     assert pickup_of(session) == own
     steps = []
     for plays_patch, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
-        steps.append(history.undo_words)
-        history.undo()
+        steps.append(session.undo_words)
+        session.undo()
         assert (session.choices.plays_patch, session.choices.listen) == (plays_patch, listen)
     assert steps == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
     assert pickup_of(session) == own
     for _ in steps:
-        history.redo()
+        session.redo()
     assert (session.choices.plays_patch, pickup_of(session)) == (True, own)
 
 
@@ -170,8 +170,8 @@ def test_each_way_the_next_step_is_named_and_two_knobs_of_a_patch_are_two_howeve
     hand.session.play(position=0.2)
     hand.change(position=0.5)
     words = []
-    while hand.history.undo_words:
-        words.append(hand.history.undo_words)
-        hand.history.undo()
-        assert hand.history.redo_words == words[-1]
+    while hand.session.undo_words:
+        words.append(hand.session.undo_words)
+        hand.session.undo()
+        assert hand.session.redo_words == words[-1]
     assert words == ["pluck position", "stiffness", "decay", "instrument Classical guitar"]

@@ -1,0 +1,1 @@
+"""The stage: all that is chosen, played and shown, as one immutable value; undo."""

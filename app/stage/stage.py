@@ -1,0 +1,239 @@
+"""The stage: all that is chosen, played and shown, as one immutable value, and the step from one to the next.
+
+Nothing here knows the window. A note rings before the stage knows of it, in the window's thread.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from app.instrument.compiled import is_another
+from app.instrument.events import KEYS, NoteOn, PluckAt
+from app.instrument.strings import KeyString, Strings, on_string
+from app.patches.patch import Patch, StringSet
+from app.playing.key_note import KeyNote
+from app.playing.note import PluckVoices
+from app.rendering.note_sound import Struck
+from app.rendering.subject import string_of
+from app.session.choices import OBSERVED, Choices, with_one_pickup
+from app.session.slots import other_preset
+from engine.pluck import Pluck
+from engine.values.string import StringParameters
+
+Note = PluckVoices | KeyNote
+Key = tuple[int, int | None]  # of an instrument, and its string of the set, as in `Strings.of_key`
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the patch chooses the patch.
+
+    Attributes:
+        by_user: not by a note or by undo, so that undo can take it back.
+    """
+
+    values: Mapping[str, Any]
+    by_user: bool = True
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A note has begun; or its player has reported the string and the pluck of it."""
+
+    note: Note
+
+
+@dataclass(frozen=True)
+class Turned:
+    """The next turn of a loop has begun: a note of what was chosen already."""
+
+    note: Note
+
+
+Event = Chosen | Begun | Turned
+
+
+@dataclass(frozen=True)
+class Stage:
+    """All that is chosen, played and shown.
+
+    Attributes:
+        choices: instrument, string and pluck that are shown, where they are heard, what is compared.
+        key: the key of an instrument that was struck or restored last; None before the first.
+        note: the note that began last; None before the first.
+        known: the player has reported this note.
+    """
+
+    choices: Choices = field(default_factory=Choices)
+    key: Key | None = None
+    note: Note | None = None
+    known: bool = True
+
+    @property
+    def drum_key(self) -> int | None:
+        """The key of the drum that is shown and struck: the latest, or the lowest; None: no drum is played."""
+        drums, patch = self.choices.drums, self.choices.patch
+        if drums is None or patch is None:
+            return None
+        (low, high), latest = patch.range, -1 if self.key is None else self.key[0]
+        if low <= latest <= high and drums.of_key(latest) is not None:
+            return latest
+        return min(max(drums.drums[0].note, low), high)
+
+    def shown_key(self, patch: Patch) -> Key:
+        """The key whose string is shown: the one struck last, on its string, or the middle of the patch's range."""
+        (low, high), latest = patch.range, self.key
+        return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
+
+    def shown_string(self, patch: Patch) -> KeyString | None:
+        """The string of the shown key; None: it has none. Raise ValueError: it is impossible."""
+        return Strings(patch).of_key(*self.shown_key(patch))
+
+    def by_hand(self, pluck: Pluck | None = None) -> NoteOn | PluckAt:
+        """A pluck, by default the chosen one, as a note of the key whose string is shown.
+
+        It is of the string alone where keys do not play it so: of a single string, and beside another preset.
+        """
+        patch, pluck = self.choices.instrument, pluck or self.choices.pluck
+        beside_another = any(other_preset(voice) for voice in self.choices.voices)
+        if patch is None or self.choices.drums is not None or pluck.amplitude_mm == 0 or beside_another:
+            return PluckAt(pluck)
+        with contextlib.suppress(ValueError):  # reported when its key is struck
+            if (string := self.shown_string(patch)) is not None:
+                velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
+                return NoteOn(string.key, velocity, KEYS, string=self.shown_key(patch)[1], pluck=pluck)
+        return PluckAt(pluck)
+
+    @property
+    def struck(self) -> Struck | None:
+        """The key of the instrument that an export and the listening test play: the latest, else the one shown.
+
+        After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
+        """
+        patch, note, drum_key = self.choices.instrument, self.note, self.drum_key
+        if patch is None:
+            return None
+        event: NoteOn | PluckAt
+        if isinstance(note, KeyNote) and note.patch.name == patch.name and note.event.pluck is None:
+            event = note.event
+        elif drum_key is not None:
+            event = NoteOn(drum_key, self.choices.velocity, KEYS)
+        else:
+            event = self.by_hand()
+        return Struck(patch, event) if isinstance(event, NoteOn) else None
+
+    @property
+    def note_played(self) -> Note | None:
+        """The latest note, where it is of the instrument that is played."""
+        note, patch = self.note, self.choices.instrument
+        if not isinstance(note, KeyNote):
+            return note
+        return note if patch is not None and not is_another(patch, note.patch) else None
+
+
+NAMES = (*OBSERVED, *(name for name in Stage.__dataclass_fields__ if name != "choices"))
+
+
+def first_stage(choices: Choices) -> Stage:
+    """The stage with remembered choices, before anything is played."""
+    return _with_own_string(Stage(with_one_pickup(choices, ())), None, ())
+
+
+def next_stage(stage: Stage, event: Event) -> Stage:
+    """The stage after an event; the same one where nothing has changed.
+
+    Raises:
+        ValueError: a chosen value is out of its range, or the instrument cannot be heard so.
+    """
+    match event:
+        case Chosen():
+            return _chosen(stage, event.values)
+        case Begun():
+            return stage if event.note is stage.note and stage.known else _begun(stage, event.note)
+        case Turned():
+            return replace(stage, note=event.note, known=True)
+
+
+def changed_names(before: Stage, after: Stage) -> frozenset[str]:
+    """The names of what differs, of NAMES; those of `Choices` among them."""
+    if after is before:
+        return frozenset()
+    differs = [name for name in NAMES[len(OBSERVED) :] if getattr(before, name) is not getattr(after, name)]
+    if after.choices is not before.choices:
+        differs += [name for name in OBSERVED if getattr(before.choices, name) != getattr(after.choices, name)]
+    return frozenset(differs)
+
+
+def _chosen(stage: Stage, values: Mapping[str, Any]) -> Stage:
+    patch = stage.choices.patch
+    if patch is not None and values.get("preset") == patch.preset:
+        values = {**{name: value for name, value in values.items() if name != "preset"}, "single": None}
+    chosen = replace(stage, choices=stage.choices.changed(values))
+    return _with_own_string(chosen, stage.choices.instrument, values)
+
+
+def _begun(stage: Stage, note: Note) -> Stage:
+    """The stage with a note that has begun, and with its string and pluck as soon as they are known."""
+    stage = replace(stage, note=note, known=not isinstance(note, KeyNote) or note.known)
+    drawn = False
+    if isinstance(note, KeyNote):
+        if not stage.known:
+            return replace(stage, key=(note.event.key, note.event.string))
+        if stage.note_played is None:  # another instrument or a single string was chosen meanwhile
+            return stage
+        stage, drawn = replace(stage, key=(note.event.key, note.string)), note.event.pluck is not None
+    if note.request is None:
+        return stage
+    values = {"string": string_of(note.request.preset)}
+    values |= {} if drawn else asdict(note.request.pluck)  # else the choices have this pluck already
+    return replace(stage, choices=stage.choices.changed(values))
+
+
+def _with_own_string(stage: Stage, before: Patch | None, asked: Collection[str]) -> Stage:
+    """The stage that shows string and pluck of an instrument before it is played, and its pluck when that is turned.
+
+    Args:
+        before: the instrument that was played.
+        asked: what was chosen with the instrument, as what undo or a file restores, stays.
+    """
+    choices, patch = stage.choices, stage.choices.instrument
+    if patch is None or patch is before or choices.drums is not None:
+        return stage
+    another = before is not None and is_another(patch, before)
+    takes_string = choices.string is None or (another and "string" not in asked)
+    if not takes_string:
+        if choices.string is not None and (another or before is None):
+            stage = replace(stage, key=_key_of(patch, choices.string) or stage.key)
+        if before is None or patch.pluck == before.pluck:
+            return stage
+    with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
+        if (string := stage.shown_string(patch)) is not None:
+            own = asdict(on_string(string, patch.pluck.pluck(choices.velocity)))
+            values = {name: value for name, value in own.items() if name not in asked}
+            values |= {"string": string.parameters} if takes_string else {}
+            return replace(stage, choices=choices.changed(values))
+    return stage
+
+
+def _key_of(patch: Patch, string: StringParameters) -> Key | None:
+    """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
+    strings, pitch_hz = Strings(patch), string.pitch_hz
+    low, high = patch.range
+    key = next((key for key in range(low, high + 1) if _nearly_equal(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
+    if key is None:
+        return None
+    for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
+        with contextlib.suppress(ValueError):  # reported when it is struck
+            key_string = strings.of_key(key, number)
+            if key_string is not None and _nearly_equal(key_string.parameters.length_m, string.length_m):
+                return key, number
+    return key, None
+
+
+def _nearly_equal(value: float, other: float) -> bool:
+    """Return True if values are equal within rounding, for the player computes strings too."""
+    return math.isclose(value, other, rel_tol=1e-6)
