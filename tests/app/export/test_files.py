@@ -19,7 +19,7 @@ from app.export.files import (
 from app.export.recipe import SoundRecipe
 from app.export.sound import VOICES, Voices, check_sources
 from app.export.wav import WavSettings
-from app.playing.ahead import AheadVoice
+from app.playing.ahead import AheadSamples
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import BITS, Bits, Source
 from app.shared.worker import Cancelled
@@ -32,7 +32,6 @@ from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice, model_program, truth_program
-from engine.voices.ear import weights_of
 from engine.voices.voice import ATTACK_S
 from tests.app.sounds import export_sound, render_sound
 
@@ -77,10 +76,9 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     initial_m, ear = project(sound.pluck.displacement(101), info.modes), Ear((0.37,))
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
-        source = ModelSource(loaded)
-        ahead = AheadVoice(voice, source, initial_m, weights_of(ear, 101), (), lambda: None, lambda error: None)
+        ahead = AheadSamples(voice, ModelSource(loaded), initial_m, ())
         while not ahead.finished:
-            ahead.advance()
+            ahead.render()
     mixer = Mixer(48_000)
     mixer.add(voice)
     played = np.concatenate([mixer.render(frames) for frames in (256, 100, 7, 9237)])
