@@ -308,7 +308,7 @@ def test_no_control_is_lost_nor_cut_in_a_small_window_with_large_text(
     guitar.wait(lambda: all(each.isVisible() for each in wide))
     roomy = controls(window)
     assert set(wide) <= set(roomy)
-    for percent in (100, 150, 125):
+    for percent in (100, 150):
         themed("dark", percent)
         for size in ((1280, 800), (1280, 720), (1024, 640), (958, 600)):
             window.resize(*size)
@@ -388,7 +388,7 @@ def test_a_notice_is_read_whole_over_the_window_moves_nothing_and_is_dismissed_b
         lab.wait(stay)
         return found[-1]
 
-    for size in ((1920, 1080), (1280, 720), (1280, 640), (1000, 640), (853, 480)):
+    for size in ((1920, 1080), (1280, 640), (853, 480)):
         window.resize(*size)
         notices.hide()
         lab.wait(lambda: fits(window) and window.size().toTuple() == size)  # noqa: B023
