@@ -308,7 +308,7 @@ def test_no_control_is_lost_nor_cut_in_a_small_window_with_large_text(
     guitar.wait(lambda: all(each.isVisible() for each in wide))
     roomy = controls(window)
     assert set(wide) <= set(roomy)
-    for percent in (100, 150):
+    for percent in (150, 125):
         themed("dark", percent)
         for size in ((1280, 800), (1280, 720), (1024, 640), (958, 600)):
             window.resize(*size)
