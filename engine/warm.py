@@ -6,6 +6,7 @@ does not depend on one another.
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 from collections.abc import Iterator
@@ -63,10 +64,9 @@ def warm() -> None:
     if cache.is_whole():
         _sound(Voice(model_program(PRESET, RATE_HZ), INITIAL_M, EARS[0]))
     else:
-        with _beside("playing"):
-            models()
-            unheard()
-        voices()
+        with _beside("apart"):
+            voices()
+        apart()
         cache.set_whole()
 
 
@@ -74,39 +74,26 @@ def _beside(work: str) -> AbstractContextManager[object]:
     """Start another process with a function of this module; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
-    code = f"from engine import warm; warm.{work}()"
+    code = f"import gc; gc.disable(); from engine import warm; warm.{work}()"
     return subprocess.Popen(python_command("-c", code), env=python_environment())
 
 
-def playing() -> None:
-    """Compile what makes voices of events, for strings and drums."""
-    from engine.kernels import contact, sympathy
-    from engine.kernels.playing import events
-
-    for function in (events.play, contact.sound, sympathy.sympathise):
-        function.compile("void(int64, int64)")
-    CompiledPlayer(RATE_HZ, INFO.modes)
-    _drum()
-    _loudness()
-
-
-def unheard() -> None:
-    """A quantum of every kind of voice that is computed."""
-    for voice in _each():
-        voice.skip(QUANTUM / RATE_HZ, Mixer(RATE_HZ))
-
-
 def voices() -> None:
-    """Compile all sound by a few quanta of every kind of voice.
-
-    What a device calls is compiled as it is imported.
-    """
-    unheard()
+    """Compile all sound by a few quanta of every kind of voice, unheard and heard, and by a player."""
+    player, mixer = CompiledPlayer(RATE_HZ, INFO.modes), Mixer(RATE_HZ)
+    player.catch_up(mixer.address)
     for voice in _each():
+        voice.skip(QUANTUM / RATE_HZ, mixer)
         _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
+
+
+def apart() -> None:
+    """Compile what voices do without: models and the solver, responses, drums' modes, and loudness."""
+    models()
     responses()
-    playing()
+    _drum()
+    _loudness()
 
 
 def responses() -> None:
@@ -189,4 +176,5 @@ def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
 
 
 if __name__ == "__main__":
+    gc.disable()  # collections took a fifth of the time
     warm()

@@ -207,7 +207,26 @@ class TrainingConfiguration:
         )
 
 
-def digest_of(plain: dict[str, Any]) -> str:
+@dataclass(frozen=True)
+class Run:
+    """A configuration with the names that its row carries.
+
+    Attributes:
+        name: also of its folder and its preset.
+        recipe: "" where it is none of the tables'.
+    """
+
+    name: str
+    recipe: str
+    configuration: TrainingConfiguration
+
+    @cached_property
+    def digest(self) -> str:
+        """See `TrainingConfiguration.digest`."""
+        return self.configuration.digest
+
+
+def digest_of(plain: Any) -> str:
     """The sixteen digits that tell plain data apart."""
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -53,15 +52,17 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
     plucks = standard_plucks(info)
     errors: list[AudibleErrors] = []
-    parts = len(plucks) + 1  # the last is the end of one of them
     runs_away_s: list[float] = []
     seconds = 0.0
+
+    def part_of(number: int) -> Callable[[float], None]:
+        return lambda share: report((number + share) / (len(plucks) + 1))  # the last is the end of one of them
+
     for number, pluck in enumerate(plucks):
         truth = render_voice(programs[1], None, info, pluck, ear, wanted_s, until_db=UNTIL_DB)[:, 0]
         seconds = max(seconds, len(truth) / RATE_HZ)
         try:
-            advanced = partial(_advanced, report, number, parts)
-            model = render_voice(programs[0], source, info, pluck, ear, len(truth) / RATE_HZ, advanced)[:, 0]
+            model = render_voice(programs[0], source, info, pluck, ear, len(truth) / RATE_HZ, part_of(number))[:, 0]
         except Runaway as error:
             runs_away_s.append(error.time_s)
         else:
@@ -69,8 +70,7 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
             errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
     hum_db = None
     if not runs_away_s:
-        advanced = partial(_advanced, report, parts - 1, parts)
-        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, advanced)
+        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, part_of(len(plucks)))
     report(1.0)
     splits = [e.split_cents for e in errors if e.split_cents is not None]
     return Heard(
@@ -98,10 +98,6 @@ def measure(path: Path, write: bool, report: Callable[[float], None] = lambda sh
     if write:
         add_heard(path.parent, [row])
     return row
-
-
-def _advanced(report: Callable[[float], None], done: int, parts: int, share: float) -> None:
-    report((done + share) / parts)
 
 
 def _hum_db(

@@ -7,7 +7,6 @@ import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_p
 from engine.schema import SchemaError, read, write
 from engine.whole_file import whole_file
 from training import provenance
-from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration
+from training.configuration import DatasetConfiguration, Run, TrainingConfiguration, read_configuration
 from training.data.dataset import Dataset, load_dataset
 from training.data.draws import (
     CENTRE_RANGE,
@@ -32,7 +31,7 @@ from training.data.draws import (
     WIDTH_RANGE,
 )
 from training.evaluate import evaluate_model, figures
-from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
+from training.fitting.fit import Diverged, FitProgress, FitResult, Report, fit_seeds
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, SHORT_HORIZON, Row
 
@@ -40,39 +39,9 @@ PREFIXES = {"validation": "", "test": "test_"}
 REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
 
 
-@dataclass(frozen=True)
-class NamedRun:
-    """A run with its name and its recipe as a row carries them, and its preset's file.
-
-    Attributes:
-        preset: None: NAME.safetensors in the run's folder.
-        report: receives the run's progress.
-    """
-
-    name: str
-    recipe: str
-    configuration: TrainingConfiguration
-    preset: Path | None = None
-    report: Callable[[FitProgress], None] = lambda progress: None
-
-    def output(self, runs: Path) -> Path:
-        return self.preset or runs / self.name / f"{self.name}.safetensors"
-
-
-def _logged(run: NamedRun, runs: Path) -> Seed:
-    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported."""
-    output = run.output(runs)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryFile(dir=output.parent):
-        pass  # a folder that cannot be written is reported before the work
-    log = TrainingLog(runs / run.name / "log.csv")
-
-    def log_and_report(progress: FitProgress) -> None:
-        if progress.ends_epoch:
-            log.add(progress)
-        run.report(progress)
-
-    return Seed(run.configuration, runs / run.name, log_and_report)
+def preset_file(folder: Path, name: str) -> Path:
+    """The place of a run's preset in the folder of runs."""
+    return folder / name / f"{name}.safetensors"
 
 
 def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, output: Path) -> dict[str, Any]:
@@ -88,11 +57,13 @@ def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitRe
 
 
 def run_rows(
-    named: Sequence[NamedRun],
-    runs: Path,
+    runs: Sequence[Run],
+    folder: Path,
     *,
+    output: Path | None = None,
     cache: Path | None = None,
     device: torch.device | str = "cpu",
+    report: Report = lambda run, progress: None,
     waits: Callable[[], None] = lambda: None,
     checkpoint_every_s: float | None = None,
 ) -> list[Row]:
@@ -102,7 +73,9 @@ def run_rows(
     again from the run's checkpoint. A run that diverges is a result too: a row that says so.
 
     Args:
-        runs: a run's folder is runs/NAME: checkpoint, log and its plot, row, and the preset if it has no other place.
+        folder: a run's own is folder/NAME: checkpoint, log.csv, row, and the preset if it has no other place.
+        output: the preset of a single run; None: see `preset_file`.
+        report: receives the progress of each run, when an epoch is in its log.
         waits: is called where another process trains in such a folder, whose end is awaited.
 
     Raises:
@@ -110,83 +83,101 @@ def run_rows(
         RuntimeError: a preset that was written is not the model that was trained.
         OSError: a folder cannot be written.
     """
+    presets = {run.name: output or preset_file(folder, run.name) for run in runs}
+    logs = {run.name: TrainingLog(folder / run.name / "log.csv") for run in runs}
+
+    def log_and_report(run: Run, progress: FitProgress) -> None:
+        if progress.ends_epoch:
+            logs[run.name].add(progress)
+        report(run, progress)
+
     with ExitStack() as locks:
         # never two in one folder, even where a worker that was taken for dead still trains
-        for run in sorted(named, key=lambda run: run.name):  # in one order, or two processes could await each other
-            (runs / run.name).mkdir(parents=True, exist_ok=True)
-            locks.enter_context(_held(runs / run.name / "run.lock", waits))
-        rows = {run.name: row for run in named if (row := _known_row(run, runs)) is not None}
-        left = [run for run in named if run.name not in rows or not _made_by(run.configuration, run.output(runs))]
+        for name in sorted(presets):  # in one order, or two processes could await each other
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            locks.enter_context(_held(folder / name / "run.lock", waits))
+        rows = {run.name: row for run in runs if (row := _known_row(run, folder)) is not None}
+        left = [run for run in runs if run.name not in rows or not _made_by(run, presets[run.name])]
         if left:
             dataset = load_dataset(left[0].configuration.data, cache)
-            seeds = [_logged(run, runs) for run in left]
-            outcomes = fit_seeds(seeds, dataset, device=device, checkpoint_every_s=checkpoint_every_s)
+            for run in left:
+                _check_writable(presets[run.name].parent)
+            every_s = checkpoint_every_s
+            outcomes = fit_seeds(
+                left, dataset, folder, report=log_and_report, device=device, checkpoint_every_s=every_s
+            )
             for run, outcome in zip(left, outcomes, strict=True):
-                rows[run.name] = _row(run, outcome, dataset, runs, device, rows.get(run.name))
-        return [rows[run.name] for run in named]
+                facts = row_facts(run) | _circumstances(run, device)
+                if isinstance(outcome, Diverged):
+                    row = Row(**facts, status="diverged", message=str(outcome), finished=provenance.now())
+                else:
+                    columns = _saved(run.configuration, dataset, outcome, presets[run.name])
+                    row = Row(**facts, status="done", finished=provenance.now(), **columns)
+                    row = _kept(row, rows.get(run.name), folder / run.name / "row.json")
+                rows[run.name] = row
+        return [rows[run.name] for run in runs]
 
 
-def _known_row(run: NamedRun, runs: Path) -> Row | None:
+def _check_writable(folder: Path) -> None:
+    """Raise OSError before the work: nothing can be written there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
+def _known_row(run: Run, folder: Path) -> Row | None:
     """The row that the run left in its folder; None where there is none, or one of another configuration."""
-    file = runs / run.name / "row.json"
+    file = folder / run.name / "row.json"
     if not file.exists():
         return None
     try:
         row = read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
     except ValueError as error:
         raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
-    return row if row.digest == run.configuration.digest else None
+    return row if row.digest == run.digest else None
 
 
-def _row(
-    run: NamedRun,
-    outcome: FitResult | Diverged,
-    dataset: Dataset,
-    runs: Path,
-    device: torch.device | str,
-    known: Row | None,
-) -> Row:
-    """The row of a run that has ended; its preset and row are written."""
+def _kept(row: Row, known: Row | None, file: Path) -> Row:
+    """The row that stays of a run that is done, and is in its file."""
+    if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
+        return known  # the preset alone was missing: where and when it was trained stays
+    with whole_file(file) as unfinished:
+        unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
+    return row
+
+
+def row_facts(run: Run) -> dict[str, Any]:
+    """The columns of a row that say which run it is."""
     configuration = run.configuration
-    facts: dict[str, Any] = {
-        **row_facts(run.name, run.recipe, configuration),
-        "initialisation": configuration.start,
+    return {
+        "digest": run.digest,
+        "name": run.name,
+        "model": configuration.model,
+        "string": configuration.data.string_kind,
+        "initial": configuration.data.initial,
+        "rate_hz": configuration.data.rate_hz,
+        "horizon": configuration.steps,
+        "recipe": run.recipe,
+        "seed": configuration.recipe.seed,
+    }
+
+
+def _circumstances(run: Run, device: torch.device | str) -> dict[str, Any]:
+    """The columns that say how it started, and where it was trained."""
+    return {
+        "initialisation": run.configuration.start,
         "device": torch.device(device).type,
         "threads": torch.get_num_threads(),
         "hardware": provenance.hardware(device),
         "torch": torch.__version__,
         "commit": provenance.commit(),
     }
-    if isinstance(outcome, Diverged):
-        return Row(**facts, status="diverged", message=str(outcome), finished=provenance.now())
-    columns = _saved(configuration, dataset, outcome, run.output(runs))
-    row = Row(**facts, status="done", finished=provenance.now(), **columns)
-    if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
-        return known  # the preset alone was missing: where and when it was trained stays
-    with whole_file(runs / run.name / "row.json") as unfinished:
-        unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
-    return row
 
 
-def row_facts(name: str, recipe: str, configuration: TrainingConfiguration) -> dict[str, Any]:
-    """The columns of a row that say which run it is."""
-    return {
-        "digest": configuration.digest,
-        "name": name,
-        "model": configuration.model,
-        "string": configuration.data.string_kind,
-        "initial": configuration.data.initial,
-        "rate_hz": configuration.data.rate_hz,
-        "horizon": configuration.steps,
-        "recipe": recipe,
-        "seed": configuration.recipe.seed,
-    }
-
-
-def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
+def _made_by(run: Run, preset: Path) -> bool:
     """Return True if a file is the preset of this run."""
     try:
-        return configuration_of(read_info(preset), str(preset)).digest == configuration.digest
+        return configuration_of(read_info(preset), str(preset)).digest == run.digest
     except (PresetError, SchemaError):
         return False
 

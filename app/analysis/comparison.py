@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presets.library import PresetEntry
-from app.rendering.job import BLOCK_FRAMES
+from app.rendering.line import BLOCK_FRAMES
 from app.rendering.subject import StringOf, load_subject
 from app.shared.worker import Cancelled, Job
 from engine.compare.relative import NULL_FLOOR_DB, ErrorSums

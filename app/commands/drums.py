@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from app.patches.patch import Patch
     from engine.resonators.drum import DrumModes
     from engine.strike import Strike
-    from training.family.drums import Blocks, DrumPlayer, StruckDrum
+    from training.family.drums import StruckDrum
+    from training.family.motion import Blocks, Player
 
 drums = typer.Typer(help="Motions and sounds of drums.", no_args_is_help=True)
 DrumName = Annotated[
@@ -102,14 +103,14 @@ def simulate(
 
     OUT has its displacement on a grid, the first row at the top, 0 outside the drum.
     """
-    from training.family.drums import linear_drum, true_motion
+    from training.family.motion import linear_motion, true_motion
 
     blow = _blow_of(drum, key, velocity, place)
     with progress(out.name) as report:
         if solver == "dop853":
             motion = _dop853(blow.struck(linear), rate, steps, report)
         else:
-            motion = (linear_drum if linear else true_motion)(blow.struck(), rate)
+            motion = (linear_motion if linear else true_motion)(blow.struck(), rate)
         _write(out, blow, motion, steps, points, report)
 
 
@@ -184,13 +185,13 @@ def compare(
     blow = _blow_of(drum, key, velocity, place, preset)
     import torch
 
-    from training.family.drums import linear_drum, motion_errors, untrained_player
+    from training.family.motion import linear_motion, motion_errors, untrained_player
 
     torch.set_num_threads(1)
     players = {
         blow.patch.preset: blow.player(),
         "r = p = 1/12": untrained_player("series"),
-        "linear drum": linear_drum,
+        "linear drum": linear_motion,
     }
     struck_drum = blow.struck()
     with progress("drums compare") as report:
@@ -227,9 +228,9 @@ class _Blow:
 
         return StruckDrum.by(self.strike, self.key.modes, not linear)
 
-    def player(self) -> DrumPlayer:
+    def player(self) -> Player:
         """The player of the instrument's preset. Raises Failure: its model learned one string."""
-        from training.family.drums import model_player
+        from training.family.motion import model_player
 
         try:
             return model_player(arguments.open_preset(self.patch.preset).model)
@@ -300,10 +301,9 @@ def _with_file(path: Path) -> Patch:
 def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressReport) -> Blocks:
     import torch
 
-    from engine.truth import ModalState, solve_dop853
+    from engine.truth import solve_dop853
 
-    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck_drum.amplitudes_m, struck_drum.speeds_m_s)))
-    rows = iter(solve_dop853(struck_drum.resonator, state, rate_hz, steps, report=report)[0, 1:])
+    rows = iter(solve_dop853(struck_drum.resonator, struck_drum.state, rate_hz, steps, report=report)[0, 1:])
     return lambda count: torch.stack([*islice(rows, count)])
 
 

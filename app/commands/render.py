@@ -117,7 +117,7 @@ def render(
         arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
     if rate is not None:
         arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
-    loaded = arguments.open_preset_to_render(preset, string, rate, modes)
+    loaded = arguments.open_preset_of_string(preset, string, rate, modes, to_render=True)
     options.check_shortest(seconds, loaded.info.rate_hz)
     if source == "both" and listen_right is not None:
         raise typer.BadParameter(IN_ONE_FILE, param_hint="--source")

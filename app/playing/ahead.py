@@ -6,6 +6,7 @@ samples it pauses by itself; the others continue.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import OrderedDict
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from app.shared.thread_priority import Rank, lower_priority
 from engine.resonators.base import Array
 from engine.sources import ModelSource, Runaway
-from engine.voices import ModelSamples, Voice
+from engine.voices import Voice, render_samples
 from engine.voices.offline import AHEAD_FIRST
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ SILENT = 1e-5  # of full scale
 KEPT = 32  # plucks that need not be rendered again
 
 
-class AheadSamples(ModelSamples):
+class AheadSamples:
     """The samples of a note's voice, rendered ahead.
 
     Args:
@@ -39,7 +40,7 @@ class AheadSamples(ModelSamples):
         from_s: where in its motion the note will begin.
 
     Attributes:
-        blocks: of the samples so far.
+        blocks: of the samples so far; done: their number.
         ready: enough is rendered for the note to begin.
         ran_away: the model did; its voice ends before.
     """
@@ -47,9 +48,11 @@ class AheadSamples(ModelSamples):
     def __init__(
         self, voice: Voice, source: ModelSource, initial_m: Array, key: tuple[object, ...], from_s: float = 0.0
     ) -> None:
-        super().__init__(voice, source, initial_m)
-        self.key, self._from_s, self._rate_hz = key, from_s, source.rate_hz
+        self.voice, self.key = voice, key
+        self._from_s, self._rate_hz = from_s, source.rate_hz
+        self._rest = render_samples(voice, source, initial_m)
         self.blocks: list[NDArray[np.float32]] = []
+        self.done = 0
         self.finished = self.ready = self.ran_away = False
         self._spent_s = 0.0
 
@@ -81,11 +84,12 @@ class AheadSamples(ModelSamples):
         """Render the next block; `finished` after the last one."""
         began_s = time.monotonic()
         try:
-            block = self.advance()
+            block = next(self._rest)
         except Runaway:
             self.finished = self.ready = self.ran_away = True
             return
         self.blocks.append(block)
+        self.done += len(block)
         if not self.voice.room or (self.done > AHEAD_FIRST and float(np.abs(block).max()) < SILENT):
             self._finish()
         if self.done > 1 + AHEAD_FIRST:
@@ -95,8 +99,13 @@ class AheadSamples(ModelSamples):
     def take(self, samples: NDArray[np.float32]) -> None:
         """Take all samples, (frames, channels), which are known from an earlier pluck."""
         self.voice.append(samples)
-        self.done = len(samples)
+        self.blocks, self.done = [samples], len(samples)
         self._finish()
+
+    def level(self, seconds: float) -> float:
+        """Root mean square of the first seconds of it."""
+        first = np.concatenate(self.blocks)[: round(seconds * self._rate_hz)]
+        return math.sqrt(float(np.square(first, dtype=np.float64).mean()))
 
     def _finish(self) -> None:
         self.voice.end_here()
@@ -108,7 +117,7 @@ class Ahead:
 
     Args:
         begin: hands a note over; called in the thread when enough of all its samples is rendered.
-        failed: is called there with a note and what went wrong.
+        failed: ends a note, and reports what went wrong; called there.
     """
 
     def __init__(
@@ -152,7 +161,6 @@ class Ahead:
             try:
                 self._advance(note)
             except Exception as error:
-                note.cut = True
                 self._failed(note, error)
             with self._mailbox:
                 if note.over or not note.unfinished:

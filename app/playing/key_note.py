@@ -155,8 +155,14 @@ class KeyNote:
 
 
 def drop(note: PluckVoices | KeyNote | None, error: Exception, report: Callable[[str, str], None]) -> None:
-    """End a note whose handling failed, as far as it was made. Its report is always the same, to be shown once."""
-    report(DROPPED, log_fault(error, "while a note was played"))
+    """End a note whose handling failed, as far as it was made.
+
+    What is wrong with a preset is reported in its own words; any other fault in the same, to be shown once.
+    """
+    if isinstance(error, ValueError):
+        report(str(error), "")
+    else:
+        report(DROPPED, log_fault(error, "while a note was played"))
     if note is not None:
         note.cut = True
         with contextlib.suppress(Exception):  # what has failed may be this

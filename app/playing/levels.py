@@ -26,9 +26,10 @@ def level_match(sources: Sources, note: PluckVoices, rate_hz: int) -> Mapping[st
 
 def _level(sources: Sources, note: PluckVoices, source: str, seconds: float, rate_hz: int) -> float:
     """Root mean square of the first `seconds`. 0 where it is not known, so that the source stays as it is."""
-    request, voice = note.request, note.voices[source]
-    if voice.program.rendered:
-        return voice.level_of_samples(seconds) if request.ear.pickup != "velocity" else 0.0
+    request = note.request
+    for samples in note.ahead:
+        if samples.voice is note.voices[source]:
+            return samples.level(seconds) if request.ear.pickup != "velocity" else 0.0
     mixer = Mixer(rate_hz, limited=False)
     mixer.add(sources.load(note.subject(source)).voice(source, request.pluck, request.ear, rate_hz))
     sound = mixer.render(round(seconds * rate_hz))

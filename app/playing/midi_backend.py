@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 VARIABLE = "LEARNED_STRINGS_MIDI"
 CLIENT = "Learned Strings"
@@ -19,21 +19,6 @@ PERIOD_S = 0.001
 
 class MidiUnavailable(Exception):
     """The error that there is no MIDI, in plain words with the remedy."""
-
-
-class OpenPort(Protocol):
-    def close(self) -> None: ...
-
-    def connected(self) -> bool:
-        """Return True if its device is still there."""
-
-
-class Backend(Protocol):
-    """A system for MIDI. Both raise OSError where it does not answer."""
-
-    def get_input_names(self) -> list[str]: ...
-
-    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> OpenPort: ...
 
 
 def load_backend() -> RtMidi:

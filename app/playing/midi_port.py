@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from app.instrument.events import Event, channels_in, release_all
 from app.instrument.midi_file import event_of
-from app.playing.midi_backend import Backend, MidiUnavailable, OpenPort, load_backend
+from app.playing.midi_backend import MidiUnavailable, RtMidi, RtMidiInput, load_backend
 
 
 class MidiInput:
@@ -23,14 +23,14 @@ class MidiInput:
     def __init__(
         self,
         on_message: Callable[[Event], None],
-        load: Callable[[], Backend] = load_backend,
+        load: Callable[[], RtMidi] = load_backend,
         on_release_all: Callable[[Event], object] = lambda event: None,
     ) -> None:
         self._on_message = on_message
         self._on_release_all = on_release_all
         self._load = load
-        self._backend: Backend | None = None
-        self._port: OpenPort | None = None
+        self._backend: RtMidi | None = None
+        self._port: RtMidiInput | None = None
         self._channels: set[int] = set()  # on which something came
         self.name = ""  # of the open input
         self._awaited = ""  # of one that was open, or was to be, and is not connected
@@ -103,7 +103,7 @@ class MidiInput:
         for event in release_all(channels):
             self._on_release_all(event)
 
-    def _load_backend(self) -> Backend:
+    def _load_backend(self) -> RtMidi:
         if self._backend is None:
             self._backend = self._load()
         return self._backend

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -92,7 +91,7 @@ class Notes:
         self._chosen: RenderRequest | None = None
         self._reach: PluckRange | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
-        self._ahead = Ahead(self._hand_over, self._cannot_render)
+        self._ahead = Ahead(self._hand_over, self._drop)
         self._latencies_s: deque[float] = deque(maxlen=100)
         self._loads: deque[float] = deque(maxlen=LOOKS)
         self._frames_looked = 0  # of the mixer, when its load was looked at
@@ -170,7 +169,7 @@ class Notes:
         try:
             return self._handle(event, due)
         except Exception as error:
-            drop(None, error, self._report)
+            self._drop(None, error)
             return None
 
     def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
@@ -218,11 +217,8 @@ class Notes:
             note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
             self._notes.append(note)
-        begin = partial(self._begin, note)
-        if note.from_s > 0 or not loaded:
-            self.in_background(begin, note)
-        else:
-            self._wrap_errors(begin, note)()
+        begin = self._do if loaded and not note.from_s else self.in_background
+        begin(partial(self._begin, note), note)
         return note
 
     def turn(
@@ -262,7 +258,7 @@ class Notes:
     def in_background(self, work: Callable[[], None], note: PluckVoices | None = None) -> None:
         """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
-            self._helper.submit(self._wrap_errors(work, note))
+            self._helper.submit(self._do, work, note)
 
     @property
     def at_hand(self) -> bool:
@@ -331,13 +327,20 @@ class Notes:
 
     # How it is done
 
+    def _do(self, work: Callable[[], None], note: PluckVoices | KeyNote | None = None) -> None:
+        """Do `work`; a note with which it fails is dropped, and what went wrong is reported."""
+        try:
+            work()
+        except Exception as error:
+            self._drop(note, error)
+
     def _do_for_each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
-        """Do `work` with each note. One with which it fails is dropped, and the others continue."""
+        """Do `work` with each note, as `_do`."""
         for note in notes:
-            try:
-                work(note)
-            except Exception as error:
-                drop(note, error, self._report)
+            self._do(partial(work, note), note)
+
+    def _drop(self, note: PluckVoices | KeyNote | None, error: Exception) -> None:
+        drop(note, error, self._report)
 
     def _take_latency(self, note: PluckVoices | KeyNote) -> None:
         """Add the latency of a note, once it is known, to the recent ones; notes rendered ahead have none."""
@@ -386,22 +389,6 @@ class Notes:
         rate_hz = self._sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
-    def _wrap_errors(self, work: Callable[[], None], note: PluckVoices | None = None) -> Callable[[], None]:
-        """The work with its errors reported; they cut the note."""
-
-        def guarded() -> None:
-            try:
-                work()
-                return
-            except ValueError as error:
-                self._report(str(error), "")
-            except Exception as error:
-                self._report(f"This pluck cannot be played: {error}", traceback.format_exc())
-            if note is not None:
-                note.cut = True
-
-        return guarded
-
     def _move_to_new_mixer(self) -> None:
         """Let the latest plucks ring on in the new mixer of a device that has changed its rate. Keys' notes end."""
         mixer = self._sound.mixer
@@ -448,9 +435,6 @@ class Notes:
             self._ahead.render(note)
         else:
             self._hand_over(note)
-
-    def _cannot_render(self, note: PluckVoices, error: Exception) -> None:
-        self._report(f"This pluck cannot be rendered: {error}", "")
 
     def _hand_over(self, note: PluckVoices) -> None:
         """Hand a note over to the mixer; begin it again where the device has one of another rate or frame by now."""

@@ -12,7 +12,8 @@ from app.rendering.strobe import FLASH_HZ
 from app.rendering.take import SOURCES, Listened, Signal
 from engine.presets import PresetError
 from engine.resonators.base import Array
-from training.family.drums import Blocks, StruckDrum, model_player, true_motion
+from training.family.drums import StruckDrum
+from training.family.motion import Blocks, model_player, true_motion
 
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
 TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them

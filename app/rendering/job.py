@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from app.rendering.line import SourceLine
+from app.rendering.line import BLOCK_FRAMES, SourceLine
 from app.rendering.rendering import Rendering, RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.take import SOURCES, Listened, Pictures, Take
@@ -15,7 +15,6 @@ from engine.values.ear import Ear
 
 PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
-BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
 class PluckJob(Rendering[RenderRequest, Take]):

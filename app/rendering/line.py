@@ -13,6 +13,8 @@ from engine.resonators.base import Array
 from engine.sources import Runaway, SourceState, StringSource
 from engine.values.ear import Ear
 
+BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
+
 
 class SourceLine:
     """The rendering of a source into its motion and its signal.
@@ -101,9 +103,9 @@ class SourceLine:
                 flashes.take(stop, union, frames)
             self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
         if self._shown is not None and flashes is not None:
-            self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
+            self._catch_up(self._shown, flashes, max(samples, BLOCK_FRAMES * self.stride))
         if self._listening is not None:
-            self._listening.advance()
+            self._listening.advance(min(self.done, self._listening.signal.ready_frames + BLOCK_FRAMES * self.stride))
             if self._listening.signal.complete:
                 self._listening = None
 

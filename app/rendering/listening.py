@@ -6,7 +6,7 @@ of the motion, which has every frame.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,13 @@ from app.rendering.subject import Loaded
 from app.rendering.take import Pictures, Signal
 from engine.kernels.constants import QUANTUM
 from engine.kernels.mixer_records import REACH
+from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
-from engine.resonators.base import Array
 from engine.sources import Runaway
 from engine.values.ear import Ear
-from engine.voices import ModelSamples, OfflineVoice
+from engine.voices import OfflineVoice, Voice, render_samples
 
-FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
-BLOCK_FRAMES = 32_768  # up to this one
-RENDERED_FRAMES = 2_048  # a block of any other voice
+MOTION_FRAMES = 1_024  # of a block of samples of a motion
 BEHIND = 4 * QUANTUM  # frames that a voice with given samples reads ahead at most
 BEYOND = 2 * REACH + 2 * QUANTUM  # samples after the end, which the differentiator of a velocity reads
 
@@ -44,49 +42,40 @@ class Listening:
         voice = loaded.voice(source, pluck, ear, signal.rate_hz, (signal.frames + BEYOND) / signal.rate_hz)
         voice.begin_at_once()
         self._offline = OfflineVoice(voice)
-        self._samples: ModelSamples | None = None
-        if voice.program.rendered:
-            model = loaded.model if motion is None else _Motion(motion)
-            self._samples = ModelSamples(voice, model, loaded.initial_m(pluck))
+        self._given = 0  # samples of a voice that is not compiled
+        self._rest: Iterator[NDArray[np.float32]] | None = None
+        if voice.program.rendered and motion is not None:
+            self._rest = _motion_samples(voice, motion)
+        elif voice.program.rendered:
+            self._rest = render_samples(voice, loaded.model, loaded.initial_m(pluck))
 
-    def advance(self) -> None:
-        """Append a block to the signal, or less where less is available; silence where the source runs away."""
-        signal = self.signal
-        readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
+    def advance(self, stop: int) -> None:
+        """Append to the signal up to a frame, or less where less is there; silence where the source runs away."""
+        signal, stop = self.signal, min(stop, self.signal.frames)
         try:
-            if self._samples is not None:
-                readable = self._render(self._samples)
-            count = min(readable, signal.frames) - signal.ready_frames
-            if count > 0:
-                signal.append(self._offline.read(count) * np.float32(self._ear.full_scale))
+            if self._rest is not None:
+                while self._given < stop + BEHIND and len(block := next(self._rest, signal.read(0, 0))):
+                    self._given += len(block)
+                whole = not self._offline.voice.room
+                stop = stop if whole else min(stop, self._given - BEHIND)
+            if stop > signal.ready_frames:
+                signal.append(self._offline.read(stop - signal.ready_frames) * np.float32(self._ear.full_scale))
         except Runaway:
             signal.end_in_silence()
 
-    def _render(self, samples: ModelSamples) -> int:
-        """Give the voice a block of samples; the number of frames up to which it can be read."""
-        stop = samples.done + RENDERED_FRAMES
-        while samples.voice.room and samples.done < stop and len(samples.advance()):
-            pass
-        return samples.done - BEHIND if samples.voice.room else self.signal.frames
 
+def _motion_samples(voice: Voice, motion: Pictures) -> Iterator[NDArray[np.float32]]:
+    """Give a voice the samples of a motion, block by block; empty ones where no more is ready.
 
-class _Motion:
-    """The source that has the frames of a motion; a point reflection about the last one continues it."""
-
-    def __init__(self, motion: Pictures) -> None:
-        self._motion = motion
-
-    def start(self, displacement_m: Array) -> int:
-        """The state: the number of the next frame."""
-        return 1
-
-    def advance(self, state: int, steps: int, readout: Array) -> tuple[NDArray[np.floating[Any]], int]:
-        """The next frames as far as they are ready, (1, frames, points)."""
-        motion, last = self._motion, self._motion.frames - 1
-        weights = readout.astype(np.float32)
-        if state <= last:
-            samples = motion.read(state, state + steps) @ weights
-        else:
-            mirrored = np.maximum(2 * last - np.arange(state, state + steps), 0)
+    A point reflection about the last frame continues it.
+    """
+    weights = (voice.program.grid_weights(voice.ear) / FULL_SCALE_M).astype(np.float32)
+    given, last = 0, motion.frames - 1
+    while voice.room:
+        samples = motion.read(given, given + MOTION_FRAMES) @ weights
+        if given > last:
+            mirrored = np.maximum(2 * last - np.arange(given, given + voice.room), 0)
             samples = (2 * motion.read(last) - motion.read()[mirrored]) @ weights
-        return samples[None], state + len(samples)
+        voice.append(samples)
+        given += len(samples)
+        yield samples

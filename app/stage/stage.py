@@ -12,11 +12,13 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from app.instrument.compiled import is_another
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import KEYS, NoteOn, PluckAt
 from app.instrument.strings import KeyString, Strings, on_string
 from app.patches.patch import Patch, StringSet
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
+from app.rendering import BlowRequest, BlowTake, RenderRequest, Take
 from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import OBSERVED, Choices, with_one_pickup
@@ -25,6 +27,7 @@ from engine.pluck import Pluck
 from engine.values.string import StringParameters
 
 Note = PluckVoices | KeyNote
+Request = RenderRequest | BlowRequest
 Key = tuple[int, int | None]  # of an instrument, and its string of the set, as in `Strings.of_key`
 
 
@@ -54,7 +57,29 @@ class Turned:
     note: Note
 
 
-Event = Chosen | Begun | Turned
+@dataclass(frozen=True)
+class Asked:
+    """The motion that is to be shown is another one; None: there is none."""
+
+    request: Request | None
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """The motion that is asked for has its first block, or is complete."""
+
+    take: Take | BlowTake
+    complete: bool = False
+
+
+@dataclass(frozen=True)
+class Parked:
+    """The playhead was put at a time of the motion, where it stands until the next note."""
+
+    position_s: float
+
+
+Event = Chosen | Begun | Turned | Asked | Rendered | Parked
 
 
 @dataclass(frozen=True)
@@ -66,12 +91,42 @@ class Stage:
         key: the key of an instrument that was struck or restored last; None before the first.
         note: the note that began last; None before the first.
         known: the player has reported this note.
+        request: the motion that is asked for: of the chosen pluck, or of the latest blow; None: there is none.
+        take: the motion that is shown.
+        ready, complete: this is the one that is asked for; all of it is rendered.
+        lead: the note whose time the playhead follows; None: it stands at `parked_s`.
+        parked: the note that the playhead was parked from, and does not follow again.
     """
 
     choices: Choices = field(default_factory=Choices)
     key: Key | None = None
     note: Note | None = None
     known: bool = True
+    request: Request | None = None
+    take: Take | BlowTake | None = None
+    ready: bool = False
+    complete: bool = False
+    lead: Note | None = None
+    parked: Note | None = None
+    parked_s: float = 0.0
+
+    def position_s(self, latency_s: float) -> float:
+        """The playhead: the time in the motion that is heard now, or where it stands; `latency_s`: of the output."""
+        if self.take is None:
+            return 0.0
+        heard_s = self.parked_s if self.lead is None else max(self.lead.seconds - latency_s, self.lead.from_s)
+        return min(max(heard_s, 0.0), self.take.seconds)
+
+    @property
+    def audible(self) -> bool:
+        """Return True if the note of the motion rings, which may be longer than the motion."""
+        return self.lead is not None and self.take is not None and not self.lead.over
+
+    @property
+    def moving(self) -> bool:
+        """Return True if the playhead moves."""
+        lead, take = self.lead, self.take
+        return lead is not None and take is not None and not lead.over and lead.seconds < take.seconds
 
     @property
     def drum_key(self) -> int | None:
@@ -127,6 +182,17 @@ class Stage:
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     @property
+    def blow(self) -> BlowRequest | None:
+        """The motion of the latest blow on the drums that are played, as it is heard now; None: there is none."""
+        request, note, patch = self.request, self.note, self.choices.patch
+        if not (isinstance(request, BlowRequest) and isinstance(note, KeyNote) and patch is not None):
+            return None
+        if note.patch.name != patch.name:
+            return None
+        heard = replace(request, seconds=self.choices.seconds, ear=self.choices.ear)
+        return request if (heard.seconds, heard.ear) == (request.seconds, request.ear) else heard
+
+    @property
     def note_played(self) -> Note | None:
         """The latest note, where it is of the instrument that is played."""
         note, patch = self.note, self.choices.instrument
@@ -153,9 +219,19 @@ def next_stage(stage: Stage, event: Event) -> Stage:
         case Chosen():
             return _chosen(stage, event.values)
         case Begun():
-            return stage if event.note is stage.note and stage.known else _begun(stage, event.note)
+            stage = stage if event.note is stage.note and stage.known else _begun(stage, event.note)
         case Turned():
-            return replace(stage, note=event.note, known=True)
+            stage = replace(stage, note=event.note, known=True)
+        case Asked():
+            stage = _asked(stage, event.request)
+        case Rendered():
+            stage = _rendered(stage, event)
+        case Parked():
+            return replace(stage, lead=None, parked=stage.note, parked_s=event.position_s)
+    note, request = stage.note, stage.request
+    if note is None or request is None or not (stage.ready and stage.known) or note in (stage.lead, stage.parked):
+        return stage
+    return replace(stage, lead=note) if _is_of(note, request) and not (note.released or note.over) else stage
 
 
 def changed_names(before: Stage, after: Stage) -> frozenset[str]:
@@ -186,11 +262,48 @@ def _begun(stage: Stage, note: Note) -> Stage:
         if stage.note_played is None:  # another instrument or a single string was chosen meanwhile
             return stage
         stage, drawn = replace(stage, key=(note.event.key, note.string)), note.event.pluck is not None
+        if note.of_drum:
+            return _struck(stage, note)
     if note.request is None:
         return stage
     values = {"string": string_of(note.request.preset)}
     values |= {} if drawn else asdict(note.request.pluck)  # else the choices have this pluck already
     return replace(stage, choices=stage.choices.changed(values))
+
+
+def _struck(stage: Stage, note: KeyNote) -> Stage:
+    """The stage that asks for the motion of a blow."""
+    keys, choices, event = note.player.keys, stage.choices, note.event
+    drum_key = keys.of_key(event.key) if isinstance(keys, DrumKeys) else None
+    if drum_key is None:
+        return stage
+    strike = drum_key.strike(event.velocity, note.patch.pluck.curve)
+    strike = strike if event.place is None else replace(strike, place=event.place)
+    return _asked(stage, BlowRequest(note.path, drum_key.modes, strike, choices.seconds, choices.ear))
+
+
+def _asked(stage: Stage, request: Request | None) -> Stage:
+    """The stage that asks for a motion; of a string after one of a drum, it shows none until then."""
+    if type(request) is not type(stage.request):
+        stage = replace(stage, take=None, ready=False, lead=None, parked_s=0.0)
+    ready = stage.ready and request is not None and request.same_motion(stage.request)
+    return replace(stage, request=request, ready=ready)
+
+
+def _rendered(stage: Stage, event: Rendered) -> Stage:
+    """The stage with a motion, at its beginning. Where the playhead was parked after the same blow, it stays."""
+    if event.take is stage.take:
+        return replace(stage, ready=True, complete=stage.complete or event.complete)
+    stays = isinstance(event.take, BlowTake) and stage.note is stage.parked
+    parked_s = stage.parked_s if stays else 0.0
+    return replace(stage, take=event.take, ready=True, complete=event.complete, lead=None, parked_s=parked_s)
+
+
+def _is_of(note: Note, request: Request) -> bool:
+    """Return True if a note is of the pluck, or of a blow as the one, whose motion is asked for."""
+    if isinstance(request, BlowRequest):
+        return isinstance(note, KeyNote) and note.of_drum
+    return note.request is not None and (note.request.preset, note.request.pluck) == (request.preset, request.pluck)
 
 
 def _with_own_string(stage: Stage, before: Patch | None, asked: Collection[str]) -> Stage:

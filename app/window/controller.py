@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -61,13 +62,22 @@ from app.instrument.learned import Kept
 LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
 IDLE_LOOK_MS = 50  # while nothing moves
 TURNS: tuple[Location, ...] = ("stage", "left", "stage", "right")
-FACTS_S = 0.1  # between two updates of gains and of the audio state
+KEYS_EVERY_S, FACTS_EVERY_S, JUDGED_EVERY_S = 0.04, 0.1, 0.15
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
 DRUMS_PLAYED = (
     "This view shows a string, and drums are played.\nWaveform, spectrum, spectrogram and error over time show them."
 )
+
+
+@dataclass
+class Duty:
+    """What the window's timer does from time to time."""
+
+    every_s: float
+    do: Callable[[], object]
+    due_s: float = 0.0
 
 
 class Controller(QObject):
@@ -90,7 +100,6 @@ class Controller(QObject):
         self._timer.timeout.connect(self._tick)
         self._lively_until_s = 0.0
         self._ticks = 0
-        self._facts_due_s = 0.0
         self._shown_s = dict.fromkeys(TURNS, time.monotonic())
         self._peak_db = METER_FLOOR_DB
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
@@ -137,6 +146,13 @@ class Controller(QObject):
             self.window.notices.report(problem)
         self.session.changed.connect(self._stage_changed)
         self._stage_changed(frozenset(OBSERVED))
+        self._duties = [
+            Duty(KEYS_EVERY_S, self.patches.tick),
+            Duty(FACTS_EVERY_S, self._show_facts),
+            Duty(JUDGED_EVERY_S, self.patches.judge),
+            Duty(1.0, self.instruments.midi.look),
+            Duty(1.0, self.keeper.look),
+        ]
         self._timer.start()
         window.closing.disconnect(self.sound.close)
         window.closing.connect(self.close)
@@ -395,14 +411,12 @@ class Controller(QObject):
     # Session → everything
 
     def _stage_changed(self, names: frozenset[str]) -> None:
+        self.performance.stage_changed(names)
         if not names.isdisjoint(OBSERVED):
-            self.performance.choices_changed(names)
             self.instruments.choices_changed(names)
             self._choices_shown(names)
         if names & {"note", "known"} and self.session.stage.known:
-            self.performance.follow()
             self._show_struck()
-            self.patches.show_played()
             self.exports.refresh()
 
     def _choices_shown(self, names: frozenset[str]) -> None:
@@ -478,16 +492,21 @@ class Controller(QObject):
         performance.tick()
         transport.show_playing(performance.playing)
         self._show_level(elapsed_s)
-        if now_s >= self._facts_due_s:
-            self._facts_due_s = now_s + FACTS_S
-            choices = self.session.choices
-            transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
-            self.audio.show(self.sound.status(), performance.notes, performance.take)
-        self.patches.tick()
+        for duty in self._duties:
+            if now_s >= duty.due_s:
+                duty.due_s = now_s + duty.every_s
+                duty.do()
         is_still = performance.settled and not (performance.playing or performance.moving)
         if not is_still or self._peak_db > METER_FLOOR_DB:
             self._lively_until_s = now_s + LIVELY_S
         self._set_pace(LOOK_MS if now_s < self._lively_until_s else IDLE_LOOK_MS)
+
+    def _show_facts(self) -> None:
+        """Show the gains and the state of the audio output."""
+        choices, performance = self.session.choices, self.performance
+        gains_db = {slot: choices.gain_db(slot, performance.match) for slot in SLOTS}
+        self.window.transport.slots.show_gains(gains_db)
+        self.audio.show(self.sound.status(), performance.notes, performance.take)
 
     def _show_level(self, elapsed_s: float) -> None:
         mixer = self.sound.mixer

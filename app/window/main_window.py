@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Callable
@@ -38,7 +37,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presets.words import judged
 from app.shared.vocabulary import Face
 from app.views import theme
 from app.views.controls.app_menu import AppMenu, menu_button
@@ -146,8 +144,6 @@ class MainWindow(QMainWindow):
         self.growth_sign.setAccessibleName("Error of the model")
         self.through_label = words_label()
         self.outside_label = words_label()
-        self._outside, self._of_shown = "", True
-        self._error = math.nan
         self._lay_out()
         self.setAcceptDrops(True)
         self.menu.look_asked.connect(self._change_look)
@@ -389,22 +385,8 @@ class MainWindow(QMainWindow):
         self.through_label.setToolTip(plain_tip(text))
         self.through_label.setVisible(bool(text))
 
-    def show_outside(self, text: str, of_shown: bool = True) -> None:
-        """Show the parts of the latest note that lie outside the training; "" for nothing.
-
-        Args:
-            of_shown: whether that note is the pluck that is shown; else a knob was turned since.
-        """
-        self._outside, self._of_shown = text, of_shown
-        self._show_outside()
-
-    def show_error(self, error: float) -> None:
-        """Show the largest relative error of the pluck that is shown; not a number until it is measured."""
-        self._error = error
-        self._show_outside()
-
-    def _show_outside(self) -> None:
-        text, grave = judged(self._outside, self._error if self._of_shown else math.nan)
+    def show_outside(self, text: str, grave: bool) -> None:
+        """Show the parts of the latest note that lie outside the training; "" for nothing. `grave`: as a warning."""
         words = self.outside_label
         words.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
         words.setToolTip(plain_tip(text))

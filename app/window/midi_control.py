@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.instrument.events import ControlChange, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.midi import MidiChoices, turns_of
-from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
+from app.playing.midi_backend import MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
-
-LOOK_MS = 1_000  # between two looks at the input
 
 
 class MidiControl(QObject):
@@ -44,7 +42,7 @@ class MidiControl(QObject):
         handle: Callable[[Event], object],
         play_note: Callable[[NoteOn, str], None],
         parent: QObject | None = None,
-        load: Callable[[], Backend] = load_backend,
+        load: Callable[[], RtMidi] = load_backend,
     ) -> None:
         super().__init__(parent)
         self.choices = choices
@@ -54,12 +52,9 @@ class MidiControl(QObject):
         self._patch: Patch | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load, handle)
-        self._look_timer = QTimer(self, interval=LOOK_MS)
-        self._look_timer.timeout.connect(self._look)
 
     def start(self) -> None:
         """Open the remembered input, if any, now or when it is connected; emits `reported` where it cannot."""
-        self._look_timer.start()
         if self.choices.port:
             try:
                 self.input.open(self.choices.port)
@@ -67,11 +62,10 @@ class MidiControl(QObject):
                 self.reported.emit(str(error))
 
     def close(self) -> None:
-        self._look_timer.stop()
         self.input.close()
 
-    def _look(self) -> None:
-        """Follow an input that was disconnected, or is connected again."""
+    def look(self) -> None:
+        """Follow an input that was disconnected, or is connected again; to be called once a second."""
         if not (happened := self.input.look()):
             return
         (self.informed if self.input.name else self.reported).emit(happened)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.bodies import body_titles
@@ -36,9 +36,10 @@ from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
-from app.playing.note import PluckVoices
 from app.playing.playback import Playback
 from app.presets.library import Library
+from app.presets.words import judged
+from app.rendering import Take
 from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
@@ -58,8 +59,6 @@ from engine.result_file import WriteError
 from engine.schema import explained
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
-SHOWN_EVERY_S = 0.04
-NOTE_REPORTED_AFTER_MS = 150
 SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
@@ -91,13 +90,11 @@ class PatchDesk(BrowserDesk):
         self._instruments = instruments
         self._panel = window.instrument
         self._entries: list[PatchEntry] = []
-        self._shown_s = 0.0
         self._sounding: frozenset[int] = frozenset()  # MIDI keys of the patch for which the octave was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
-        self._note_timer = QTimer(self, interval=NOTE_REPORTED_AFTER_MS, singleShot=True)
-        self._note_timer.timeout.connect(self._show_latest_note)
+        self._judged: object = None  # all that the words about the training depend on, as they are
         self.recordings = Recordings(window, session, performance.notes.keys)
         self.reload()
         self._connect()
@@ -147,6 +144,11 @@ class PatchDesk(BrowserDesk):
     @property
     def chosen(self) -> str:
         return "" if self.entry is None else self.entry.name
+
+    def _update(self, **fields: object) -> None:
+        """Give the patch that is there other values."""
+        if self.patch is not None:
+            self._session.update(patch=self.patch.model_copy(update=fields))
 
     def _find(self, name: str) -> PatchEntry | None:
         return next((entry for entry in self._entries if entry.name == name), None)
@@ -268,7 +270,7 @@ class PatchDesk(BrowserDesk):
         if entry.name in self.favourites:
             self.favourites ^= {entry.name, renamed.name}
         if self.patch is not None and self.patch.name == entry.patch.name:
-            self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
+            self._update(name=renamed.patch.name)
         self.reload()
         self.browser.reveal(renamed.name)
 
@@ -343,15 +345,14 @@ class PatchDesk(BrowserDesk):
             other = patch.tuning.scale
             kind = "scale"
         tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
-        self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
+        self._update(tuning=tuning)
         joined = f", with the {kind} that it had" if other else ""
         self._notices.inform(f"{file.name} tunes {patch.name}{joined}.")
 
     def remove_scala(self) -> None:
         """Tune the patch in twelve equal steps again."""
         if (patch := self.patch) is not None:
-            tuning = TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose)
-            self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
+            self._update(tuning=TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose))
 
     def take_body(self, name: str) -> None:
         """Give the patch one of the user's own bodies, which was just installed."""
@@ -389,8 +390,6 @@ class PatchDesk(BrowserDesk):
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.keys.show_letters(letters_of(choices.octave) if pitches else {})
-        if names & {"patch", "single"}:
-            self._judge_again()
         if names & {"patch", "single", *Monitor.model_fields}:
             self._show_source()
 
@@ -435,40 +434,29 @@ class PatchDesk(BrowserDesk):
             )
             self._reported_other = other
 
-    def show_played(self) -> None:
-        """Say soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
-        if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
-            self._note_timer.start()
+    def judge(self) -> None:
+        """Show the string of the latest note, and what of it lies outside the training with the knobs as they are.
 
-    def _judge_again(self) -> None:
-        """Say soon what of the latest note lies outside the training with the knobs as they are now."""
-        if self._session.stage.note_played is not None:
-            self.show_played()
+        Called a few times a second: of a chord, of fast notes or of a knob once, as it takes milliseconds.
+        """
+        stage, choices, patch = self._session.stage, self._session.choices, self.patch
+        subject = stage.note, stage.known, patch, choices.single, stage.complete, stage.request
+        if subject == self._judged:
             return
-        self._note_timer.stop()
-        self._say("")
-
-    def _show_latest_note(self) -> None:
-        if self.patch is not None:
-            self._show_string(self.patch)
-        latest = self._session.stage.note_played
-        is_outdated = isinstance(latest, KeyNote) and latest.patch != self.patch
-        self._say(self._outside(latest), of_shown=not is_outdated)
-
-    def _say(self, outside: str, of_shown: bool = True) -> None:
-        """Report what is outside the training; in the bar, how pitches are had where there is no patch."""
-        self._window.show_outside(outside, of_shown)
-        self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
-
-    def _outside(self, latest: PluckVoices | KeyNote | None) -> str:
-        """The parts of the latest note, with the present knobs, that lie outside the training of its model."""
-        choices, patch = self._session.choices, self.patch
-        entry = self._library.find(choices.preset)
-        if entry is None:
-            return ""
-        if isinstance(latest, KeyNote) and patch is not None and latest.patch != patch:
-            return "; ".join(outside_of_key(entry.info, patch, latest.event, latest.string))
-        return "" if choices.string is None else outside_of_shown(choices, entry)
+        self._judged = subject
+        if patch is not None:
+            self._show_string(patch)
+        note, entry = stage.note_played, self._library.find(choices.preset)
+        is_turned = isinstance(note, KeyNote) and note.patch != patch
+        outside = ""
+        if entry is not None and isinstance(note, KeyNote) and patch is not None and is_turned:
+            outside = "; ".join(outside_of_key(entry.info, patch, note.event, note.string))
+        elif entry is not None and note is not None and choices.string is not None:
+            outside = outside_of_shown(choices, entry)
+        error = math.nan
+        if isinstance(stage.take, Take) and stage.complete and not is_turned:
+            error = stage.take.error
+        self._window.show_outside(*judged(outside, error))
 
     def _show_string(self, patch: Patch) -> None:
         """Show the string or the drum in figures, or why there is none."""
@@ -490,22 +478,17 @@ class PatchDesk(BrowserDesk):
         self._panel.knobs.show_figures(figures)
 
     def tick(self) -> None:
-        """Show the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
-        now_s = time.monotonic()
-        if now_s - self._shown_s < SHOWN_EVERY_S:
-            return
-        self._shown_s = now_s
+        """Show the MIDI file's position and which keys sound; called by the window's timer."""
         self._song.tick()
         if not self._panel.isVisible():
             return
         keys = self._performance.notes.keys
         self._panel.show_sounding(keys.sounding(), keys.sounding_notes())
         self._panel.bar.show_voices(self._performance.notes.ringing)
-        self.recordings.tick(now_s)
+        self.recordings.tick(time.monotonic())
 
     def close(self) -> None:
         """End the playback and a recording, which is kept; may be called again."""
-        self._note_timer.stop()
         self.browser.dismiss()  # or it would play what is selected after a rest, without a device
         self.stop()
         self.recordings.close()
@@ -514,6 +497,7 @@ class PatchDesk(BrowserDesk):
         patch = self.patch
         entry = self.entry
         panel = self._panel
+        panel.bar.show_note("" if patch is not None else NO_PATCH)
         if patch is None:
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
@@ -555,8 +539,7 @@ class PatchDesk(BrowserDesk):
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
             kept = dict(self.patch.body) if self.patch.body.mix > 0 else {"size": self.patch.body.size}
-            body = BodyChoice.model_validate({**kept, "name": name})
-            self._session.update(patch=self.patch.model_copy(update={"body": body}))
+            self._update(body=BodyChoice.model_validate({**kept, "name": name}))
 
 
 def _note(key: int) -> list[TimedEvent]:

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QObject, Signal
 
 from app.audio.sound import Sound
-from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
@@ -23,59 +21,21 @@ from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
-from app.rendering import BlowRequest, BlowTake, RenderRequest, RenderWorker, Take
+from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
+from app.session.choices import OBSERVED
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
 from app.shared.vocabulary import DIFFERENCE
 from app.stage.session import Session
-from app.stage.stage import Turned
+from app.stage.stage import Asked, Note, Parked, Rendered, Turned
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from engine.plain_text import name_text
-from engine.strike import Strike
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
-
-
-@dataclass
-class Playhead:
-    """A motion and the note whose time it follows; without a note it stands at `parked_s`.
-
-    Attributes:
-        finished: whether the motion is known to be complete.
-    """
-
-    take: Take | BlowTake | None = None
-    note: PluckVoices | KeyNote | None = None
-    parked_s: float = 0.0
-    finished: bool = False
-
-    def position_s(self, latency_s: float) -> float:
-        """The time in the motion that is heard now, or where it stands; `latency_s`: of the output."""
-        if self.take is None:
-            return 0.0
-        heard_s = self.parked_s
-        if self.note is not None:
-            heard_s = max(self.note.seconds - latency_s, self.note.from_s)
-        return min(max(heard_s, 0.0), self.take.seconds)
-
-    def park(self, position_s: float) -> None:
-        """Park the playhead: it stands at a time of the motion from now on."""
-        self.note, self.parked_s = None, position_s
-
-    @property
-    def moving(self) -> bool:
-        """Return True if it moves."""
-        note, take = self.note, self.take
-        return note is not None and take is not None and not note.over and note.seconds < take.seconds
-
-    @property
-    def audible(self) -> bool:
-        """Return True if the note of the motion rings, which may be longer than the motion."""
-        return self.note is not None and self.take is not None and not self.note.over
 
 
 class RenderSignals(QObject):
@@ -117,10 +77,7 @@ class Performance(QObject):
         self._sound = sound
         self._panels = panels
         self.compared = False
-        self._asked: RenderRequest | BlowRequest | None = None  # the motion that is to be shown
-        self._blow: KeyNote | None = None  # the note of a blow that is asked for
-        self._shown = Playhead()
-        self._next_turn: PluckVoices | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
+        self._turn: tuple[Note, Note] | None = None  # of a loop: what rings, and what waits for its end
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
         mail.started.connect(self._take_started)
@@ -140,7 +97,8 @@ class Performance(QObject):
     @property
     def take(self) -> Take | None:
         """The motion of a string that is shown; None while drums are played."""
-        return self._shown.take if isinstance(self._shown.take, Take) else None
+        take = self._session.stage.take
+        return take if isinstance(take, Take) else None
 
     @property
     def _plays_drums(self) -> bool:
@@ -149,7 +107,7 @@ class Performance(QObject):
     @property
     def ready(self) -> bool:
         """Return True if the motion that is shown is that of the chosen pluck."""
-        return self.take is not None and self._is_of_chosen(self.take)
+        return self.take is not None and self._session.stage.ready
 
     @property
     def at_hand(self) -> bool:
@@ -170,92 +128,66 @@ class Performance(QObject):
 
     @property
     def position_s(self) -> float:
-        """The playhead: the time in the shown motion that is heard now, or where it stands."""
-        return self._shown.position_s(self._sound.mixer.output_latency_s)
+        """The playhead, as of `Stage.position_s`."""
+        return self._session.stage.position_s(self._sound.mixer.output_latency_s)
 
     @property
     def moving(self) -> bool:
         """Return True if the playhead moves."""
-        return self._shown.moving
+        return self._session.stage.moving
 
     @property
     def settled(self) -> bool:
         """Return True if motion and signals are complete, so that views need not look for more."""
-        take = self._shown.take
+        take = self._session.stage.take
         return take is None or (take.complete and take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:
         """The factor by source that brings what is chosen to the level of the truth; None: not known yet."""
-        latest = self.notes.latest
-        keys = isinstance(latest, KeyNote) and self._session.choices.plays_patch
-        return latest.match if latest is not None and keys else self.notes.match
+        note = self._session.stage.note
+        keys = isinstance(note, KeyNote) and self._session.choices.plays_patch
+        return note.match if note is not None and keys else self.notes.match
 
     def moment(self, elapsed_s: float) -> Moment:
         """The moment that panels show now; `elapsed_s`: since they were shown the last one."""
-        shown = self._shown
-        return Moment(shown.take, self.position_s, shown.moving, elapsed_s, shown.audible)
+        stage = self._session.stage
+        return Moment(stage.take, self.position_s, stage.moving, elapsed_s, stage.audible)
 
     def catch_up(self, panel: Panel) -> None:
         """Show a panel that was made late the motion that it has missed."""
-        take = self._shown.take
+        take = self._session.stage.take
         if take is None or (panel.of_strings and self._plays_drums):
             return
         panel.take_started(take)
-        if isinstance(take, Take) and self._shown.finished:
+        if isinstance(take, Take) and self._session.stage.complete:
             panel.take_finished(take)
 
     # Intents
 
-    def follow(self) -> None:
-        """Show the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
-        latest = self.notes.latest
-        if isinstance(latest, KeyNote) and latest.of_drum:
-            self._follow_blow(latest)
-            return
-        if latest is None or latest is self._shown.note or latest.released or latest.over:
-            return
-        if self.ready and self._is_chosen(latest):
-            self._forget_turn()
-            self._shown.note, self._shown.parked_s = latest, latest.from_s
-
-    def _follow_blow(self, note: KeyNote) -> None:
-        """Show the latest blow on the drums that are played, once its motion is rendered."""
-        choices = self._session.choices
-        entry = self._library.find(note.patch.preset)
-        keys = note.player.keys
-        patch = choices.patch
-        if note is self._blow or choices.drums is None or patch is None or note.patch.name != patch.name:
-            return
-        drum_key = keys.of_key(note.event.key) if isinstance(keys, DrumKeys) else None
-        if drum_key is None or entry is None:
-            return
-        strike = drum_key.strike(note.event.velocity, note.patch.pluck.curve)
-        if note.event.place is not None:
-            strike = Strike(note.event.place, strike.speed_m_s, strike.mallet)
-        self._asked = BlowRequest(entry.path, drum_key.modes, strike, choices.seconds, choices.ear)
-        self._blow = note
-        shown = self._shown.take
-        if isinstance(shown, BlowTake) and self._asked.same_motion(shown.request):
-            self._shown = Playhead(shown, note)
-        self._worker.submit(self._asked)
-
     def stop(self) -> None:
         """Fade all sound out; the playhead stays."""
         self._forget_turn()
-        self._shown.park(self.position_s)
+        self._session.send(Parked(self.position_s))
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
         """Move the playhead; while notes ring, one that begins there replaces them."""
-        if (take := self._shown.take) is None:
+        if (take := self._session.stage.take) is None:
             return
         position_s = min(max(position_s, 0.0), take.seconds)
         self._forget_turn()
-        self._shown.park(position_s)
+        self._session.send(Parked(position_s))
         if not self._plays_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
-            self.notes.latest = self._shown.note = note
-            self._session.send(Turned(note))
+            self._take_turn(note)
+
+    def stage_changed(self, names: frozenset[str]) -> None:
+        if not names.isdisjoint(OBSERVED):
+            self.choices_changed(names)
+        if "request" in names:
+            self._ask()
+        if "lead" in names and self._turn is not None and self._session.stage.lead not in (None, self._turn[0]):
+            self._forget_turn()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
@@ -268,35 +200,18 @@ class Performance(QObject):
             self.notes.set_instrument(choices.patch, choices.ear, choices.single)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
-        request = self._request()
+        stage = self._session.stage
+        request = stage.blow if choices.drums is not None else request_of(choices, self._library)
         if "loop" in names and not choices.loop:
             self._forget_turn()
-        if request != self._asked:  # else an event may have chosen another pluck, which the session takes later
-            self._ask(request)
-        self.follow()
+        if request != stage.request:  # else an event may have chosen another pluck, which the session takes later
+            self._session.send(Asked(request))
 
-    def _request(self) -> RenderRequest | BlowRequest | None:
-        """The motion that the choices ask for: of drums the latest blow, until other ones are played."""
-        choices = self._session.choices
-        asked = self._asked
-        blow = self._blow
-        if choices.drums is None:
-            return request_of(choices, self._library)
-        is_theirs = blow is not None and choices.patch is not None and blow.patch.name == choices.patch.name
-        if not is_theirs or not isinstance(asked, BlowRequest):
-            return None
-        is_heard = (asked.seconds, asked.ear) == (choices.seconds, choices.ear)
-        return asked if is_heard else replace(asked, seconds=choices.seconds, ear=choices.ear)
-
-    def _ask(self, request: RenderRequest | BlowRequest | None) -> None:
-        """Ask for another motion; None: there is none, and nothing is shown."""
-        if type(request) is not type(self._asked):
-            self._shown = Playhead()
-        self._asked = request
+    def _ask(self) -> None:
+        """Ask for the motion that is to be shown; where there is none, nothing is."""
+        request = self._session.stage.request
         plucked = request if isinstance(request, RenderRequest) else None
         self.notes.choose(plucked)
-        if not isinstance(request, BlowRequest):
-            self._blow = None
         if plucked is not None:
             self.notes.prepare(plucked.preset, *plucked.others)
         if request is not None:
@@ -352,7 +267,7 @@ class Performance(QObject):
 
     def _buffering_words(self) -> str:
         """The time until a model that is rendered ahead will sound, in words; "" where none waits."""
-        latest = self.notes.latest
+        latest = self._session.stage.note
         if not isinstance(latest, PluckVoices) or not latest.waits_s:
             return ""
         entry = self._library.find(name_text(path_of(latest.request.preset).stem))
@@ -361,55 +276,50 @@ class Performance(QObject):
 
     def _hand_over_turn(self) -> None:
         """Hand the next turn of the loop to the mixer, shortly before it begins."""
+        stage = self._session.stage
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
-        note = self._shown.note or self.notes.latest
-        take = self._shown.take
-        turn = self._next_turn
-        if note is None or take is None or note.request is None or not note.began:
-            return
-        if turn is not None:
+        note, take = stage.lead or stage.note, stage.take
+        if self._turn is not None:
+            turn = self._turn[1]
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
-                self._next_turn = None
+                self._turn = None
                 if not turn.cut:
-                    self.notes.latest = turn
-                    self._session.send(Turned(turn))
+                    self._take_turn(turn)
             return
-        if not (note.cut or note.released):
-            self._next_turn = self.notes.turn(note, take.seconds, self._session.stage.by_hand())
+        rings = note is not None and note.request is not None and note.began and not (note.cut or note.released)
+        if note is not None and rings and take is not None:
+            next_turn = self.notes.turn(note, take.seconds, stage.by_hand())
+            self._turn = None if next_turn is None else (note, next_turn)
+
+    def _take_turn(self, note: Note) -> None:
+        self.notes.latest = note
+        self._session.send(Turned(note))
 
     def _forget_turn(self) -> None:
-        turn, self._next_turn = self._next_turn, None
-        if turn is not None:
+        if self._turn is not None:
+            (note, turn), self._turn = self._turn, None
             turn.release(0.0)
             if isinstance(turn, KeyNote):
                 self.notes.keys.recorder.cancel(turn.event)
-            if self._shown.note is not None:
-                self._shown.note.release_at(0)
+            note.release_at(0)
 
     # Signals of the render worker
 
     def _take_started(self, take: Take | BlowTake) -> None:
-        before = self._shown
-        if take is before.take or not self._is_of_chosen(take):  # shown already, or overtaken
+        if not self._is_of_chosen(take):  # overtaken
             return
-        self._shown = Playhead(take, self._blow)
-        is_same_strike = (
-            isinstance(take, BlowTake)
-            and isinstance(before.take, BlowTake)
-            and take.request.strike is before.take.request.strike
-        )
-        if is_same_strike and before.note is None:
-            self._shown.park(before.parked_s)
-        for panel in self._panels:
-            if not (panel.of_strings and self._plays_drums):
-                panel.take_started(take)
-        self.follow()
-        self._show_error("Rendering …")
+        is_shown = take is self._session.stage.take
+        self._session.send(Rendered(take))
+        if not is_shown:
+            for panel in self._panels:
+                if not (panel.of_strings and self._plays_drums):
+                    panel.take_started(take)
+            self._show_error("Rendering …")
 
     def _take_finished(self, take: Take | BlowTake) -> None:
-        if take is not self._shown.take or self._shown.finished:
+        if take is not self._session.stage.take or self._session.stage.complete:
             return
-        self._shown.finished = True
+        self._session.send(Rendered(take, complete=True))
         if isinstance(take, BlowTake):
             self._show_error(f"Error of this blow: {percent(math.sqrt(take.error_course.rel_mse))} over the drum")
             return
@@ -420,7 +330,7 @@ class Performance(QObject):
         errors, places = take.errors_by_training, ("in the training range", "beyond")
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
         growth = growth_words(errors, take.info.rel_mae)
-        self._show_error("Error of this pluck: " + ", ".join(parts), take.error, growth)
+        self._show_error("Error of this pluck: " + ", ".join(parts), growth)
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
@@ -431,29 +341,19 @@ class Performance(QObject):
 
     # Helpers
 
-    def _show_error(self, words: str, error: float = math.nan, growth: str = "") -> None:
+    def _show_error(self, words: str, growth: str = "") -> None:
         """Show the error of the shown motion in the header, and that it grew, as far as they are known."""
         self._error_words = words
         self._show_words()
-        self._window.show_error(error)
         self._window.show_growth(growth)
 
     def _show_words(self) -> None:
         """Show in the header how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
-    def _is_chosen(self, note: PluckVoices | KeyNote) -> bool:
-        """Return True if a note is of the chosen pluck."""
-        chosen_request, request = self._asked, note.request
-        return (
-            isinstance(chosen_request, RenderRequest)
-            and request is not None
-            and (request.preset, request.pluck) == (chosen_request.preset, chosen_request.pluck)
-        )
-
     def _is_of_chosen(self, take: Take | BlowTake) -> bool:
         """Return True if a take is of the chosen pluck, or of the latest blow."""
-        request, entry = self._asked, self.entry
+        request, entry = self._session.stage.request, self.entry
         if isinstance(take, BlowTake):
             return take.request.same_motion(request)
         if not isinstance(request, RenderRequest) or entry is None:

@@ -6,15 +6,13 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from app.window.settings import Settings, save_settings
 
-LOOK_EVERY_MS = 1_000
-
 
 class SettingsSaver(QObject):
-    """A writer of the settings: it looks each second, and writes those that changed and then stayed for one look.
+    """A writer of the settings: those that changed and then stayed for one look are written.
 
     Of two instances the one that writes last is remembered.
 
@@ -30,9 +28,6 @@ class SettingsSaver(QObject):
         self._base = self._seen = read
         self._writing: threading.Thread | None = None
         self._reported = False
-        self._timer = QTimer(self, interval=LOOK_EVERY_MS)
-        self._timer.timeout.connect(self.look)
-        self._timer.start()
 
     def look(self) -> None:
         """Write, in a thread of its own, where the settings have changed, but not since the last look."""
@@ -44,8 +39,7 @@ class SettingsSaver(QObject):
         self._writing.start()
 
     def close(self) -> None:
-        """Stop looking, and write what has not been written yet."""
-        self._timer.stop()
+        """Write what has not been written yet."""
         if self._writing is not None:
             self._writing.join()
         now = self._current()

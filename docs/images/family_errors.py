@@ -62,7 +62,7 @@ def family_errors(errors: Mapping[str, Sequence[StringError]], name: str) -> Fig
 def main() -> None:
     torch.set_num_threads(1)
     play = {PRESET: player(load_preset(find_preset(PRESET)).model)}
-    found = {c: measure(play, c, "test", STRINGS, RATE_HZ, (0.0, 1.0))[PRESET].strings for c in COLUMNS}
+    found = {c: measure(play, c, STRINGS, RATE_HZ)[PRESET].strings for c in COLUMNS}
     style.save_figure(family_errors(found, PRESET), Path(__file__).with_name("family-errors.png"))
 
 

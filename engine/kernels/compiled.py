@@ -10,7 +10,11 @@ from numba import config, njit
 from numba.extending import register_jitable
 
 from engine.kernels import cache, pulses, recorded, rotation, strings, velocities
-from engine.kernels.numba_internals import compile_once_for_all_numbers, keep_bitcode_alone, keep_cache_when_moved
+from engine.kernels.numba_internals import (
+    compile_for_callers_alone,
+    keep_cache_when_moved,
+    keep_machine_code_alone,
+)
 
 PLACE = cache.folder()
 config.CACHE_DIR = str(PLACE or "")
@@ -38,8 +42,8 @@ def inlined(function: Any) -> Any:
 LAWS = pulses, recorded, rotation, strings, velocities  # modules of plain functions that compiled ones call
 
 
-compile_once_for_all_numbers()
-keep_bitcode_alone()
+compile_for_callers_alone()
+keep_machine_code_alone()
 keep_cache_when_moved()
 for _laws in LAWS:
     for _law in vars(_laws).values():

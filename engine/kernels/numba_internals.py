@@ -2,68 +2,121 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 VERSION = "0.68"
 NOWHERE = 1  # an address that is never called
 
 
-def compile_once_for_all_numbers() -> None:
-    """Let a function be compiled once for all numbers that its calls state, not once for each."""
+def compile_for_callers_alone() -> None:
+    """Compile what compiled code calls for that code alone, once for all numbers that its calls state.
+
+    Numba would optimise each function with all that it calls, and make it callable from Python: what is called over
+    eight levels was made into machine code eight times. Here that is made only of what Python or a device calls, from
+    the code of all that it calls. So what Python and compiled code call is compiled twice.
+    """
+    from llvmlite.binding import Linkage
+    from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
     from numba.core.dispatcher import Dispatcher
+    from numba.core.environment import lookup_environment
     from numba.core.types.misc import unliteral
 
-    usual = Dispatcher.get_call_template
+    template, overload = Dispatcher.get_call_template, Dispatcher.get_overload
+    address, usual_set_env = JITCodeLibrary.get_pointer_to_function, JITCPUCodegen.set_env
 
-    def template(dispatcher: Any, arguments: Any, named: Any) -> Any:
-        return usual(dispatcher, tuple(map(unliteral, arguments)), named)
+    def called(dispatcher: Any) -> Any:
+        """The dispatcher of the same function that compiled code calls: without an entry for Python."""
+        if dispatcher.targetoptions.get("no_cpython_wrapper"):
+            return dispatcher
+        if not hasattr(dispatcher, "called"):
+            options = {**dispatcher.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            dispatcher.called = type(dispatcher)(dispatcher.py_func, dispatcher.locals, options)
+        return dispatcher.called
 
-    Dispatcher.get_call_template = template  # type: ignore[method-assign, assignment]
+    def get_call_template(dispatcher: Any, arguments: Any, named: Any) -> Any:
+        return template(called(dispatcher), tuple(map(unliteral, arguments)), named)
 
+    def get_overload(dispatcher: Any, signature: Any) -> Any:
+        return overload(called(dispatcher), signature)
 
-def keep_bitcode_alone() -> None:
-    """Let a function that is loaded keep its bitcode, not the module parsed from it: 30 MB of all together.
+    def get_pointer_to_function(library: Any, name: str) -> Any:
+        entries = {function.name for function in library._final_module.functions}
+        return address(library, name) if library._finalized or name in entries else NOWHERE
 
-    The module is parsed again where another function that calls it is compiled.
-    """
-    from llvmlite import binding
-    from numba.core.codegen import CPUCodeLibrary
+    def set_env(codegen: Any, name: str, environment: Any) -> None:
+        if codegen._engine.is_symbol_defined(name):
+            usual_set_env(codegen, name, environment)
 
-    load, link = CPUCodeLibrary._unserialize.__func__, CPUCodeLibrary._get_module_for_linking
-
-    def unserialize(kind: Any, codegen: Any, state: Any) -> Any:
-        library = load(kind, codegen, state)
-        _, form, data = state
-        if form == "object":
-            library._bitcode, library._shared_module = data[1], None
-        return library
-
-    def module_for_linking(library: Any) -> Any:
-        if library._shared_module is None and hasattr(library, "_bitcode"):
-            library._shared_module = binding.parse_bitcode(library._bitcode)
-        return link(library)
-
-    CPUCodeLibrary._unserialize = classmethod(unserialize)
-    CPUCodeLibrary._get_module_for_linking = module_for_linking
-
-
-def stop_before_machine_code() -> None:
-    """Leave Numba's code as it is lowered: not optimised, not linked, not made into machine code.
-
-    A dot is printed for each function. Nothing that is compiled in this process can be called afterwards.
-    """
-    import numba
-    from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
+    def add_linking_library(library: Any, other: Any) -> None:
+        library._linking_libraries.append(other)
 
     def finalize(library: Any) -> None:
-        library._finalized = True
-        print(".", end="", flush=True)
+        for other in list(libraries(library))[1:]:
+            library._reload_init.update(other._reload_init)
+            module = other._final_module.clone()
+            for function in module.functions:
+                if not function.is_declaration and function.linkage == Linkage.external:
+                    function.linkage = "linkonce_odr"
+            library._final_module.link_in(module)
+        library._optimize_final_module()
+        library._final_module.verify()
+        library._finalize_final_module()
+        for variable in library._final_module.global_variables:
+            if environment := lookup_environment(variable.name):
+                library.codegen.set_env(variable.name, environment)
+
+    Dispatcher.get_call_template = get_call_template  # type: ignore[method-assign, assignment]
+    Dispatcher.get_overload = get_overload  # type: ignore[method-assign, assignment]
+    JITCodeLibrary.get_pointer_to_function = get_pointer_to_function
+    JITCPUCodegen.set_env = set_env
+    CPUCodeLibrary.add_linking_library = add_linking_library
+    CPUCodeLibrary.finalize = finalize
+
+
+def libraries(library: Any, seen: set[int] | None = None) -> Iterator[Any]:
+    """A library and all that it calls, each once."""
+    seen = set() if seen is None else seen
+    if id(library) not in seen:
+        seen.add(id(library))
+        yield library
+        for other in library._linking_libraries:
+            yield from libraries(other, seen)
+
+
+def keep_machine_code_alone() -> None:
+    """Keep a function's machine code and names: nothing that is loaded is called by what is compiled."""
+    from numba.core.codegen import CPUCodeLibrary
+
+    def serialize(library: Any) -> Any:
+        library._ensure_finalized()
+        module = library._final_module
+        defined = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
+        return library.name, library._get_compiled_object(), defined
+
+    def unserialize(kind: Any, codegen: Any, state: Any) -> Any:
+        name, code, defined = state
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols.update(defined)
+        return library
+
+    CPUCodeLibrary.serialize_using_object_code = serialize
+    CPUCodeLibrary._unserialize = classmethod(unserialize)
+
+
+def write_code_alone() -> None:
+    """Leave Numba's code as it is lowered: not optimised, not linked, not made into machine code.
+
+    It holds for functions without an entry for Python. A dot is printed for each.
+    """
+    import numba
+    from numba.core.codegen import CPUCodeLibrary
 
     numba.cfunc = lambda *_signature, **_options: lambda function: function  # what devices call is not asked for
-    CPUCodeLibrary._optimize_functions = lambda library, module: None
-    CPUCodeLibrary.finalize = finalize
-    JITCodeLibrary.get_pointer_to_function = lambda library, name: NOWHERE
-    JITCPUCodegen.set_env = lambda codegen, name, env: None
+    CPUCodeLibrary._optimize_functions = lambda library, module: print(".", end="", flush=True)
 
 
 def keep_cache_when_moved() -> None:

@@ -55,7 +55,7 @@ class Mixer(KernelMemory):
     Attributes:
         active: voices that sound or wait, those of a player among them.
         frames: of sound given so far.
-        calls: of the device's callback.
+        calls: of the callback, by a device or for frames that no device takes.
         non_finite: samples that were replaced by silence.
     """
 
@@ -193,10 +193,10 @@ class Mixer(KernelMemory):
 
     def render(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), where no device takes them."""
-        from engine.kernels.mixer import render
+        from engine.kernels.mixer import call
 
-        out = np.zeros(frames * self.channels, np.float32)
-        render(self.record, frames, out, self.seconds)
+        out, times_s = np.zeros(frames * self.channels, np.float32), np.full(3, self.seconds)
+        call.ctypes(None, out.ctypes.data, frames, times_s.ctypes.data, 0, self.address)
         return out.reshape(frames, self.channels)
 
     def set_volume(self, factor: float) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +23,6 @@ SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
 AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # of a block of samples that are rendered ahead, at first and later
 FILLING = 0.9  # share of the work that these samples are
-
-
-class SampleSource(Protocol):
-    """The methods of `ModelSource` that samples need."""
-
-    def start(self, displacement_m: Array) -> Any: ...
-
-    def advance(self, state: Any, steps: int, readout: Array) -> tuple[NDArray[np.floating[Any]], Any]: ...
 
 
 class OfflineVoice:
@@ -60,42 +51,31 @@ class OfflineVoice:
         return block[:, : self.channels]
 
 
-class ModelSamples:
-    """The samples of a voice that is not compiled: its model renders them block by block, for ears and files alike.
+def render_samples(voice: Voice, source: ModelSource, initial_m: Array) -> Iterator[NDArray[np.float32]]:
+    """Render the samples of a voice that is not compiled, and give them to it: blocks (frames, points).
 
-    Attributes:
-        done: samples that the voice was given.
+    They are the same for ears and files. Two short blocks let it begin soon: the first prepares the model, the second
+    shows its speed.
+
+    Raises:
+        Runaway: the output stopped being a string's; the voice ends before.
     """
-
-    def __init__(self, voice: Voice, source: SampleSource, initial_m: Array) -> None:
-        self.voice, self._source, self._initial_m = voice, source, initial_m
-        self._weights = voice.program.grid_weights(voice.ear)
-        self._state: Any = None
-        self.done = 0
-
-    def advance(self) -> NDArray[np.float32]:
-        """Give the voice its next block, and return that (frames, points).
-
-        Two short ones let it begin soon: the first prepares the model, the second shows its speed.
-
-        Raises:
-            Runaway: the output stopped being a string's; the voice ends before.
-        """
-        if self._state is None:
-            self._state = self._source.start(self._initial_m[None])
-            block = (self._initial_m @ self._weights)[None]
-        else:
-            steps = min(AHEAD_FIRST if self.done < 2 * AHEAD_FIRST else AHEAD_FRAMES, self.voice.room)
-            try:
-                frames, self._state = self._source.advance(self._state, steps, self._weights)
-            except Runaway:
-                self.voice.end_here()
-                raise
-            block = frames[0].astype(np.float64)
+    weights = voice.program.grid_weights(voice.ear)
+    state, block, done = source.start(initial_m[None]), (initial_m @ weights)[None], 0
+    while True:
         samples = (block / FULL_SCALE_M).astype(np.float32)
-        self.voice.append(samples)
-        self.done += len(samples)
-        return samples
+        voice.append(samples)
+        yield samples
+        done += len(samples)
+        if not voice.room:
+            return
+        steps = min(AHEAD_FIRST if done < 2 * AHEAD_FIRST else AHEAD_FRAMES, voice.room)
+        try:
+            frames, state = source.advance(state, steps, weights)
+        except Runaway:
+            voice.end_here()
+            raise
+        block = frames[0].astype(np.float64)
 
 
 def render_voice(
@@ -141,9 +121,8 @@ def voice_blocks(
     offline = OfflineVoice(voice)
     if program.rendered:
         assert source is not None
-        samples, total = ModelSamples(voice, source, initial_m), voice.room
-        while voice.room:
-            samples.advance()
+        total = voice.room
+        for _ in render_samples(voice, source, initial_m):
             advanced(FILLING * (1 - voice.room / total))
     frames = max(1, round(seconds * program.rate_hz))
     loudest_db = -math.inf

@@ -81,7 +81,6 @@ class Voice(KernelMemory):
         if n:
             self.rows[0], self.rows[1] = program.start(displacement_m)
         self._samples: NDArray[np.float32] | None = None
-        self._source_rate_hz = source_rate_hz
         if program.resonator is not None:
             record["moving"] = n
             self.rows[at.OMEGA_SQUARED : at.FOLLOWING] = resonator_rows(program.resonator)
@@ -186,11 +185,6 @@ class Voice(KernelMemory):
             self.record["ends_in"] = fade
 
     @property
-    def waits(self) -> bool:
-        """Return True if it has not begun."""
-        return bool(self.record["state"] == at.WAITING)
-
-    @property
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 until then."""
         return max(0, int(self.record["began_frame"]))
@@ -223,12 +217,6 @@ class Voice(KernelMemory):
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
         self.publish("ready", ready + count)
-
-    def level_of_samples(self, seconds: float) -> float:
-        """Root mean square of what a rendered voice was given for its first seconds."""
-        assert self._samples is not None
-        frames = min(int(self.record["ready"]), round(seconds * self._source_rate_hz))
-        return math.sqrt(float(np.square(self._samples[:frames], dtype=np.float64).mean())) if frames else 0.0
 
     @property
     def room(self) -> int:

@@ -22,9 +22,10 @@ from app.window.settings import Settings, save_settings
 from engine import warm
 from engine.presets import SHIPPED, load_preset
 from training.cell import load
+from training.configuration import Run
 from training.data.dataset import load_dataset
 from training.results import read_results
-from training.run import NamedRun, run_rows
+from training.run import run_rows
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 CONFIGURATION = """title = "Tiny"
@@ -129,8 +130,8 @@ def _content(path: Path) -> object:
 
 def _train(folder: Path, model: str, sizes: str) -> None:
     configuration = load(str(_configuration(folder, model, sizes, 40)))
-    run = NamedRun("tiny", "", configuration, folder / "tiny.safetensors")
-    run_rows([run], folder / "runs", cache=folder / "cache", checkpoint_every_s=0.0)
+    run, output = Run("tiny", "", configuration), folder / "tiny.safetensors"
+    run_rows([run], folder / "runs", output=output, cache=folder / "cache", checkpoint_every_s=0.0)
 
 
 def _configuration(folder: Path, model: str, sizes: str, count: int) -> Path:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from training.configuration import TrainingConfiguration
+from training.configuration import Run, TrainingConfiguration
 from training.data.dataset import Dataset
-from training.fitting.fit import Diverged, FitProgress, FitResult, Seed, fit_seeds
+from training.fitting.fit import Diverged, FitProgress, FitResult, fit_seeds
 
 
 def fit(
@@ -19,7 +19,8 @@ def fit(
     **options: Any,
 ) -> FitResult:
     """Train or continue one run; raise Diverged where it diverges."""
-    (outcome,) = fit_seeds([Seed(configuration, folder, report)], dataset, **options)
+    run = Run(folder.name, "", configuration)
+    (outcome,) = fit_seeds([run], dataset, folder.parent, report=lambda _, progress: report(progress), **options)
     if isinstance(outcome, Diverged):
         raise outcome
     return outcome

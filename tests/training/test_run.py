@@ -10,13 +10,13 @@ from engine.compare.relative import RelativeError
 from engine.models.base import count_parameters
 from engine.presets import load_preset
 from training.cell import Cell, configuration_of
-from training.configuration import DatasetConfiguration, TrainingConfiguration
+from training.configuration import DatasetConfiguration, Run, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import FitProgress
 from training.fitting.log import Epoch, TrainingLog
 from training.results import Row
-from training.run import NamedRun, run_rows, trained_range
+from training.run import run_rows, trained_range
 
 
 def progress(epoch: int, loss: float = 1.0) -> FitProgress:
@@ -70,7 +70,8 @@ def configuration(**changes: object) -> TrainingConfiguration:
 def run_row(
     configuration: TrainingConfiguration, folder: Path, name: str = CELL.name, preset: Path | None = None
 ) -> Row:
-    (row,) = run_rows([NamedRun(name, "ours", configuration, preset)], folder / "runs", cache=folder / "cache")
+    run = Run(name, "ours", configuration)
+    (row,) = run_rows([run], folder / "runs", output=preset, cache=folder / "cache")
     return row
 
 

@@ -77,31 +77,28 @@ def open_preset(name_or_path: str) -> Preset:
 
 
 def open_preset_of_string(
-    name_or_path: str, string: str | None, rate_hz: int | None = None, modes: int | None = None
+    name_or_path: str,
+    string: str | None,
+    rate_hz: int | None = None,
+    modes: int | None = None,
+    *,
+    to_render: bool = False,
 ) -> Preset:
     """Load a preset, and choose string, rate and number of modes of one of many strings; None: the preset's own.
+
+    Args:
+        to_render: `rate_hz` is of what is rendered; presets of one string keep their own.
 
     Raises:
         PresetError, SchemaError: there is no such preset or string, or the preset is not of many strings.
     """
-    if rate_hz is not None:
-        check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
-    return _of_string(open_preset(name_or_path), string, rate_hz, modes)
-
-
-def open_preset_to_render(name_or_path: str, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
-    """Open a preset as `open_preset_of_string`, to render at `rate_hz`: presets of one string keep their own rate.
-
-    Raises:
-        As `open_preset_of_string`.
-    """
-    loaded = open_preset(name_or_path)
-    return _of_string(loaded, string, None if loaded.info.family is None else rate_hz, modes)
-
-
-def _of_string(loaded: Preset, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
     from engine.presets import PresetError, find_string, of_string, read_string
 
+    if rate_hz is not None and not to_render:
+        check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
+    loaded = open_preset(name_or_path)
+    if to_render and loaded.info.family is None:
+        rate_hz = None
     if string is None:
         return of_string(loaded, None, rate_hz, modes)
     file = find_string(string)

@@ -248,7 +248,7 @@ class _Measurement:
             facts["windows"].append(
                 {
                     **asdict(window),
-                    **self._label(window.start_s, window.stop_s),
+                    "past_horizon": self._is_past(window.start_s),
                     **figures(motion.string.standard_error(first=first, last=last), "{}_se"),
                     **_sound(of_window, spectrum),
                 }
@@ -285,11 +285,13 @@ class _Measurement:
         )
         return [
             {
-                **self._label(*window),
+                "start_s": start_s,
+                "stop_s": stop_s,
+                "past_horizon": self._is_past(start_s),
                 "modes": [asdict(mode) for mode in errors.by_mode(place)],
                 "weighted": asdict(errors.weighted(place)),
             }
-            for place, window in enumerate(windows)
+            for place, (start_s, stop_s) in enumerate(windows)
         ]
 
     def _windows(self) -> list[tuple[float, float]]:
@@ -300,9 +302,8 @@ class _Measurement:
         edges = sorted(inside | {*range(info.horizon_steps, last, info.rate_hz), last})
         return list(pairwise(edge / info.rate_hz for edge in edges))
 
-    def _label(self, start_s: float, stop_s: float) -> dict[str, Any]:
-        past = start_s >= self.preset.info.horizon_s
-        return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
+    def _is_past(self, start_s: float) -> bool:
+        return start_s >= self.preset.info.horizon_s
 
 
 def _sound(errors: RelativeError, distance: SpectralDistance) -> dict[str, float]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 FIGURES = ("geometric_mean", "worst", "share_large", "processor_s")
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
+TENTH = 9  # the place of the tenth second
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 Strings = Annotated[
     int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
@@ -87,7 +88,8 @@ def evaluate(
     """
     import torch
 
-    from training.family.errors import Player, by_rise, knowing_physics, measure, player
+    from training.family.errors import by_rise, knowing_physics, measure, player
+    from training.family.motion import Player
     from training.family.strings import COLUMNS
 
     torch.set_num_threads(1)
@@ -104,8 +106,7 @@ def evaluate(
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
         for column in COLUMNS:
-            first_s, tenth_s = (0.0, 1.0), (9.0, 10.0)
-            errors = measure(players, column, "test", strings, rate, first_s, seed=seed, report=shares.next())
+            errors = measure(players, column, strings, rate, seed=seed, report=shares.next())
             facts_by_column[column] = {name: _facts(one) for name, one in errors.items()}
             of_preset, facts = errors[loaded.name].strings, facts_by_column[column][loaded.name]
             facts["by_rise"] = [
@@ -114,7 +115,7 @@ def evaluate(
             ]
             if tenth:
                 alone, reported = {loaded.name: players[loaded.name]}, shares.next()
-                last = measure(alone, column, "test", tenth, rate, tenth_s, seed=seed, report=reported)[loaded.name]
+                last = measure(alone, column, tenth, rate, TENTH, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     if json:
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **facts_by_column})
@@ -156,16 +157,17 @@ def _evaluate_drums(
     from dataclasses import asdict
 
     from training.family import drums as of_drums
+    from training.family import motion
     from training.run import default_runs
 
     if tenth > drums:
         raise typer.BadParameter(f"is {tenth} of {drums} drums; give at most as many", param_hint="--tenth")
     loaded = _open_preset_of_many(preset)
-    players: dict[str, of_drums.DrumPlayer] = {
-        loaded.name: of_drums.model_player(loaded.model),
-        "backward error analysis (1/12)": of_drums.untrained_player("series"),
-        "kicks without corrections": of_drums.untrained_player("kicks"),
-        "linear drum": of_drums.linear_drum,
+    players: dict[str, motion.Player] = {
+        loaded.name: motion.model_player(loaded.model),
+        "backward error analysis (1/12)": motion.untrained_player("series"),
+        "kicks without corrections": motion.untrained_player("kicks"),
+        "linear drum": motion.linear_motion,
     }
     checkpoint = of_drums.checkpoint_file(runs or default_runs(), loaded.name, rate_hz, seed)
     with progress("family evaluate") as report:

@@ -17,9 +17,10 @@ from training.cli.console import Failure, ProgressReport, bars, number, print_js
 from training.cli.training import training_report
 
 if TYPE_CHECKING:
+    from training.configuration import Run
     from training.fitting.fit import FitProgress
     from training.results import Row
-    from training.sweeping.plan import Plan, PlannedRun
+    from training.sweeping.plan import Plan
 
 LINE_EVERY_S = 60.0  # between two lines of a run's progress
 MOST_MINUTES = 10_000.0
@@ -189,15 +190,15 @@ class Shown:
         self._seconds: list[float] = []  # that finished runs took
         self._ended: Counter[str] = Counter(done=0)
 
-    def started(self, run: PlannedRun) -> None:
+    def started(self, run: Run) -> None:
         report = self._begin(run.name)
         self._reports[run.name] = report, training_report(report)
 
-    def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
+    def progressed(self, run: Run, progress: FitProgress) -> None:
         self._last[run.name] = progress
         self._reports[run.name][1](progress)
 
-    def failed(self, run: PlannedRun, error: str) -> None:
+    def failed(self, run: Run, error: str) -> None:
         say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from statistics import mean, stdev
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from training.cli.console import ProgressReport
-    from training.configuration import DatasetConfiguration, TrainingConfiguration
+    from training.configuration import DatasetConfiguration, Run, TrainingConfiguration
     from training.data.dataset import Dataset
     from training.fitting.fit import FitProgress
     from training.results import Row
@@ -73,8 +73,7 @@ def train(
     """
     import torch
 
-    from training.cell import Cell
-    from training.run import NamedRun, default_runs, device_of, run_rows
+    from training.run import default_runs, device_of, preset_file, run_rows
 
     if seeds > 1 and output is not None:
         raise typer.BadParameter(
@@ -82,72 +81,66 @@ def train(
         )
     folder = runs or default_runs()
     begun: list[FitProgress] = []  # empty where all was finished already
-    with_seeds = [_with_epochs(*_with_seed(config, seed, number), epochs) for number in range(seeds)]
+    chosen = [_run_of(config, seed, number, epochs) for number in range(seeds)]
+    files = [output or preset_file(folder, run.name) for run in chosen]
     if threads is not None:
         torch.set_num_threads(threads)
     try:
-        load_data(with_seeds[0][1].data, cache)
+        load_data(chosen[0].configuration.data, cache)
         with progress("train") as report:
             shown = training_report(report)
 
-            def follow(latest: FitProgress) -> None:
+            def follow(run: Run, latest: FitProgress) -> None:
                 begun.append(latest)
                 shown(latest)
 
-            named = []
-            for name, configuration in with_seeds:
-                shortened = name.endswith(f"_epochs{epochs}")  # no row of its recipe then
-                cell = None if shortened else Cell.parse(name)
-                named.append(NamedRun(name, cell.recipe if cell else "", configuration, output, follow))
             rows = run_rows(
-                named,
+                chosen,
                 folder,
+                output=output,
                 cache=cache,
                 device=device_of(device),
-                waits=lambda: say(f"{folder / named[0].name}: another process trains there; waiting for its end"),
+                report=follow,
+                waits=lambda: say(f"{folder / chosen[0].name}: another process trains there; waiting for its end"),
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command continues with {folder / with_seeds[0][0]}")
+        say(f"stopped; the same command continues with {folder / chosen[0].name}")
         raise
-    for run, row in zip(named, rows, strict=True):
+    for file, row in zip(files, rows, strict=True):
         if row.status != "done":
-            raise Failure(f"{run.name}: {row.message}")
-        _tell_row(run.output(folder), row)
+            raise Failure(f"{row.name}: {row.message}")
+        _tell_row(file, row)
     if seeds > 1:
         _tell_mean(rows)
-    print_known(known_errors(with_seeds[0][1]))
+    print_known(known_errors(chosen[0].configuration))
     if not begun:
         print("finished earlier, nothing was trained now")
-    for run in named:
-        _tell_heard(run.output(folder))
+    for file in files:
+        _tell_heard(file)
 
 
-def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, TrainingConfiguration]:
-    """Name and configuration of a run with its own seed or `seed`, plus `number`."""
+def _run_of(config: str, seed: int | None, number: int, epochs: int | None) -> Run:
+    """The run of a configuration with its own seed or `seed`, plus `number`, and `epochs` if they are given."""
     from training.cell import Cell, load
+    from training.configuration import Run
 
-    configuration, name = load(config), name_text(Path(config).stem)
+    configuration, name, cell = load(config), name_text(Path(config).stem), Cell.parse(config)
     wanted = (configuration.recipe.seed if seed is None else seed) + number
-    if wanted == configuration.recipe.seed:
-        return name, configuration
-    cell = Cell.parse(config)
-    if cell is not None and cell.seed:
-        raise typer.BadParameter(f"{config} has a seed already; leave one out", param_hint="--seed")
-    name += f"_seed{wanted}"
-    if cell is not None:
-        return name, load(name)
-    title, recipe = f"{configuration.title}, seed {wanted}", replace(configuration.recipe, seed=wanted)
-    return name, replace(configuration, title=title, recipe=recipe)
-
-
-def _with_epochs(
-    name: str, configuration: TrainingConfiguration, epochs: int | None
-) -> tuple[str, TrainingConfiguration]:
-    """Name and configuration of a run that takes `epochs`, where they are given and not its recipe's own."""
+    if wanted != configuration.recipe.seed:
+        if cell is not None and cell.seed:
+            raise typer.BadParameter(f"{config} has a seed already; leave one out", param_hint="--seed")
+        name += f"_seed{wanted}"
+        configuration = load(name) if cell else _changed(configuration, f"seed {wanted}", seed=wanted)
     if epochs is None or epochs == configuration.recipe.epochs:
-        return name, configuration
-    title, recipe = f"{configuration.title}, {epochs} epochs", replace(configuration.recipe, epochs=epochs)
-    return f"{name}_epochs{epochs}", replace(configuration, title=title, recipe=recipe)
+        return Run(name, cell.recipe if cell else "", configuration)
+    changed = _changed(configuration, f"{epochs} epochs", epochs=epochs)
+    return Run(f"{name}_epochs{epochs}", "", changed)  # no row of its recipe
+
+
+def _changed(configuration: TrainingConfiguration, words: str, **recipe: Any) -> TrainingConfiguration:
+    """A configuration with other fields of its recipe, of which its title says `words`."""
+    title = f"{configuration.title}, {words}"
+    return replace(configuration, title=title, recipe=replace(configuration.recipe, **recipe))
 
 
 def _tell_row(file: Path, row: Row) -> None:

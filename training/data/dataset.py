@@ -5,7 +5,6 @@ The kept modes make the data band-limited, so 10 or 25 amplitudes hold a frame o
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import zlib
@@ -25,7 +24,7 @@ from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
 from engine.whole_file import naming, whole_folder
-from training.configuration import DATA_VERSION, DatasetConfiguration, non_default
+from training.configuration import DATA_VERSION, DatasetConfiguration, digest_of, non_default
 from training.data.draws import DRAWS
 
 CHUNK = 50  # trajectories a step of the progress
@@ -73,8 +72,7 @@ def default_cache() -> Path:
 
 def dataset_key(configuration: DatasetConfiguration) -> str:
     """A digest of everything that determines the data."""
-    text = json.dumps([DATA_VERSION, non_default(configuration)], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return digest_of([DATA_VERSION, non_default(configuration)])
 
 
 def dataset_folder(configuration: DatasetConfiguration, cache: Path | None = None) -> Path:

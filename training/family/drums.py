@@ -1,7 +1,5 @@
 """The drums that no model has seen, and how well models of many strings play them.
 
-It is the same equation in two dimensions.
-
 Drums differ in kind, size, pitch, decay and blow. Half of the membranes are loaded by air. Decay rates scatter by
 20 % from mode to mode. Half of the blows are those of a mallet (speeds alone), half begin pressed down, at rest.
 """
@@ -9,29 +7,25 @@ Drums differ in kind, size, pitch, decay and blow. Half of the membranes are loa
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args
+from typing import ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 import torch
 from filelock import FileLock
-from torch import Tensor
 
 from engine.kernels.drum_modes import AIR_KG_M3
 from engine.kernels.pulses import spectrum
-from engine.models.base import Physics, StringModel
-from engine.resonators.base import Array, Resonator
+from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes, bending_nm, modes_of
 from engine.strike import Strike
 from engine.table import checked, read_table, write_table
-from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
-from training.family.errors import SCALE_M, UNHEARD, geometric_mean, of_many, untrained
-from training.family.strings import log_uniform, substeps_of
+from training.family.errors import geometric_mean
+from training.family.motion import Player, Released, motion_errors
+from training.family.strings import log_uniform
 from training.provenance import now
 
 T = TypeVar("T")
@@ -42,8 +36,6 @@ HIGHEST_HZ = 4_000.0
 BRIGHT_HZ = 3_000.0
 LEAST_MODES = 10
 SLOWER = 8.0  # decays of drums that are measured in the tenth second
-SILENCE = 1e-10  # of a mode, of all: the solver leaves it out
-AT_ONCE = 1_200  # frames; 1,600 modes of them are 15 MB
 LARGEST_BYTES = 2**21
 ROWS = Path(__file__).parents[1] / "drums.csv"
 
@@ -68,33 +60,20 @@ AIRLESS: tuple[Kind, ...] = ("steel plate", "narrow plate")
 
 
 @dataclass(frozen=True, eq=False)
-class StruckDrum:
-    """A drum with all its modes below 4 kHz, and a start of it.
+class StruckDrum(Released):
+    """A drum with all its modes below 4 kHz, and a blow on it or a shape that it is pressed to."""
 
-    Attributes:
-        amplitudes_m, speeds_m_s: mass-normalised, (modes,).
-        weight: of the squares of amplitudes in the mean square over the surface, (modes,).
-        tension_rise: ΔT/T₀ that the start would reach, if all of it were displacement.
-    """
+    silence: ClassVar = 1e-10
 
     kind: Kind
     drum: DrumParameters
-    resonator: Resonator
-    amplitudes_m: Array
-    speeds_m_s: Array
-    weight: Array
-    tension_rise: float
 
     @classmethod
     def by(cls, strike: Strike, modes: DrumModes, tension_modulated: bool = True) -> StruckDrum:
         """A drum of an instrument, by a blow on it."""
         speeds, resonator = strike.speeds(modes), modes.resonator(NOWHERE, tension_modulated=tension_modulated)
         rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
-        return cls("tom", modes.drum, resonator, np.zeros_like(speeds), speeds, modes.scale**2, rise)
-
-    @property
-    def pitch_hz(self) -> float:
-        return float(self.resonator.omega[0]) / (2 * math.pi)
+        return cls(resonator, np.zeros_like(speeds), speeds, modes.scale**2, rise, "tom", modes.drum)
 
 
 def draw_drum(number: int, seed: int = 0) -> StruckDrum:
@@ -117,7 +96,7 @@ def draw_drum(number: int, seed: int = 0) -> StruckDrum:
     q, v = _start(random, modes, place, number // len(KINDS) % 2 == 0)
     rise = _between(random, RISE)
     share = math.sqrt(rise / float(resonator.relative_tension_rise(np.hypot(q, v / resonator.omega))))
-    return StruckDrum(kind, drum, resonator, q * share, v * share, modes.scale**2, rise)
+    return StruckDrum(resonator, q * share, v * share, modes.scale**2, rise, kind, drum)
 
 
 def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
@@ -169,61 +148,6 @@ def _between(random: np.random.Generator, ends: tuple[float, float]) -> float:
     return ends[0] if ends[0] == ends[1] else log_uniform(random, ends)
 
 
-# What plays them: each call gives the next frames, (frames, modes) in m
-
-Blocks = Callable[[int], Tensor]
-DrumPlayer = Callable[[StruckDrum, int], Blocks]
-
-
-def true_motion(struck: StruckDrum, rate_hz: int) -> Blocks:
-    """The true motion, by the solver."""
-    return _solved(struck.resonator, struck, rate_hz)
-
-
-def linear_drum(struck: StruckDrum, rate_hz: int) -> Blocks:
-    """The motion without tension modulation, exactly."""
-    return _solved(replace(struck.resonator, coupling=np.zeros_like(struck.resonator.coupling)), struck, rate_hz)
-
-
-def _solved(resonator: Resonator, struck: StruckDrum, rate_hz: int) -> Blocks:
-    solver = SplittingSolver(resonator, rate_hz, substeps=substeps_of(resonator, rate_hz), silence=SILENCE)
-    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
-
-    def more(frames: int) -> Tensor:
-        nonlocal state
-        motion, state = solver.advance(state, frames)
-        return motion[0]
-
-    return more
-
-
-def model_player(model: StringModel[Any]) -> DrumPlayer:
-    """The player of drums by what was learned of strings. Raises ValueError: see `of_many`."""
-    of_any = of_many(model)
-
-    def play(struck: StruckDrum, rate_hz: int) -> Blocks:
-        of_drum = of_any.for_resonator(Physics(struck.resonator, rate_hz, SCALE_M))
-        q, v = (torch.from_numpy(part)[None] / SCALE_M for part in (struck.amplitudes_m, struck.speeds_m_s))
-        state = of_drum.encode_modes(q, v / rate_hz)
-
-        def more(frames: int) -> Tensor:
-            nonlocal state
-            motion, state = of_drum.advance_modes(state, frames)
-            return motion[0] * SCALE_M
-
-        return more
-
-    return play
-
-
-def untrained_player(how: str) -> DrumPlayer:
-    """The player of drums by `koopman_tension` as its start of this name leaves it."""
-    return model_player(untrained(how))
-
-
-# How well
-
-
 @dataclass(frozen=True)
 class DrumError:
     """The errors of one drum and player over the surface: relative squared, in the first second and in the tenth.
@@ -252,17 +176,13 @@ class DrumError:
 
 
 @torch.inference_mode()
-def measure_drum(
-    number: int, players: Mapping[str, DrumPlayer], rate_hz: int, tenth: bool, seed: int
-) -> list[DrumError]:
+def measure_drum(number: int, players: Mapping[str, Player], rate_hz: int, tenth: bool, seed: int) -> list[DrumError]:
     """The errors of players on the drum of a number; in the tenth second, too, where it decays `SLOWER` times."""
     struck = draw_drum(number, seed)
     if tenth:
         struck = replace(struck, resonator=replace(struck.resonator, sigma=struck.resonator.sigma / SLOWER))
     _, first, *others = motion_errors(struck, players, rate_hz, (10 if tenth else 1) * rate_hz)
-    size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
-    silent_below = UNHEARD * float(size @ struck.weight) * rate_hz
-    last = others[-1] if tenth and others[-1].energy > silent_below else None
+    last = others[-1] if tenth and others[-1].energy > struck.unheard * rate_hz else None
     blow = "blow" if struck.speeds_m_s.any() else "pressed"
     drum = struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise, blow
     errors = []
@@ -273,56 +193,8 @@ def measure_drum(
     return errors
 
 
-@dataclass(frozen=True)
-class Window:
-    """Relative squared errors over the surface between two times, by player; `energy`: what they are relative to."""
-
-    start_s: float
-    stop_s: float
-    energy: float
-    rel_mse: Mapping[str, float]
-    processor_s: Mapping[str, float]
-
-
-@torch.inference_mode()
-def motion_errors(
-    struck: StruckDrum,
-    players: Mapping[str, DrumPlayer],
-    rate_hz: int,
-    frames: int,
-    report: Callable[[float], None] = lambda share: None,
-) -> list[Window]:
-    """The errors of players over the first frames: in all, then in each second."""
-    true, weight = true_motion(struck, rate_hz), torch.from_numpy(struck.weight)
-    playing = [play(struck, rate_hz) for play in players.values()]
-    edges = [*range(0, frames, rate_hz), frames]
-    energy = np.zeros(len(edges) - 1)
-    wrong, spent = np.zeros((2, len(edges) - 1, len(players)))
-    for part, (first, stop) in enumerate(pairwise(edges)):
-        for begin in range(first, stop, AT_ONCE):
-            count = min(AT_ONCE, stop - begin)
-            expected = true(count)
-            energy[part] += float((expected.square() @ weight).sum())
-            for place, more in enumerate(playing):
-                begun = time.process_time()
-                motion = more(count)
-                spent[part, place] += time.process_time() - begun
-                wrong[part, place] += float(((motion - expected).square() @ weight).sum())
-            report((begin + count) / frames)
-
-    def window(first: int, stop: int, of: slice) -> Window:
-        whole = float(energy[of].sum())
-        errors = [sums / whole if whole else math.nan for sums in wrong[of].sum(0).tolist()]
-        errors = [math.inf if whole and not math.isfinite(error) else error for error in errors]
-        by_player = (dict(zip(players, sums, strict=True)) for sums in (errors, spent[of].sum(0).tolist()))
-        return Window(first / rate_hz, stop / rate_hz, whole, *by_player)
-
-    parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
-    return [window(0, frames, slice(None)), *parts]
-
-
 def measure_drums(
-    players: Mapping[str, DrumPlayer],
+    players: Mapping[str, Player],
     count: int,
     tenth: int,
     rate_hz: int,

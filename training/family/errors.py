@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import statistics
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,18 +12,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from engine.compare.relative import error_to_signal
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
-from engine.models.koopman_tension import SERIES, KoopmanTension
-from training.family.strings import Column, PluckedString, displacement_m, draw_string, solve
+from engine.resonators.family import inharmonicity
+from training.family.motion import SCALE_M, Blocks, Player, linear_motion, motion_errors, of_many, untrained
+from training.family.strings import Column, PluckedString, displacement_m, draw_string
 
-# modal amplitudes (steps, modes) in m of a string, at a rate
-Player = Callable[[PluckedString, int, int], Tensor]
 LARGE = 1e-2  # an error that is heard as another string
-UNHEARD = 1e-18  # of the energy at the pluck: an error below that of a string that has fallen so far is none
-SCALE_M = 1e-3
-FRAMES_AT_ONCE = 4_800
 
 
 @dataclass(frozen=True)
@@ -76,73 +70,43 @@ def geometric_mean(errors: Iterable[float]) -> float:
     return math.exp(sum(logarithms) / len(logarithms))
 
 
-@torch.inference_mode()
 def measure(
     players: dict[str, Player],
     column: Column,
-    split: str,
     count: int,
     rate_hz: int,
-    seconds: tuple[float, float],
+    place: int = 0,
     *,
+    window_s: float = 1.0,
     seed: int = 0,
     report: Callable[[float], None] = lambda share: None,
 ) -> dict[str, FamilyErrors]:
-    """The errors of each player from one time to another after the pluck."""
-    first, last = (round(edge * rate_hz) for edge in seconds)
+    """The errors of each player on test strings, in one of the windows after the pluck: that at `place`."""
+    window = round(window_s * rate_hz)
     errors_by_player: dict[str, list[StringError]] = {name: [] for name in players}
     for number in range(count):
-        plucked = draw_string(column, split, number, seed)
-        truth = solve(plucked, rate_hz, last)[first:]
-        unheard = UNHEARD * float(plucked.amplitudes_m.square().sum()) * len(truth)
-        for name, play in players.items():
-            started = time.process_time()
-            played = play(plucked, rate_hz, last)
-            processor_s = (time.process_time() - started) * rate_hz / last
-            error = error_to_signal(played[first:], truth, unheard)
-            sounds = float(truth.square().sum()) > unheard
-            reported = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            errors_by_player[name].append(StringError(*reported, error, processor_s, sounds))
+        plucked = draw_string(column, "test", number, seed)
+        whole, *windows = motion_errors(plucked, players, rate_hz, (place + 1) * window, window=window)
+        sounds = windows[place].energy > plucked.unheard * window
+        facts = plucked.pitch_hz, inharmonicity(plucked.string), plucked.tension_rise, plucked.resonator.modes
+        for name, of_player in errors_by_player.items():
+            processor_s = whole.processor_s[name] / whole.stop_s
+            of_player.append(StringError(*facts, windows[place].rel_mse[name], processor_s, sounds))
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in errors_by_player.items()}
 
 
 def player(model: StringModel[Any]) -> Player:
-    """The player of strings by a model of many. Raises ValueError: see `of_many`."""
+    """The player of strings by a model of many, by displacement on the grid. Raises ValueError: see `of_many`."""
     of_any = of_many(model)
 
-    def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-        return rollout(of_any.for_resonator(Physics(plucked.resonator, rate_hz, SCALE_M)), plucked, steps)
+    def play(plucked: PluckedString, rate_hz: int) -> Blocks:
+        return rollout(of_any.for_resonator(Physics(plucked.resonator, rate_hz, SCALE_M)), plucked)
 
     return play
 
 
-def of_many(model: StringModel[Any]) -> KoopmanTension:
-    """Return a model of many strings. Raises ValueError: it learned one string, which its weights are."""
-    if not isinstance(model, KoopmanTension):
-        raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
-    return model
-
-
-def untrained(how: str) -> KoopmanTension:
-    """`koopman_tension` as its start of this name leaves it, without a string."""
-    model = of_many(build_model("koopman_tension", {"modes": 1, "grid_points": 1}))
-    if how == "series":
-        with torch.no_grad():
-            model.r[0] = model.p[0] = SERIES
-    return model.eval()
-
-
-def linear_string(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-    """The player of strings without tension modulation: what all errors are large beside."""
-    times = torch.arange(1, steps + 1, dtype=torch.float64)[:, None] / rate_hz
-    eigenvalues = torch.from_numpy(plucked.resonator.eigenvalues())
-    sine = -eigenvalues.real / eigenvalues.imag
-    angle = times * eigenvalues.imag
-    return plucked.amplitudes_m * torch.exp(times * eigenvalues.real) * (angle.cos() + sine * angle.sin())
-
-
-def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
+def averaging(plucked: PluckedString, rate_hz: int) -> Blocks:
     """The player by `koopman_integrated` as averaging over a period starts it, without networks or training."""
     sizes = {
         "state_size": plucked.resonator.modes,
@@ -154,7 +118,7 @@ def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     }
     model = build_model("koopman_integrated", sizes)
     model.initialise("averaging", Physics(plucked.resonator, rate_hz, SCALE_M), torch.Generator().manual_seed(0))
-    return rollout(model.eval(), plucked, steps)
+    return rollout(model.eval(), plucked)
 
 
 def knowing_physics() -> dict[str, Player]:
@@ -163,18 +127,19 @@ def knowing_physics() -> dict[str, Player]:
         "kicks without corrections": player(untrained("kicks")),
         "backward error analysis (1/12)": player(untrained("series")),
         "averaging": averaging,
-        "linear string": linear_string,
+        "linear string": linear_motion,
     }
 
 
-def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:
-    displacement = (displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype())
-    state = model.encode(displacement)
-    blocks = []
-    for done in range(0, steps, FRAMES_AT_ONCE):
-        frames, state = model.advance(state, min(FRAMES_AT_ONCE, steps - done))
-        blocks.append(torch.from_numpy(plucked.resonator.to_modes(frames[0].double().numpy()) * SCALE_M))
-    return torch.cat(blocks)
+def rollout(model: StringModel[Any], plucked: PluckedString) -> Blocks:
+    state = model.encode((displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype()))
+
+    def more(frames: int) -> Tensor:
+        nonlocal state
+        motion, state = model.advance(state, frames)
+        return torch.from_numpy(plucked.resonator.to_modes(motion[0].double().numpy()) * SCALE_M)
+
+    return more
 
 
 def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[tuple[float, float], FamilyErrors]]:

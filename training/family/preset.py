@@ -19,8 +19,9 @@ from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, read_toml, write
 from engine.values.string import StringParameters
-from training.family.errors import SCALE_M, of_many, player
+from training.family.errors import player
 from training.family.fit import FitCase, fit_curves
+from training.family.motion import SCALE_M, of_many
 from training.family.strings import FAMILY, GRID_POINTS, draw_string, solve
 
 CONFIGURATION = Path(__file__).parent / "studio_any_string.toml"
@@ -142,6 +143,6 @@ def mean_errors(model: KoopmanTension, cases: list[FitCase], rate_hz: int) -> tu
     errors = []
     for case in cases:
         shapes = torch.from_numpy(case.plucked.resonator.shapes)
-        displacement = play(case.plucked, rate_hz, len(case.truth)) @ shapes
+        displacement = play(case.plucked, rate_hz)(len(case.truth)) @ shapes
         errors.append(relative_error(displacement[None], (case.truth @ shapes)[None]))
     return mean(error.rel_mse for error in errors), mean(error.rel_mae for error in errors)

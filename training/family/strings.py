@@ -17,11 +17,10 @@ from torch import Tensor
 
 from engine.excitation import displacement
 from engine.pluck import Shape
-from engine.resonators.base import Resonator
 from engine.resonators.family import BRIGHT_HZ, StringFamily
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, SplittingSolver, default_substeps
 from engine.values.string import StringParameters
+from training.family.motion import Released, true_motion
 
 Column = Literal["inside", "beyond"]
 COLUMNS: tuple[Column, ...] = get_args(Column)
@@ -35,8 +34,6 @@ LENGTH_M = 0.65
 MASS_KG_M = 5e-4
 AREA_M2 = 5e-7
 MODULUS_PA = 2e10  # of every string: they change nothing but units
-# times fewer sub-steps than a data set has: 1e-12 of the energy off after a second, inside the family
-SUBSTEP_DIVISOR = 3
 
 
 FAMILY: dict[Column, StringFamily] = {
@@ -45,21 +42,11 @@ FAMILY: dict[Column, StringFamily] = {
 }
 
 
-@dataclass(frozen=True)
-class PluckedString:
-    """A string with all its modes below 20 kHz, and a pluck of it.
-
-    Attributes:
-        amplitudes_m: at its release, float64 (modes,).
-        tension_rise: ΔT/T₀ then.
-    """
+@dataclass(frozen=True, eq=False)
+class PluckedString(Released):
+    """A string with all its modes below 20 kHz, and a pluck of it."""
 
     string: StringParameters
-    resonator: Resonator
-    amplitudes_m: Tensor
-    pitch_hz: float
-    inharmonicity: float
-    tension_rise: float
 
 
 def draw_string(column: Column, split: str, number: int, seed: int = 0) -> PluckedString:
@@ -83,7 +70,8 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
     width = 2 * half_width if shape == "raised_cosine" else half_width
     amplitudes = resonator.to_modes(displacement(shape, place, width, 1e-3, GRID_POINTS))
     amplitudes = amplitudes * np.sqrt(rise / resonator.relative_tension_rise(amplitudes))
-    return PluckedString(string, resonator, torch.from_numpy(amplitudes), pitch_hz, inharmonicity, rise)
+    at_rest, even = np.zeros_like(amplitudes), np.ones_like(amplitudes)  # sines are orthogonal, and of one size
+    return PluckedString(resonator, amplitudes, at_rest, even, rise, string)
 
 
 def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s: float) -> StringParameters:
@@ -112,18 +100,12 @@ def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s:
 
 def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     """The true motion: modal amplitudes of the frames 1 … steps in m, float64 (steps, modes)."""
-    solver = SplittingSolver(plucked.resonator, rate_hz, substeps=substeps_of(plucked.resonator, rate_hz))
-    return solver.advance(ModalState.at_rest(plucked.amplitudes_m[None]), steps)[0][0]
-
-
-def substeps_of(resonator: Resonator, rate_hz: int) -> int:
-    """The number of sub-steps of the true motion in a frame."""
-    return max(1, -(-default_substeps(resonator, rate_hz) // SUBSTEP_DIVISOR))
+    return true_motion(plucked, rate_hz)(steps)
 
 
 def displacement_m(plucked: PluckedString) -> Tensor:
     """The displacement at its release, float64 (grid_points,)."""
-    return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m.numpy()))
+    return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m))
 
 
 def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:

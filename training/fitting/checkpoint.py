@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
@@ -76,13 +75,3 @@ class Checkpoint:
             message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
             raise ValueError(message) from error
         return cls(parts["model"], parts["best"], parts["average"], optimiser, facts)
-
-
-def optimiser_moments(optimiser: torch.optim.Optimizer) -> dict[str, dict[str, Tensor]]:
-    """The optimiser's state by parameter index."""
-    return {str(index): dict(moments) for index, moments in optimiser.state_dict()["state"].items()}
-
-
-def restore_moments(optimiser: torch.optim.Optimizer, moments: Mapping[str, Mapping[str, Tensor]]) -> None:
-    state = {int(index): dict(values) for index, values in moments.items()}
-    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})

@@ -25,12 +25,12 @@ from engine.compare.relative import ErrorSums, RelativeError
 from engine.models.base import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
-from training.configuration import Recipe, TrainingConfiguration, read_configuration
+from training.configuration import Recipe, Run, TrainingConfiguration, read_configuration
 from training.data.batches import Batch, TrainingData, batches, keeps_every_frame
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import together
-from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
+from training.fitting.checkpoint import Checkpoint
 from training.fitting.losses import backward
 from training.fitting.recorded import RecordedWork
 from training.fitting.soap import SOAP
@@ -91,24 +91,15 @@ class FitResult:
     start: RelativeError | None = None
 
 
-@dataclass(frozen=True)
-class Seed:
-    """A training of `fit_seeds`.
-
-    Attributes:
-        run_folder: with its checkpoint, from which it continues.
-        report: called after every epoch, and every few seconds within.
-    """
-
-    configuration: TrainingConfiguration
-    run_folder: Path
-    report: Callable[[FitProgress], None] = lambda progress: None
+Report = Callable[[Run, FitProgress], None]
 
 
 def fit_seeds(
-    seeds: Sequence[Seed],
+    runs: Sequence[Run],
     dataset: Dataset,
+    folder: Path,
     *,
+    report: Report = lambda run, progress: None,
     device: torch.device | str = "cpu",
     checkpoint_every_s: float | None = None,
 ) -> list[FitResult | Diverged]:
@@ -117,21 +108,25 @@ def fit_seeds(
     On a GPU, runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two
     checkpoints, catch up first. A run that diverges leaves the others.
 
+    Args:
+        folder: of the runs' folders, in which each has its checkpoint and continues from it.
+        report: called after every epoch, and every few seconds within.
+
     Returns:
         The outcome of each. Seconds are the shares of the time that all took.
 
     Raises:
         ValueError: a checkpoint is damaged or of another configuration, or the runs differ in more than their seeds.
     """
-    first = seeds[0].configuration
-    for other in (seed.configuration for seed in seeds):
+    first = runs[0].configuration
+    for other in (run.configuration for run in runs):
         same_recipe = replace(other.recipe, seed=first.recipe.seed) == first.recipe
         if not same_recipe or (other.model, other.data, other.steps) != (first.model, first.data, first.steps):
             raise ValueError("runs that are trained together must differ in their seeds alone")
     if first.start == LEAST_SQUARES:
-        return [_fit_at_once(seed.configuration, dataset, seed.report) for seed in seeds]
+        return [_fit_at_once(run, dataset, report) for run in runs]
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
-    under_way = [_UnderWay(seed, dataset, torch.device(device)) for seed in seeds]
+    under_way = [_UnderWay(run, dataset, torch.device(device), folder, report) for run in runs]
     steps = Steps()
     started = before = time.monotonic()
     iterations = 0
@@ -390,7 +385,7 @@ class TrainingState:
             "best_epoch": self._best_epoch,
         }
         average = self._average.state_dict() if self._average is not None else {}
-        moments = optimiser_moments(self._optimiser)
+        moments = {str(index): of_one for index, of_one in self._optimiser.state_dict()["state"].items()}
         return Checkpoint(self.model.state_dict(), self._best_model, average, moments, facts)
 
     def restore(self, checkpoint: Checkpoint, path: Path) -> None:
@@ -415,7 +410,8 @@ class TrainingState:
             self.model.load_state_dict(dict(checkpoint.model))
             if self._average is not None:
                 self._average.load_state_dict(dict(checkpoint.average))
-            restore_moments(self._optimiser, checkpoint.optimiser)
+            moments = {int(index): dict(of_one) for index, of_one in checkpoint.optimiser.items()}
+            self._optimiser.load_state_dict({**self._optimiser.state_dict(), "state": moments})
         except (RuntimeError, ValueError, KeyError, TypeError) as error:  # torch's words for tensors that do not fit
             message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
             raise ValueError(message) from error
@@ -430,10 +426,10 @@ class TrainingState:
 class _UnderWay(TrainingState):
     """A run of several, with its checkpoint's file and what was last saved and reported."""
 
-    def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
+    def __init__(self, run: Run, dataset: Dataset, device: torch.device, folder: Path, report: Report) -> None:
         begun = time.monotonic()
-        super().__init__(seed.configuration, dataset, device)
-        self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
+        super().__init__(run.configuration, dataset, device)
+        self._path, self._report = folder / run.name / "checkpoint.safetensors", partial(report, run)
         self._diverged: Diverged | None = None
         if self._path.exists():
             self.restore(Checkpoint.load(self._path), self._path)
@@ -469,21 +465,19 @@ class _UnderWay(TrainingState):
             self._saved = now
 
 
-def _fit_at_once(
-    configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[FitProgress], None]
-) -> FitResult:
+def _fit_at_once(run: Run, dataset: Dataset, report: Report) -> FitResult:
     """Fit a model whose start is all there is."""
-    started = time.monotonic()
-    model, _ = begin(configuration, dataset)
-    sums = evaluate_model(model, dataset, "validation", configuration.steps)
+    started, steps = time.monotonic(), run.configuration.steps
+    model, _ = begin(run.configuration, dataset)
+    sums = evaluate_model(model, dataset, "validation", steps)
     error = sums.total()
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
-    truth = dataset.split("train")[:100, : configuration.steps + 1] @ dataset.synthesis.float()
+    truth = dataset.split("train")[:100, : steps + 1] @ dataset.synthesis.float()
     with torch.no_grad():
-        loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
-    report(FitProgress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
+        loss = float((model(truth[:, 0], steps) - truth[:, 1:]).square().mean())
+    report(run, FitProgress(1, 1, 1, 1, steps, 0.0, loss, error, seconds, 0.0))
     return FitResult(model.eval(), sums, 1, 1, seconds)
 
 

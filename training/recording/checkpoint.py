@@ -113,11 +113,10 @@ def restore(path: Path, takes: Takes, steps: int) -> int:
     takes.damping, takes.rests = np.array(state.damping), np.array(state.rests, int)
     takes.free_damping = state.free_damping
     for fit, take in zip(takes.fits, state.takes, strict=True):
-        poles: list[list[Pole]] = [[] for _ in range(bands + 1)]
+        fit.poles = [[] for _ in range(bands + 1)]
         for p in take.poles:
             s, a = complex(p.real, p.imaginary), complex(p.amplitude_real, p.amplitude_imaginary)
-            poles[p.partial].append(Pole(s, a, p.partial))
-        fit.free, *fit.poles = poles
+            fit.poles[p.partial - 1].append(Pole(s, a, p.partial))  # the last are free
         fit.set_glide(Glide(np.array(take.glide), take.pitch))
     return state.steps
 

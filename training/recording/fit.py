@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -17,7 +18,7 @@ from training.recording.glide import Glide, glide_of_phases
 from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
 from training.recording.numbering import PartialSeries
-from training.recording.refine import Complex, Fit, Pole
+from training.recording.refine import FREE, Complex, Fit, Pole
 from training.recording.slow import settle_slow
 from training.recording.sweeps import FIRST_DAMPING, Takes
 
@@ -52,17 +53,9 @@ class LearnedNote:
         return total
 
 
-def fit_note(
-    note: Note,
-    series: PartialSeries,
-    *,
-    seconds: float = FIT_LASTS_S,
-    poles_a_partial: int = 2,
-    free: int = FREE_POLES,
-    glides: bool = True,
-) -> LearnedNote:
-    """The poles of one note; see `fit_takes`."""
-    return fit_takes([(note, series)], seconds=seconds, poles_a_partial=poles_a_partial, free=free, glides=glides)[0]
+def fit_note(note: Note, series: PartialSeries, **options: Any) -> LearnedNote:
+    """The poles of one note; see `fit_takes`, also for the options."""
+    return fit_takes([(note, series)], **options)[0]
 
 
 def fit_takes(
@@ -119,8 +112,7 @@ def _steps(
         for number in range(len(hz)):
             plain = Pole(complex(-3.0, 2 * math.pi * hz[number]), partial=number + 1)
             first = _loudest(takes, number).start(number, 1) or [plain]
-            for fit in takes.fits:
-                fit.poles[number] = first
+            takes.set_poles(number, [first for _ in takes.fits])
 
     def second_poles() -> None:
         residuals = takes.residuals()
@@ -208,10 +200,9 @@ def _first_glide(samples: Array, rate: int, hz: Array, edges: Array) -> Glide:
 
 def _add_pole(takes: Takes, number: int, residuals: Sequence[Complex]) -> None:
     """A second pole of a band, from the subspace or else close to the first, where it leaves much less."""
-    wheres = takes.bands(number)
-    before = [fit.poles[number] for fit in takes.fits]
+    before, wheres = takes.poles(number), takes.bins(number)
     targets = takes.targets(before, residuals, wheres)
-    one, left, _ = takes.improved(before, targets, wheres, FIRST_DAMPING, number)
+    one, left, _ = takes.improved(before, targets, wheres, FIRST_DAMPING)
     first = one[0][0]
     beside = Pole(complex(2.5 * first.s.real, first.s.imag + 2.0), partial=first.partial)
     tried = [[first, beside]]
@@ -224,14 +215,13 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[Complex]) -> None:
         after = left
         damping = FIRST_DAMPING
         for _ in range(5):
-            two, after, damping = takes.improved(two, targets, wheres, damping, number)
+            two, after, damping = takes.improved(two, targets, wheres, damping)
         if after < best:
             best, chosen = after, two
     bins = sum(2 * (where.stop - where.start) for where in wheres)
     more = 2 + 2 * len(takes.fits)  # numbers
     if bins * math.log(left / max(best, 1e-300)) > WORTH * more * math.log(bins):
-        for fit, own in zip(takes.fits, chosen, strict=True):
-            fit.poles[number] = own
+        takes.set_poles(number, chosen)
         takes.damping[number] = FIRST_DAMPING
 
 
@@ -251,9 +241,8 @@ def _add_free(takes: Takes) -> None:
             for decay in (0.5 * width_hz, 1.5 * width_hz, 4 * width_hz):
                 start = [Pole(complex(-decay, fit.omega[place]))]
                 left, start, _ = fit.solve(start, residual[where], where)
-                moved, left, _ = alone.improved([start], [residual[where]], [where], FIRST_DAMPING, None)
+                moved, left, _ = alone.improved([start], [residual[where]], [where], FIRST_DAMPING)
                 tried.append((weight * (left - whole), moved[0][0]))
     pole = min(tried, key=lambda trial: trial[0])[1]
-    for fit in takes.fits:
-        fit.free = [*fit.free, pole]
+    takes.set_poles(FREE, [[*free, pole] for free in takes.poles(FREE)])
     takes.free_damping = FIRST_DAMPING

@@ -35,7 +35,7 @@ from scipy import optimize
 
 from engine.resonators.base import Array
 from training.recording.glide import CENTS, Glide
-from training.recording.refine import Complex, Fit, Pole, moments, polarisations, real_rows
+from training.recording.refine import FREE, Complex, Fit, Pole, moments, polarisations, real_rows
 
 MODEL_ERRORS = {"cents": 0.6, "decay": 0.05, "level_db": 0.35}  # cents, a share, dB
 NORMAL_95 = 1.96
@@ -69,7 +69,7 @@ def spreads(fit: Fit) -> dict[int, Spread]:
     residual = fit.data - fit.model()
     random = np.random.default_rng(0)
     by_number = {
-        number + 1: polarisations([pole for pole in poles if pole.a]) for number, poles in enumerate(fit.poles)
+        number + 1: polarisations([pole for pole in poles if pole.a]) for number, poles in enumerate(fit.poles[:FREE])
     }
     by_number = {number: poles for number, poles in by_number.items() if poles}
     rests = at_rest(fit.glide, by_number)

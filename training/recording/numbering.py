@@ -167,16 +167,10 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Part
     if len(peaks.hz) == 0:
         return None
     candidates = _candidates(peaks, f0_range_hz)
-    scored = sorted(((max(_score(peaks, f0, b)[0] for b in COARSE), f0) for f0 in candidates), reverse=True)
+    scored = sorted(((max(series_at(peaks, f0, b).score for b in COARSE), f0) for f0 in candidates), reverse=True)
     tried = (series_at(peaks, f0, float(stiffness)) for _, f0 in scored[:40] for stiffness in STIFFNESSES)
     best = max(tried, key=lambda series: series.score, default=None)
     return None if best is None else _best_refined(peaks, best)
-
-
-def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
-    """A series of given f0 and B with its score."""
-    score, explained, missing, present = _score(peaks, f0_hz, stiffness)
-    return PartialSeries(f0_hz, stiffness, present, explained, missing, score)
 
 
 def followed(peaks: Peaks, series: PartialSeries) -> PartialSeries:
@@ -208,7 +202,8 @@ def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
     return np.array(kept)
 
 
-def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, float, tuple[int, ...]]:
+def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
+    """A series of given f0 and B with its score."""
     k_of = nearest(peaks.hz, f0_hz, stiffness).astype(int)
     target = partial_hz(k_of, f0_hz, stiffness)
     allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
@@ -221,7 +216,7 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     np.maximum.at(best, k_of[inside], (near * weight)[inside])
     present = np.flatnonzero(best > 0.02)
     if len(present) == 0:
-        return -1.0, 0.0, 1.0, ()
+        return PartialSeries(f0_hz, stiffness, (), explained=0.0, missing=1.0, score=-1.0)
     # predicted ones that are not there, up to where most of the series' strength lies: one peak is no series
     share = np.cumsum(best) / best.sum()
     last = int(np.searchsorted(share, 0.93))
@@ -236,7 +231,7 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     missing = float(absent.sum() / count)
     first = 0.12 * float(absent[0])
     score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
-    return score, explained, missing, tuple(int(number_present) for number_present in present)
+    return PartialSeries(f0_hz, stiffness, tuple(present.tolist()), explained, missing, score)
 
 
 def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:

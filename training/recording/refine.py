@@ -37,6 +37,7 @@ LARGEST_STEP = 60.0  # of ω in rad/s
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
 MOST_DECAYS_APART = 8.0
 LONGEST_WINDOW = 120  # of the subspace
+FREE = -1  # the place of the poles that do not glide, behind all bands
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,7 @@ class Fit:
         samples: that are fitted, (frames,).
         edges_hz: of the bands, ascending, (partials + 1,).
         partials_hz: where partials are expected, (partials,).
-        poles: of each band.
-        free: poles that do not glide.
+        poles: of each band, and last those that do not glide.
         tuned: whether its pitch differs from that of the poles, which it shares with another take.
     """
 
@@ -75,11 +75,10 @@ class Fit:
     partials_hz: Array
     glide: Glide
     poles: list[list[Pole]] = field(default_factory=list)
-    free: list[Pole] = field(default_factory=list)
     tuned: bool = False
 
     def __post_init__(self) -> None:
-        self.poles = self.poles or [[] for _ in self.partials_hz]
+        self.poles = self.poles or [[] for _ in range(len(self.partials_hz) + 1)]
         self.width_hz = np.diff(self.edges_hz)
         self.size = COARSE * fft.next_fast_len(math.ceil((1.04 * len(self.samples) + 64) / COARSE))
         self.step_hz = self.rate_hz / self.size
@@ -142,14 +141,16 @@ class Fit:
         return total
 
     def gliding(self) -> list[Pole]:
-        return [pole for band in self.poles for pole in band]
+        return [pole for band in self.poles[:FREE] for pole in band]
 
     def every(self) -> list[Pole]:
-        return self.gliding() + self.free
+        return self.gliding() + self.poles[FREE]
 
-    def free_bins(self) -> slice:
-        """The bins in which the poles that do not glide are fitted."""
-        reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.free), default=0.0)
+    def bins(self, number: int) -> slice:
+        """The bins in which the poles of a band, or the free ones, are fitted."""
+        if number != FREE:
+            return self.bands[number]
+        reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.poles[FREE]), default=0.0)
         return slice(1, min(self.highest, max(2, round(reach / self.step_hz))))
 
     # Steps
@@ -192,12 +193,12 @@ class Fit:
             bent += [0.5 * pole.s.real * (moved + mirrored), 0.5j * (moved - mirrored)]
         return np.stack(linear, 1), np.stack(bent, 1)
 
-    def moved(self, pole: Pole, step: Array, number: int | None) -> Pole:
+    def moved(self, pole: Pole, step: Array) -> Pole:
         decay = pole.decay * math.exp(float(np.clip(step[0], -1.0, 1.0)))
         omega = pole.s.imag + float(np.clip(step[1], -LARGEST_STEP, LARGEST_STEP))
-        if number is not None:
-            decay = min(max(decay, LEAST_DECAY), WIDEST * self.width_hz[number])
-            middle, far = (2 * math.pi * hz for hz in (self.partials_hz[number], self._far_hz(number)))
+        if number := pole.partial:
+            decay = min(max(decay, LEAST_DECAY), WIDEST * self.width_hz[number - 1])
+            middle, far = (2 * math.pi * hz for hz in (self.partials_hz[number - 1], self._far_hz(number - 1)))
             omega = min(max(omega, middle - far), middle + far)
         else:
             decay = min(max(decay, LEAST_DECAY), MOST_FREE_DECAY)

@@ -18,7 +18,7 @@ import numpy as np
 
 from engine.resonators.base import Array
 from training.recording.intervals import covariance
-from training.recording.refine import Complex, Fit, Pole
+from training.recording.refine import FREE, Complex, Fit, Pole
 from training.recording.sweeps import Takes
 
 FALL = 1.25  # in nepers until the end of the fit, an estimate; faster poles are left alone
@@ -29,19 +29,12 @@ def settle_slow(takes: Takes) -> None:
     """Settle the slow poles of takes, which share them."""
     least = FALL / max(len(fit.samples) / fit.rate_hz for fit in takes.fits)
     residuals = takes.residuals()
-    for number in range(len(takes.damping)):
-        moved = _settled(takes, [fit.poles[number] for fit in takes.fits], residuals, takes.bands(number), least)
-        for fit, poles in zip(takes.fits, moved, strict=True):
-            fit.poles[number] = poles
-    free_bins = [fit.free_bins() for fit in takes.fits]
-    moved = _settled(takes, [fit.free for fit in takes.fits], residuals, free_bins, least)
-    for fit, poles in zip(takes.fits, moved, strict=True):
-        fit.free = poles
+    for number in (*range(len(takes.damping)), FREE):
+        takes.set_poles(number, _settled(takes, number, residuals, least))
 
 
-def _settled(
-    takes: Takes, before: list[list[Pole]], residuals: Sequence[Complex], wheres: Sequence[slice], least: float
-) -> list[list[Pole]]:
+def _settled(takes: Takes, number: int, residuals: Sequence[Complex], least: float) -> list[list[Pole]]:
+    before, wheres = takes.poles(number), takes.bins(number)
     if not any(pole.decay < least for pole in before[0]):
         return before
     known = np.zeros(len(before[0]))

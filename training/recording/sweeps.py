@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.resonators.base import Array
-from training.recording.refine import Complex, Fit, Pole, projector, real_rows
+from training.recording.refine import FREE, Complex, Fit, Pole, projector, real_rows
 
 SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
 REST = 3  # sweeps, for such a band
@@ -45,8 +45,16 @@ class Takes:
         """The part of each take's spectrum that all poles leave."""
         return [fit.data - fit.model() for fit in self.fits]
 
-    def bands(self, number: int) -> list[slice]:
-        return [fit.bands[number] for fit in self.fits]
+    def poles(self, number: int) -> list[list[Pole]]:
+        """The poles of a band, or the free ones, in each take."""
+        return [fit.poles[number] for fit in self.fits]
+
+    def set_poles(self, number: int, poles: Sequence[list[Pole]]) -> None:
+        for fit, of_take in zip(self.fits, poles, strict=True):
+            fit.poles[number] = of_take
+
+    def bins(self, number: int) -> list[slice]:
+        return [fit.bins(number) for fit in self.fits]
 
     def targets(
         self, poles: Sequence[list[Pole]], residuals: Sequence[Complex], wheres: Sequence[slice]
@@ -61,14 +69,9 @@ class Takes:
         targets: Sequence[Complex],
         wheres: Sequence[slice],
         damping: float,
-        number: int | None,
         tries: int = 2,
     ) -> tuple[list[list[Pole]], float, float]:
-        """Poles of each take after one step towards the targets, the weighted energy that is left, the next damping.
-
-        Args:
-            number: of the band; None: poles that do not glide.
-        """
+        """Poles of each take after a step towards the targets, the weighted energy that is left, the next damping."""
         left, solved, rests = self.solve(poles, targets, wheres)
         square: Array = np.zeros((2 * len(poles[0]),) * 2)
         slope: Array = np.zeros(2 * len(poles[0]))
@@ -82,7 +85,7 @@ class Takes:
         for _ in range(tries):
             step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
             moved = [
-                [lead.moved(pole, change, number) for pole, change in zip(take_poles, step, strict=True)]
+                [lead.moved(pole, change) for pole, change in zip(take_poles, step, strict=True)]
                 for take_poles in solved
             ]
             after, moved, _ = self.solve(moved, targets, wheres)
@@ -106,25 +109,24 @@ class Takes:
         residuals = self.residuals()
         loudest = [max((abs(pole.a) for pole in fit.every()), default=0.0) for fit in self.fits]
         for number in range(len(self.damping)):
-            before = [fit.poles[number] for fit in self.fits]
+            before = self.poles(number)
             if not before[0]:
                 continue
             if self.rests[number]:
                 self.rests[number] -= 1
                 continue
-            wheres = self.bands(number)
+            wheres = self.bins(number)
             targets = self.targets(before, residuals, wheres)
             parts = zip(self.weights, residuals, wheres, strict=True)
             had = sum(weight * float(np.vdot(rest[where], rest[where]).real) for weight, rest, where in parts)
             after, left = before, had
             for _ in range(steps):
-                after, left, self.damping[number] = self.improved(
-                    after, targets, wheres, float(self.damping[number]), number
-                )
+                damping = float(self.damping[number])
+                after, left, self.damping[number] = self.improved(after, targets, wheres, damping)
             if had - left < SETTLED * self.fits[0].energy * len(self.fits):
                 self.rests[number] = REST
+            self.set_poles(number, after)
             for fit, rest, old, new, most in zip(self.fits, residuals, before, after, loudest, strict=True):
-                fit.poles[number] = new
                 for sign, poles in ((1, old), (-1, new)):
                     for pole in poles:
                         if pole.a:
@@ -133,17 +135,15 @@ class Takes:
 
     def sweep_free(self, steps: int = 1) -> None:
         """Steps of all free poles together, against what the string leaves."""
-        if not self.fits[0].free:
+        free, wheres = self.poles(FREE), self.bins(FREE)
+        if not free[0]:
             return
-        wheres = [fit.free_bins() for fit in self.fits]
         targets = [
             fit.data[where] - fit.model(fit.gliding())[where] for fit, where in zip(self.fits, wheres, strict=True)
         ]
-        free = [fit.free for fit in self.fits]
         for _ in range(steps):
-            free, _, self.free_damping = self.improved(free, targets, wheres, self.free_damping, None)
-        for fit, take_free in zip(self.fits, free, strict=True):
-            fit.free = take_free
+            free, _, self.free_damping = self.improved(free, targets, wheres, self.free_damping)
+        self.set_poles(FREE, free)
 
     def step_glides(self) -> None:
         """The glide of each take, and the pitch of all but the first."""

@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -35,54 +36,24 @@ from training.fitting.modes import SLOWEST, Modes
 ENDS = 2  # modes a channel that is read from the ends
 
 
-def store_in_fgru(model: FGRU, modes: StringModes) -> None:
-    """Set its weights to those of a string of these modes, whose frequencies follow the squares.
-
-    Raises:
-        ValueError: see `wire_fgru`.
-    """
-    _store(model, wire_fgru(modes, model.configuration.width), (model.z_layer, model.r_layer, model.h_layer))
-
-
-def store_in_frnn(model: FRNN, modes: StringModes) -> None:
-    """Set its weights to those of a linear string: its frequencies follow nothing.
-
-    Raises:
-        ValueError: see `wire_frnn`.
-    """
-    c = model.configuration
-    layers = [module for module in model.modules() if isinstance(module, FourierConvolution)]
-    _store(model, wire_frnn(modes, c.width, c.depth), layers)
-    with torch.no_grad():
-        for parameter in model.pointwise_layers.parameters():
-            parameter.zero_()
-
-
-def _store(model: FGRU | FRNN, wiring: Wiring, layers: Sequence[FourierConvolution]) -> None:
-    for layer, kernels in zip(layers, wiring.layers, strict=True):
-        kernels.store(layer.weight, layer.bias)
+def _store(
+    model: FGRU | FRNN,
+    layers: Sequence[FourierConvolution],
+    kernels: Sequence[Kernels],
+    weight_in: Tensor,
+    bias_in: Tensor,
+    weight_out: Tensor,
+    bias_out: float,
+) -> None:
+    """Set a cell's convolutions, and its maps in and out: (width,), of the first input and of the displacement."""
+    for layer, of_layer in zip(layers, kernels, strict=True):
+        of_layer.store(layer.weight, layer.bias)
     with torch.no_grad():
         model.in_mapping.weight.zero_()
-        model.in_mapping.weight[:, 0] = wiring.weight_in
-        model.in_mapping.bias.copy_(wiring.bias_in)
-        model.out_mapping.weight[0] = wiring.weight_out
-        model.out_mapping.bias.fill_(wiring.bias_out)
-
-
-@dataclass(frozen=True)
-class Wiring:
-    """A cell's convolutions, and the maps in and out.
-
-    Attributes:
-        layers: in the cell's own order.
-        weight_in, bias_in, weight_out: (width,), of the first input and of the displacement.
-    """
-
-    layers: tuple[Kernels, ...]
-    weight_in: Tensor
-    bias_in: Tensor
-    weight_out: Tensor
-    bias_out: float
+        model.in_mapping.weight[:, 0] = weight_in
+        model.in_mapping.bias.copy_(bias_in)
+        model.out_mapping.weight[0] = weight_out
+        model.out_mapping.bias.fill_(bias_out)
 
 
 class Kernels:
@@ -142,8 +113,8 @@ LIFT = 30.0  # standard deviations of displacement: what ReLU does not bend
 HELD_DOWN = -300.0
 
 
-def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
-    """Wire an FRNN for the modes: its pointwise maps are 0, and couplings are left out.
+def store_in_frnn(model: FRNN, modes: StringModes) -> None:
+    """Set its weights to those of a linear string: its frequencies follow nothing, its pointwise maps are 0.
 
     The state of a mode are its amplitude, which the field holds, and a number that is 0 at rest. Pairs of modes that
     share a channel are kept as sum and difference, so that one kernel turns both.
@@ -151,6 +122,7 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     Raises:
         ValueError: there are too few channels or layers.
     """
+    width, depth = model.configuration.width, model.configuration.depth
     count, points = modes.shapes.shape
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
@@ -163,10 +135,13 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     for layer in layers:
         layer.bias[:, 1 : 1 + 2 * pairs] = HELD_DOWN
     total = math.sqrt(0.5)
-    flow, readings = _turns(modes), modes.analysis
+    odd = ENDS * pairs - count  # the last pair has one mode, and one that rests
+    shapes_of, readings, flow = (
+        torch.cat([of, of.new_zeros(odd, *of.shape[1:])]).unflatten(0, (pairs, ENDS))
+        for of in (modes.shapes, modes.analysis, _turns(modes))
+    )
     for pair in range(pairs):
-        here = slice(ENDS * pair, ENDS * (pair + 1))
-        shapes, analysis, steps = (_two(of, here) for of in (modes.shapes, readings, flow))
+        shapes, analysis, steps = shapes_of[pair], readings[pair], flow[pair]
         for end, sign in ((0, 1.0), (last, -1.0)):
             analyse.gather(field, now + pair, end, total * (analysis[0] + sign * analysis[1]))
             analyse.bias[end, now + pair] = LIFT - LIFT * float(total * (analysis[0] + sign * analysis[1]).sum())
@@ -189,14 +164,11 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     through[field] = 1.0
     lifted = LIFT * through
     lifted[rate : rate + pairs] = LIFT
-    return Wiring(layers, through, lifted, through, -LIFT)
-
-
-def _two(of_modes: Tensor, here: slice) -> Tensor:
-    """The two of a pair; zeros where the last has none."""
-    ends = of_modes.new_zeros(ENDS, *of_modes.shape[1:])
-    ends[: len(of_modes[here])] = of_modes[here]
-    return ends
+    convolutions = [module for module in model.modules() if isinstance(module, FourierConvolution)]
+    _store(model, convolutions, layers, through, lifted, through, -LIFT)
+    with torch.no_grad():
+        for parameter in model.pointwise_layers.parameters():
+            parameter.zero_()
 
 
 def _turns(modes: StringModes) -> Tensor:
@@ -230,8 +202,8 @@ MOST_OWN = 1.0
 TINY = 1e-30
 
 
-def wire_fgru(modes: StringModes, width: int) -> Wiring:
-    """The convolutions z, r and h.
+def store_in_fgru(model: FGRU, modes: StringModes) -> None:
+    """Set its weights to those of a string of these modes, whose frequencies follow the squares.
 
     The initial field lasts for one step, in which the states of all modes are read from it. Those are then turned
     sample by sample, one frame ahead, and spread to the field that is read. Couplings are kept as far as they are
@@ -240,6 +212,7 @@ def wire_fgru(modes: StringModes, width: int) -> Wiring:
     Raises:
         ValueError: there are too few channels or points.
     """
+    width = model.configuration.width
     count, points = modes.shapes.shape
     channels = _Channels.of(count)
     if channels.start >= width or 3 * count >= points:
@@ -272,7 +245,8 @@ def wire_fgru(modes: StringModes, width: int) -> Wiring:
     weight_in, weight_out = torch.zeros(2, width, dtype=torch.float64)
     weight_in[channels.start :] = 1.0  # for a step that has no tanh before it
     weight_out[channels.field] = 1 / FIELD_SIZE
-    return Wiring((z, r, h), weight_in, torch.zeros_like(weight_in), weight_out, 0.0)
+    layers = model.z_layer, model.r_layer, model.h_layer
+    _store(model, layers, (z, r, h), weight_in, torch.zeros_like(weight_in), weight_out, 0.0)
 
 
 @dataclass(frozen=True)
@@ -403,7 +377,7 @@ def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at
     generator = torch.Generator().manual_seed(0)  # any windows do that have nothing in common
     shares = torch.rand(r.bias[:, start].shape, generator=generator, dtype=torch.float64)
     r.bias[:, start] = torch.logit(0.5 + WINDOW * (2 * shares - 1))
-    solve = _LeastKernels(torch.sigmoid(r.bias[:, start]), modes.shapes)
+    solve = partial(_least_kernels, torch.sigmoid(r.bias[:, start]), modes.shapes)
     turn = modes.log_eigenvalues + 1j * modes.drift
     # two frames on, and the drift of two more steps, in which the squares are not known yet
     ahead = SMALL * torch.diag(modes.starts * torch.exp(2 * turn + 2j * modes.drift))
@@ -417,27 +391,23 @@ def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at
     h.lags[:, start, channels.field] += solve(torch.arange(points), modes.shapes.T * first)
 
 
-@dataclass(frozen=True)
-class _LeastKernels:
-    """Kernels from windows (points, channels) of a field to points of another, by what they make of each shape."""
+def _least_kernels(windows: Tensor, shapes: Tensor, places: Tensor, wanted: Tensor) -> Tensor:
+    """The smallest kernels (2·points, channels) from windows (points, channels) of a field to places of another.
 
-    windows: Tensor
-    shapes: Tensor
-
-    def __call__(self, places: Tensor, wanted: Tensor) -> Tensor:
-        """wanted: (places, modes). The smallest kernels (2·points, channels)."""
-        points, channels = self.windows.shape
-        lags = torch.arange(1 - points, points)
-        source = places[:, None] - lags  # (places, lags)
-        inside = ((source >= 0) & (source < points)).double()
-        source = source.clamp(0, points - 1)
-        seen = self.shapes[:, source] * inside  # (modes, places, lags)
-        rows = seen[..., None] * self.windows[source]  # (modes, places, lags, channels)
-        rows = rows.transpose(0, 1).reshape(len(places) * len(self.shapes), -1)
-        solution = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-4, driver="gelsd").solution
-        kernels = torch.zeros(2 * points, channels, dtype=torch.float64)
-        kernels[lags] = solution.view(len(lags), channels)
-        return kernels
+    Of each shape they make what is wanted: (places, modes).
+    """
+    points, channels = windows.shape
+    lags = torch.arange(1 - points, points)
+    source = places[:, None] - lags  # (places, lags)
+    inside = ((source >= 0) & (source < points)).double()
+    source = source.clamp(0, points - 1)
+    seen = shapes[:, source] * inside  # (modes, places, lags)
+    rows = seen[..., None] * windows[source]  # (modes, places, lags, channels)
+    rows = rows.transpose(0, 1).reshape(len(places) * len(shapes), -1)
+    solution = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-4, driver="gelsd").solution
+    kernels = torch.zeros(2 * points, channels, dtype=torch.float64)
+    kernels[lags] = solution.view(len(lags), channels)
+    return kernels
 
 
 def mean_motions(modes: Modes) -> StringModes:

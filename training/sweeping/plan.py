@@ -16,7 +16,7 @@ from typing import Any, Literal
 from engine import bounds
 from engine.schema import SchemaError, read, read_toml
 from training.cell import RECIPE, Cell, Initial, configuration_of
-from training.configuration import TrainingConfiguration
+from training.configuration import Run
 
 PLANS = Path(__file__).parent / "plans"
 LISTS = ("models", "strings", "initials", "rates_hz", "horizons", "seeds")
@@ -60,22 +60,6 @@ class CellBlock:
 
 
 @dataclass(frozen=True)
-class PlannedRun:
-    """A cell and the configuration that fills it."""
-
-    cell: Cell
-    configuration: TrainingConfiguration
-
-    @property
-    def name(self) -> str:
-        return self.cell.name
-
-    @property
-    def digest(self) -> str:
-        return self.configuration.digest
-
-
-@dataclass(frozen=True)
 class Plan:
     """Runs in order of value, each once.
 
@@ -86,7 +70,7 @@ class Plan:
 
     name: str
     description: str
-    runs: tuple[PlannedRun, ...]
+    runs: tuple[Run, ...]
     trial: bool
 
 
@@ -119,10 +103,10 @@ def load_plan(name_or_path: str) -> Plan:
     if not path.is_file():
         raise SchemaError(f"no plan {name_or_path!r}; give a .toml file or one of: {', '.join(plan_names())}")
     file = read(_File, read_toml(path), str(path))
-    runs: dict[str, PlannedRun] = {}
+    runs: dict[str, Run] = {}
     for cell in (cell for block in file.block for cell in block.cells()):
         try:
-            run = PlannedRun(cell, configuration_of(cell, file.data, file.recipe_fields))
+            run = Run(cell.name, cell.recipe, configuration_of(cell, file.data, file.recipe_fields))
         except SchemaError as error:
             raise SchemaError(f"{path}: {error}") from error
         runs.setdefault(run.digest, run)

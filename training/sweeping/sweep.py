@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
-from training.cell import Cell
+from training.configuration import Run
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
 from training.run import default_runs, row_facts
-from training.sweeping.plan import Plan, PlannedRun
-from training.sweeping.task import PROGRESS, Task, TaskRun, Workers, WorkersError, read_progress
+from training.sweeping.plan import Plan
+from training.sweeping.task import PROGRESS, Task, Workers, WorkersError, read_progress
 
 if TYPE_CHECKING:
     from training.fitting.fit import FitProgress
@@ -57,17 +57,19 @@ class Options:
     def left_s(self) -> float:
         return math.inf if self.ends_s is None else self.ends_s - time.monotonic()
 
-    def pieces(self, runs: Iterable[PlannedRun]) -> list[tuple[PlannedRun, ...]]:
+    def pieces(self, runs: Iterable[Run]) -> list[tuple[Run, ...]]:
         """The pieces of work that runs are, each where its first run is."""
-        pieces: dict[Cell, list[PlannedRun]] = {}
+        pieces: dict[str, list[Run]] = {}
         for run in runs:
-            pieces.setdefault(replace(run.cell, seed=0) if self.seeds_at_once else run.cell, []).append(run)
+            recipe = replace(run.configuration.recipe, seed=0)
+            cell = replace(run.configuration, recipe=recipe).digest if self.seeds_at_once else run.digest
+            pieces.setdefault(cell, []).append(run)
         return [tuple(piece) for piece in pieces.values()]
 
-    def task(self, plan: Plan, *runs: PlannedRun) -> Task:
+    def task(self, plan: Plan, *runs: Run) -> Task:
         return Task(
-            runs=tuple(TaskRun(run.name, write(run.configuration), run.digest) for run in runs),
-            recipe=runs[0].cell.recipe,
+            runs=runs,
+            digests=tuple(run.digest for run in runs),
             folder=str(self.runs.absolute()) if self.runs else None,
             group=group_of(plan),
             cache=str(self.cache.absolute()) if self.cache else None,
@@ -80,13 +82,13 @@ class Options:
 class Watch(Protocol):
     """Receives what happens in a sweep."""
 
-    def started(self, run: PlannedRun) -> None:
+    def started(self, run: Run) -> None:
         """A run was handed to the workers."""
 
-    def progressed(self, run: PlannedRun, progress: FitProgress) -> None:
+    def progressed(self, run: Run, progress: FitProgress) -> None:
         """A run is under way."""
 
-    def failed(self, run: PlannedRun, error: str) -> None:
+    def failed(self, run: Run, error: str) -> None:
         """A run has failed and is tried again."""
 
     def finished(self, row: Row) -> None:
@@ -108,7 +110,7 @@ def is_finished(row: Row | None) -> bool:
     return row is not None and row.status in ("done", "diverged")
 
 
-def unfinished(plan: Plan, rows: Iterable[Row]) -> list[PlannedRun]:
+def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
     """The runs that are still to be done, in the plan's order."""
     known = {row.digest: row for row in rows}
     return [run for run in plan.runs if not is_finished(known.get(run.digest))]
@@ -131,7 +133,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
     folder = (options.runs or default_runs()) / group_of(plan)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(options.pieces(unfinished(plan, rows.values())))
-    running: dict[Future[dict[str, Any]], tuple[PlannedRun, ...]] = {}
+    running: dict[Future[dict[str, Any]], tuple[Run, ...]] = {}
     failures: Counter[str] = Counter()  # of pieces by their first run
     while (waiting or running) and options.left_s > 0:
         while waiting and len(running) < workers.capacity():
@@ -175,6 +177,5 @@ def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
         return [], f"its result makes no sense: {refused}"
 
 
-def _failed(run: PlannedRun, error: str) -> Row:
-    facts = row_facts(run.name, run.cell.recipe, run.configuration)
-    return Row(**facts, status="failed", finished=now(), message=error)
+def _failed(run: Run, error: str) -> Row:
+    return Row(**row_facts(run), status="failed", finished=now(), message=error)

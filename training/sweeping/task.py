@@ -7,6 +7,7 @@ the run's folder, where the sweep reads it; a cluster whose folders are out of t
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import threading
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from engine.schema import SchemaError, parse_json, read, write
 from engine.whole_file import whole_file
+from training.configuration import Run
 
 if TYPE_CHECKING:
     from training.fitting.fit import FitProgress
@@ -53,28 +55,20 @@ class Workers:
 
 
 @dataclass(frozen=True)
-class TaskRun:
-    """A run of a task; `configuration` is a TrainingConfiguration, written."""
-
-    name: str
-    configuration: dict[str, Any]
-    digest: str
-
-
-@dataclass(frozen=True)
 class Task:
     """Runs as plain data, so that a worker of another version says so instead of training something else.
 
     Attributes:
         runs: differ in their seeds alone, and are trained step by step together.
+        digests: of the runs, by the code that began the sweep.
         folder, cache: None: the worker's own defaults.
         group: a folder in `folder` for the runs' folders, "" for none.
         device: "cpu", "cuda" or "auto".
         threads: of the CPU, None: as the worker was started.
     """
 
-    runs: tuple[TaskRun, ...]
-    recipe: str
+    runs: tuple[Run, ...]
+    digests: tuple[str, ...]
     folder: str | None = None
     group: str = ""
     cache: str | None = None
@@ -122,40 +116,30 @@ def read_progress(folder: Path) -> FitProgress | None:
 def _train(task: Task) -> list[Row]:
     import torch
 
-    from training.configuration import TrainingConfiguration
-    from training.run import NamedRun, device_of, run_rows
+    from training.run import device_of, run_rows
 
     if task.threads is not None:
         torch.set_num_threads(task.threads)
-    named = []
-    for run in task.runs:
-        configuration = read(TrainingConfiguration, run.configuration, run.name)
-        if configuration.digest != run.digest:
-            raise RuntimeError("this worker's code is of another version than that which began the sweep; update it")
-        named.append(NamedRun(run.name, task.recipe, configuration, report=_reporter(task.folder_of(run.name))))
+    if tuple(run.digest for run in task.runs) != task.digests:
+        raise RuntimeError("this worker's code is of another version than that which began the sweep; update it")
+    written_s: dict[str, float] = {}  # by run, when its progress was written
+
+    def tell(run: Run, progress: FitProgress) -> None:
+        now = time.monotonic()
+        if now - written_s.get(run.name, -math.inf) >= TELL_EVERY_S:
+            written_s[run.name] = now
+            with suppress(OSError), whole_file(task.folder_of(run.name) / PROGRESS) as unfinished:
+                unfinished.write_text(json.dumps(write(progress)), encoding="utf-8")
+
     return run_rows(
-        named,
+        task.runs,
         task.folder_of(""),
+        report=tell,
         cache=Path(task.cache) if task.cache else None,
         device=device_of(task.device),
         waits=lambda: print(f"{task.runs[0].name}: waits: another process trains it", file=sys.stderr, flush=True),
         checkpoint_every_s=task.checkpoint_every_s,
     )
-
-
-def _reporter(folder: Path) -> Callable[[FitProgress], None]:
-    """A function that writes a run's progress now and then."""
-    reported = -TELL_EVERY_S
-
-    def report(progress: FitProgress) -> None:
-        nonlocal reported
-        now = time.monotonic()
-        if now - reported >= TELL_EVERY_S:
-            reported = now
-            with suppress(OSError), whole_file(folder / PROGRESS) as unfinished:
-                unfinished.write_text(json.dumps(write(progress)), encoding="utf-8")
-
-    return report
 
 
 def _leave_if_broken(device: str) -> None:

@@ -1,18 +1,17 @@
 """LLVM code of the kernels' entries as text, without any machine code: `python -m app.export.plugin.texts PART FILE`.
 
-Numba would optimise and emit each function with all that it calls, several times over. Here it stops at its own code,
-which is linked once. The parts are written by processes of their own, at once. A dot is printed for each function.
+Numba stops at its own code, which is linked once. The parts are written by processes of their own, at once. A dot is
+printed for each function.
 """
 
 from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from engine.kernels.numba_internals import stop_before_machine_code
+from engine.kernels.numba_internals import libraries, write_code_alone
 from engine.result_file import explain
 
 PREFIX = "ls_"  # of the entries' names
@@ -22,15 +21,6 @@ PARTS = {
     "playing": ("play", "sound", "sympathise", "begin", "kit_begin", "kit_follow", "kit_prepare"),
 }
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing
-
-
-def _libraries(library: Any, seen: set[int]) -> Iterator[Any]:
-    """A library and all that it calls, each once."""
-    if id(library) not in seen:
-        seen.add(id(library))
-        yield library
-        for callee in library._linking_libraries:
-            yield from _libraries(callee, seen)
 
 
 def _external_entry(name: str) -> Any:
@@ -58,7 +48,7 @@ def _external_entry(name: str) -> Any:
 
 def text(part: str) -> str:
     """LLVM code of all entries of a part together, as Numba has it for the processor of its settings."""
-    stop_before_machine_code()
+    write_code_alone()
     import llvmlite.binding as llvm
     from numba import njit
 
@@ -80,7 +70,7 @@ def text(part: str) -> str:
     for name in PARTS[part]:
         entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
         overload = entry.overloads[entry.signatures[0]]
-        for library in _libraries(overload.library, seen):
+        for library in libraries(overload.library, seen):
             module = library._final_module
             for function in module.functions:
                 if not function.is_declaration and function.linkage not in private:

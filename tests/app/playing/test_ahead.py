@@ -27,7 +27,7 @@ class Ahead4k:
     """Renders voices of the small preset, and notes what is reported of them."""
 
     def __init__(self, lab: Lab) -> None:
-        self.ahead, self.wait = Ahead(self._begin, lambda note, error: self.errors.append(error)), lab.wait
+        self.ahead, self.wait = Ahead(self._begin, self._fail), lab.wait
         self.model = lab.sources.load(lab.small_preset)
         self.begun_s: list[float] = []  # how much was rendered then
         self.errors: list[Exception] = []
@@ -36,6 +36,10 @@ class Ahead4k:
     def _begin(self, note: PluckVoices) -> None:
         note.pending = False
         self.begun_s.append(note.ahead[0].rendered_s)
+
+    def _fail(self, note: PluckVoices, error: Exception) -> None:
+        note.cut = True
+        self.errors.append(error)
 
     def render(
         self, seconds: float = 1.0, from_s: float = 0.0, key: object = None, amplitude_mm: float = 3.0

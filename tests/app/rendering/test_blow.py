@@ -23,7 +23,8 @@ from engine.strike import Strike
 from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
 from engine.values.ear import Ear
-from training.family.drums import StruckDrum, model_player, motion_errors
+from training.family.drums import StruckDrum
+from training.family.motion import model_player, motion_errors
 
 PRESET = SHIPPED / "studio_any_string.safetensors"
 LOADED = Loaded(load_preset(PRESET))
@@ -140,7 +141,7 @@ def test_any_length_of_blocks_gives_the_same(helper: Executor, monkeypatch: pyte
 def test_errors_are_those_over_the_surface(helper: Executor) -> None:
     take = rendered(request_of(TOM), helper)
     resonator, speeds = TOM.resonator(np.zeros((1, 2))), HARD.speeds(TOM)
-    struck = StruckDrum("tom", TOM.drum, resonator, np.zeros(len(TOM)), speeds, TOM.scale**2, 0.1)
+    struck = StruckDrum(resonator, np.zeros(len(TOM)), speeds, TOM.scale**2, 0.1, "tom", TOM.drum)
     players = {"model": model_player(LOADED.preset.model)}
     expected = motion_errors(struck, players, RATE_HZ, take.frames - 1)[0].rel_mse
     assert take.error_course.rel_mse == pytest.approx(expected["model"], rel=0.01)

@@ -381,12 +381,12 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Windo
     assert "inharmonicity" not in tip()
     turned(0.5, 0.1, True)  # before the next key
     guitar.session.play_string()
-    assert not tip()
+    guitar.wait(lambda: not tip())
     guitar.session.play_patch()
     guitar.play(80, hold=True)
     guitar.wait(lambda: "decay time near 3 kHz" in tip())
     guitar.choose("concert_harp")
-    assert not tip()
+    guitar.wait(lambda: not tip())
 
 
 def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_is_dry(

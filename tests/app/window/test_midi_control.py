@@ -19,7 +19,6 @@ from app.playing.midi import MidiChoices
 from app.playing.midi_backend import MidiUnavailable
 from app.playing.midi_port import MidiInput, same_device
 from app.views.dialogs.midi_dialog import MidiDialog
-from app.window import midi_control
 from app.window.midi_control import MidiControl
 from app.window.settings import load_settings
 from tests.app.window.driver import CONTROL, KEY, LEFT, Window, choose, find
@@ -115,7 +114,6 @@ class Desk:
 
 @pytest.fixture
 def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Desk]]:
-    monkeypatch.setattr(midi_control, "LOOK_MS", 5)
     made: list[Desk] = []
 
     def make(names: tuple[str, ...] = (KEYS, PADS), **choices: Any) -> Desk:
@@ -169,9 +167,7 @@ def test_keys_that_an_input_holds_are_released_with_it(desk: Callable[..., Desk]
     assert keys.performed == [] and keys.midi.choices.controllers == {"width": 74}
 
 
-def test_a_controller_is_learned_and_forgotten_in_the_dialog_which_shows_inputs_that_come_and_go(
-    qtbot: QtBot, desk: Callable[..., Desk]
-) -> None:
+def test_a_controller_is_learned_in_the_dialog_and_forgotten_there(qtbot: QtBot, desk: Callable[..., Desk]) -> None:
     keys = desk()
     learn, forget = find(keys.dialog, QPushButton, WIDTH), find(keys.dialog, QPushButton, "Unassign pluck width")
     assert not forget.isEnabled()
@@ -186,10 +182,24 @@ def test_a_controller_is_learned_and_forgotten_in_the_dialog_which_shows_inputs_
     for waits in (True, False):  # thought better of it
         qtbot.mouseClick(learn, LEFT)
         assert learn.isChecked() == waits
+
+
+def test_an_input_that_comes_and_goes_is_reported_shown_and_remembered(
+    qtbot: QtBot, desk: Callable[..., Desk]
+) -> None:
+    keys = desk(names=())
     box = find(keys.dialog, QComboBox, "MIDI input")
-    for names, words, shown in (([PADS], "disconnected", "None"), ([KEYS, PADS], "is connected again", KEYS)):
+    assert "not connected" in keys.said[0] and box.currentText() == "No MIDI input found"
+    for names, words, shown in (([KEYS, PADS], f"{KEYS} is connected again", KEYS), ([PADS], "disconnected", "None")):
         keys.backend.names = names
-        qtbot.waitUntil(lambda: bool(keys.said) and words in keys.said[-1] and box.currentText() == shown)  # noqa: B023
+        keys.midi.look()
+        qtbot.waitUntil(lambda words=words: words in keys.said[-1])
+        qtbot.waitUntil(lambda shown=shown: box.currentText() == shown)
+    assert keys.midi.choices.port == "Keys:Keys 9:0"
+    keys.dialog.port_chosen.emit("Strings")  # a wrong choice is not waited for
+    before, keys.backend.names = len(keys.said), ["Strings"]
+    keys.midi.look()
+    assert len(keys.said) == before
 
 
 @pytest.mark.parametrize("number", [64, 101, 123])

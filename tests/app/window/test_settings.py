@@ -22,7 +22,6 @@ from app.patches.library import SHIPPED as PATCHES
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
-from app.window import remembering
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
 
@@ -144,7 +143,6 @@ class Desk:
 def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(remembering, "LOOK_EVERY_MS", 10**8)
     owner, path, folder = QObject(), tmp_path / "settings.json", tmp_path / "folder"
     desk = Desk(path, owner)
     desk.place(0.41)
@@ -179,6 +177,9 @@ application = QCoreApplication([])
 box = [Settings()]
 keeper = SettingsSaver(Path(sys.argv[1]), box[0], lambda: box[0], application)
 QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(position=0.41))))
+looks = QTimer(interval=100)
+looks.timeout.connect(keeper.look)
+looks.start()
 application.exec()
 """
 

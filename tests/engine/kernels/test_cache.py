@@ -66,4 +66,4 @@ def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:
     warm.voices()
-    warm.models()
+    warm.apart()

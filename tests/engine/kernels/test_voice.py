@@ -297,7 +297,7 @@ def test_it_begins_at_its_frame_and_is_released_at_its_quantum(frame: int) -> No
     voice = constant()
     voice.begin_at(frame)
     voice.release_at(1000)
-    assert voice.waits
+    assert not voice.sounding
     found = mixer_of(voice).render(2048 + FADE)[:, 0]
     assert int(np.argmax(found != 0)) == frame == voice.began_frame
     end = (1000 - frame + QUANTUM - 1) // QUANTUM * QUANTUM + frame

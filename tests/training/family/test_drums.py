@@ -8,14 +8,12 @@ from engine.presets import SHIPPED, load_preset
 from training.family.drums import (
     DrumError,
     draw_drum,
-    linear_drum,
     measure_drum,
     measure_drums,
-    model_player,
     store,
     summary,
-    untrained_player,
 )
+from training.family.motion import linear_motion, model_player, untrained_player
 
 RATE_HZ = 48_000
 
@@ -23,7 +21,7 @@ RATE_HZ = 48_000
 @pytest.fixture(scope="module")
 def errors() -> list[DrumError]:
     model = load_preset(SHIPPED / "studio_any_string.safetensors").model
-    players = {"model": model_player(model), "series": untrained_player("series"), "linear": linear_drum}
+    players = {"model": model_player(model), "series": untrained_player("series"), "linear": linear_motion}
     found: list[DrumError] = []
     for seed in range(2):
         for number in (4, 5, 10, 11):  # plates: few modes
@@ -50,7 +48,7 @@ def test_a_measurement_continues(tmp_path: Path) -> None:
 
     def counted(struck, rate_hz):  # type: ignore[no-untyped-def]
         calls.append(rate_hz)
-        return linear_drum(struck, rate_hz)
+        return linear_motion(struck, rate_hz)
 
     checkpoint = tmp_path / "runs" / "drums.csv"
     measure_drums({"linear": counted}, 1, 0, 8_000, 5, checkpoint)

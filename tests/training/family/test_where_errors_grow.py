@@ -36,7 +36,7 @@ def error(model: KoopmanTension, ranges: StringFamily, shape: Shape | None = Non
     for number in range(STRINGS):
         plucked = draw_from(ranges, np.random.default_rng(number), shape)
         truth = solve(plucked, RATE_HZ, STEPS)
-        found.append((play(plucked, RATE_HZ, STEPS) - truth).square().sum() / truth.square().sum())
+        found.append((play(plucked, RATE_HZ)(STEPS) - truth).square().sum() / truth.square().sum())
     return geometric_mean(torch.stack(found))
 
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,13 +14,13 @@ from engine.compare.relative import RelativeError
 from engine.models.dmd import DMD
 from tests.training.fits import fit
 from training.cell import Cell, configuration_of
-from training.configuration import Recipe, TrainingConfiguration
+from training.configuration import Recipe, Run, TrainingConfiguration
 from training.data.batches import Batch
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Diverged, FitProgress, Seed, fit_seeds, horizon_at, learning_rate_at
+from training.fitting.fit import Diverged, FitProgress, fit_seeds, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
 from training.fitting.start import new_model
 
@@ -44,6 +44,10 @@ def small(model: str, recipe: str = "ours", horizon: int = 40, **changes: Any) -
     by_hand = {"start": "paper"} if (model, recipe) in (("fgru", "ours"), ("frnn", "ours")) else {}
     configuration = configuration_of(cell, DATA, {**QUICK, **by_hand, **changes})
     return replace(configuration, model_configuration=SMALL.get(model, {}))
+
+
+def named(configurations: Sequence[TrainingConfiguration]) -> list[Run]:
+    return [Run(str(number), "", configuration) for number, configuration in enumerate(configurations)]
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -192,7 +196,7 @@ def test_a_checkpoint_of_another_version_or_configuration_is_refused(small_datas
         (lambda data: Recipe(epochs=1, latent_polish=1), "latent_polish needs latent_epochs"),
         (lambda data: new_model(replace(small("koopman"), model_configuration=HUGE), 1.0), "lower its widths"),
         (
-            lambda data: fit_seeds([Seed(small("koopman", epochs=n), Path(str(n))) for n in (2, 3)], data),
+            lambda data: fit_seeds(named([small("koopman", epochs=n) for n in (2, 3)]), data, Path()),
             "differ in their seeds alone",
         ),
     ],
@@ -314,22 +318,23 @@ def test_a_seed_trained_with_others_is_the_seed_alone(
     if (model, recipe) == ("koopman", "ours"):
         changes |= {"latent_epochs": 5, "latent_polish": 1}
     configurations = [small(model, recipe, horizon, seed=seed, **changes) for seed in range(2)]
-    losses: dict[str, list[list[float]]] = {"alone": [], "together": []}
+    seeds = named(configurations)
+    losses: dict[str, dict[str, list[float]]] = {
+        way: {run.name: [] for run in seeds} for way in ("alone", "together")
+    }
 
-    def seeds(way: str) -> list[Seed]:
-        found = []
-        for configuration in configurations:
-            own: list[float] = []
-            losses[way].append(own)
-            folder = runs / way / str(configuration.recipe.seed)
-            found.append(Seed(configuration, folder, lambda p, own=own: own.append(p.loss) if p.ends_epoch else None))  # type: ignore[misc]
-        return found
+    def train(way: str, *chosen: Run) -> None:
+        def follow(run: Run, progress: FitProgress) -> None:
+            losses[way][run.name] += [progress.loss] if progress.ends_epoch else []
 
-    for seed in seeds("alone"):
-        fit_seeds([seed], small_dataset)
-    fit_seeds(seeds("together"), small_dataset)
-    assert [len(own) for own in losses["together"]] == [epochs] * 2
-    torch.testing.assert_close(torch.tensor(losses["together"]), torch.tensor(losses["alone"]), rtol=1e-5, atol=0)
+        fit_seeds(chosen, small_dataset, runs / way, report=follow)
+
+    for seed in seeds:
+        train("alone", seed)
+    train("together", *seeds)
+    alone, together = (list(of_way.values()) for of_way in losses.values())
+    assert [len(own) for own in together] == [epochs] * 2
+    torch.testing.assert_close(torch.tensor(together), torch.tensor(alone), rtol=1e-5, atol=0)
 
 
 @pytest.mark.usefixtures("mapped")
@@ -339,9 +344,7 @@ def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monk
     monkeypatch.setattr(
         module.together, "backward", lambda models, *rest: passes.append(len(models)) or together(models, *rest)
     )
-    fit_seeds(
-        [Seed(small("s5", "published", steps_per_batch=0, seed=n), runs / str(n)) for n in range(2)], small_dataset
-    )
+    fit_seeds(named([small("s5", "published", steps_per_batch=0, seed=n) for n in range(2)]), small_dataset, runs)
     assert passes == [2] * 8
 
 
@@ -353,7 +356,7 @@ def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs
     with pytest.raises(KeyboardInterrupt):
         fit(configurations[0], small_dataset, ahead, report=cut_after(2), checkpoint_every_s=-1)
     for way in ("whole", "cut"):
-        fit_seeds([Seed(c, runs / way / str(n)) for n, c in enumerate(configurations)], small_dataset)
+        fit_seeds(named(configurations), small_dataset, runs / way)
     for n in range(2):
         whole, cut = (weights(runs / way / str(n)) for way in ("whole", "cut"))
         for name, weight in whole.items():
@@ -372,7 +375,7 @@ def test_a_seed_that_diverges_leaves_the_others(
         return error * math.inf if model is first[0] else error
 
     monkeypatch.setattr(module, "backward", broken)
-    broke, well = fit_seeds([Seed(small("koopman_var", seed=n), runs / str(n)) for n in range(2)], small_dataset)
+    broke, well = fit_seeds(named([small("koopman_var", seed=n) for n in range(2)]), small_dataset, runs)
     assert isinstance(broke, Diverged)
     assert not isinstance(well, Diverged)
     assert well.epochs == 4

@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
+from training.configuration import Run
 from training.results import Row
-from training.sweeping.plan import Plan, PlannedRun, load_plan
+from training.sweeping.plan import Plan, load_plan
 from training.sweeping.sweep import Options
-from training.sweeping.task import Task, TaskRun
+from training.sweeping.task import Task
 
 PLAN = """
 description = "Tiny."
@@ -68,7 +69,7 @@ def task(plan, options: Options) -> Task:
     return options.task(made, made.runs[0])
 
 
-def row_of(run: PlannedRun | TaskRun, **changes: Any) -> Row:
+def row_of(run: Run, **changes: Any) -> Row:
     fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
     fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "finished": "2026-01-01T00:00:00Z"}
     return Row(run.digest, run.name, **(fields | changes))

@@ -111,7 +111,7 @@ def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name: str) -> 
 
 def counts_of(name: str) -> Counter[tuple[str, int, str]]:
     runs = load_plan(name).runs
-    return Counter((run.cell.model, run.cell.horizon, run.cell.recipe) for run in runs)
+    return Counter((run.configuration.model, run.configuration.steps, run.recipe) for run in runs)
 
 
 def test_committed_plans_are_whole() -> None:
@@ -123,7 +123,7 @@ def test_committed_plans_are_whole() -> None:
         ("koopman_var", 4000, "published"): 4 * 3,
         ("koopman_var", 400, "paper"): 4 * 3,
     }
-    first = [run.cell for run in load_plan("published").runs[:5]]
+    first = [Cell.parse(run.name) for run in load_plan("published").runs[:5]]
     assert first == [Cell("koopman_var", True, "noise", 4000, 400, "published", seed) for seed in range(5)]
     # the paper's: eight data sets, two horizons, five seeds; the Fourier models over 400 frames alone, one DMD
     expected = {(model, n, "paper"): 8 * 5 for model in models for n in (400, 4000)}
@@ -136,5 +136,5 @@ def test_committed_plans_are_whole() -> None:
     assert found == expected and {model for model, *_ in expected} == MODELS.keys() - OF_MANY_STRINGS
     assert sum(blind.values()) == 2 * 8
     # one seed of ours everywhere before two anywhere
-    seeds = [run.cell.seed for run in load_plan("tables").runs if run.cell.recipe == "ours"]
+    seeds = [run.configuration.recipe.seed for run in load_plan("tables").runs if run.recipe == "ours"]
     assert seeds.index(1) == seeds.count(0)

@@ -17,12 +17,13 @@ from filelock import FileLock
 
 from engine.schema import SchemaError, read, write
 from tests.training.sweeping.conftest import plan_in, row_of
+from training.configuration import Run
 from training.fitting.fit import FitProgress
 from training.results import Row, add_rows, read_results
 from training.sweeping.plan import Plan
 from training.sweeping.processes import Layout, fitted, process_workers
 from training.sweeping.sweep import Options, Watch, is_finished, sweep, unfinished
-from training.sweeping.task import Task, TaskRun, Workers, WorkersError, perform
+from training.sweeping.task import Task, Workers, WorkersError, perform
 
 MEASURED = [name for name in Row.__dataclass_fields__ if name not in ("seconds", "finished", "commit")]
 
@@ -51,7 +52,7 @@ class Script:
     description = "a script"
 
     def __init__(
-        self, outcome: Callable[[TaskRun, int], Row | str], capacity: int = 3, wrong: dict[str, Any] | None = None
+        self, outcome: Callable[[Run, int], Row | str], capacity: int = 3, wrong: dict[str, Any] | None = None
     ) -> None:
         self._outcome = outcome
         self._wrong = wrong or {}  # values of every row
@@ -86,7 +87,7 @@ def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, option
 
     over = threading.Event()
 
-    def outcome(run: TaskRun, tries: int) -> Row:
+    def outcome(run: Run, tries: int) -> Row:
         if run.name == made.runs[1].name:
             over.wait()
         return row_of(run)
@@ -106,7 +107,7 @@ def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, 
     made = plan()
     together = threading.Barrier(3)
 
-    def outcome(run: TaskRun, tries: int) -> Row:
+    def outcome(run: Run, tries: int) -> Row:
         if run.name in [each.name for each in made.runs[:3]]:
             together.wait(timeout=60)
         return row_of(run)
@@ -123,7 +124,7 @@ def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(pl
     made = plan()
     worst, unlucky = made.runs[0].name, made.runs[2].name
 
-    def outcome(run: TaskRun, tries: int) -> Row | str:
+    def outcome(run: Run, tries: int) -> Row | str:
         if run.name == worst or (run.name == unlucky and tries == 1):
             return f"OSError: try {tries}"
         return row_of(run)
@@ -150,7 +151,7 @@ def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, 
     done = made.runs[0]
     add_rows(options.results, [row_of(done)])  # seed 0 of the first cell
 
-    def outcome(run: TaskRun, tries: int) -> Row | str:
+    def outcome(run: Run, tries: int) -> Row | str:
         return f"OSError: try {tries}" if run.name == unlucky else row_of(run)
 
     workers, watch = Script(outcome, capacity=1), Record()
@@ -168,7 +169,7 @@ def test_what_diverged_is_a_result(plan, options: Options) -> None:
     nothing = Script(lambda run, tries: "not to be run")
     sweep(plan(), nothing, options, Mock())
     assert nothing.started == []
-    assert is_finished(row_of(TaskRun("a", {}, "a"))) and not is_finished(None)
+    assert is_finished(row_of(plan().runs[0])) and not is_finished(None)
 
 
 def test_workers_that_are_gone_end_the_sweep(plan, options: Options) -> None:
@@ -190,7 +191,7 @@ def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, opti
     made = plan()
     last = made.runs[-1]
 
-    def outcome(run: TaskRun, tries: int) -> Row:
+    def outcome(run: Run, tries: int) -> Row:
         add_rows(options.results, [row_of(last, rel_mae=0.25)])
         return row_of(run)
 
@@ -312,7 +313,7 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
 
 
 def test_a_process_that_died_between_two_tasks_is_replaced() -> None:
-    wrong = {"runs": [], "recipe": "ours", "threads": "two"}
+    wrong = {"runs": [], "digests": [], "threads": "two"}
     with process_workers(here(1)) as workers:
         assert "task.threads" in workers.submit(wrong).result()["error"]
         (process,) = multiprocessing.active_children()
