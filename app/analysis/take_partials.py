@@ -90,7 +90,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
 def _model_modes(take: Take, steps: int, block: int) -> Iterator[Array]:
     """The model's modal amplitudes in m, (1, up to `block`, modes), of frames 1 … steps."""
     info, source = take.info, take.model
-    if source is None or not source.any_frame:  # the take holds every frame
+    if source is None or take.stride == 1:  # the take holds every frame
         motion = take.motions["model"]
         for first in range(1, steps + 1, block):
             frames = motion.read(first, min(first + block, steps + 1))

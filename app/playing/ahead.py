@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import math
 import threading
-import time
-from collections import OrderedDict
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.rendering.motion import ModelMotion, give
 from app.shared.thread_priority import Rank, lower_priority
-from engine.resonators.base import Array
-from engine.sources import ModelSource, Runaway
-from engine.voices import Voice, render_samples
-from engine.voices.offline import AHEAD_FIRST
+from engine.voices import Voice
+from engine.voices.offline import FIRST_FRAMES
 
 if TYPE_CHECKING:
     from app.playing.note import PluckVoices
@@ -29,87 +26,72 @@ LEAST_S = 0.06  # rendered before it begins
 SAFE_S = 0.25  # lead of voices that sound, above which one that has not begun goes first
 CARE = 0.75  # the part of the measured speed that is counted on, for the load may rise
 SILENT = 1e-5  # of full scale
-KEPT = 32  # plucks that need not be rendered again
 
 
 class AheadSamples:
     """The samples of a note's voice, rendered ahead.
 
     Args:
-        key: what the samples depend on; they are kept by it.
+        motion: of which they are; let go with the last of them.
         from_s: where in its motion the note will begin.
 
     Attributes:
-        blocks: of the samples so far; done: their number.
+        given: their number so far.
+        finished: there will be no more.
         ready: enough is rendered for the note to begin.
-        ran_away: the model did; its voice ends before.
     """
 
-    def __init__(
-        self, voice: Voice, source: ModelSource, initial_m: Array, key: tuple[object, ...], from_s: float = 0.0
-    ) -> None:
-        self.voice, self.key = voice, key
-        self._from_s, self._rate_hz = from_s, source.rate_hz
-        self._rest = render_samples(voice, source, initial_m)
-        self.blocks: list[NDArray[np.float32]] = []
-        self.done = 0
-        self.finished = self.ready = self.ran_away = False
-        self._spent_s = 0.0
+    def __init__(self, voice: Voice, motion: ModelMotion, from_s: float = 0.0) -> None:
+        self.voice = voice
+        self._motion: ModelMotion | None = motion
+        self._rate_hz, self._total_s, self._from_s = motion.rate_hz, motion.frames / motion.rate_hz, from_s
+        self._blocks: list[NDArray[np.float32]] = []
+        self.given = 0
+        self.ready = False
+
+    @property
+    def finished(self) -> bool:
+        return self._motion is None
 
     @property
     def rendered_s(self) -> float:
-        return self.done / self._rate_hz
+        return self.given / self._rate_hz
 
     @property
-    def speed(self) -> float:
-        """Seconds of sound in a second of rendering, without the first, short block; 0 before there is another."""
-        frames = self.done - 1 - AHEAD_FIRST
-        return frames / self._rate_hz / self._spent_s if frames > 0 and self._spent_s > 0 else 0.0
+    def _speed(self) -> float:
+        """As of the motion, 0 where it is not known."""
+        return 0.0 if self._motion is None else self._motion.speed
 
     @property
     def wanted_s(self) -> float:
         """The seconds that must be rendered before it begins."""
-        total_s = (self.done + self.voice.room) / self._rate_hz
-        least_s = min(self._from_s + LEAST_S, total_s)
-        return max(least_s, total_s - (total_s - self._from_s) * CARE * self.speed) if self.speed else least_s
+        least_s = min(self._from_s + LEAST_S, self._total_s)
+        return max(least_s, self._total_s - (self._total_s - self._from_s) * CARE * self._speed)
 
     @property
     def waits_s(self) -> float:
         """The seconds until it is ready; 0 where it is, or the speed is not known yet."""
-        if self.ready or not self.speed:
-            return 0.0
-        return max(0.0, (self.wanted_s - self.rendered_s) / self.speed)
+        speed = self._speed
+        return 0.0 if self.ready or not speed else max(0.0, (self.wanted_s - self.rendered_s) / speed)
 
     def render(self) -> None:
         """Render the next block; `finished` after the last one."""
-        began_s = time.monotonic()
-        try:
-            block = next(self._rest)
-        except Runaway:
-            self.finished = self.ready = self.ran_away = True
+        if (motion := self._motion) is None:
             return
-        self.blocks.append(block)
-        self.done += len(block)
-        if not self.voice.room or (self.done > AHEAD_FIRST and float(np.abs(block).max()) < SILENT):
-            self._finish()
-        if self.done > 1 + AHEAD_FIRST:
-            self._spent_s += time.monotonic() - began_s
-        self.ready = self.ready or bool(self.speed and self.rendered_s >= self.wanted_s)
-
-    def take(self, samples: NDArray[np.float32]) -> None:
-        """Take all samples, (frames, channels), which are known from an earlier pluck."""
-        self.voice.append(samples)
-        self.blocks, self.done = [samples], len(samples)
-        self._finish()
+        motion.render(self.given + 1)
+        block = give(self.voice, motion, self.given)
+        self._blocks.append(block)
+        self.given += len(block)
+        silent = self.given > FIRST_FRAMES and float(np.abs(block).max(initial=0.0)) < SILENT
+        self.ready = self.ready or bool(motion.speed and self.rendered_s >= self.wanted_s)
+        if silent or not self.voice.room or motion.ends is not None:
+            self.voice.end_here()
+            self.ready, self._motion = True, None
 
     def level(self, seconds: float) -> float:
         """Root mean square of the first seconds of it."""
-        first = np.concatenate(self.blocks)[: round(seconds * self._rate_hz)]
+        first = np.concatenate(self._blocks)[: round(seconds * self._rate_hz)]
         return math.sqrt(float(np.square(first, dtype=np.float64).mean()))
-
-    def _finish(self) -> None:
-        self.voice.end_here()
-        self.finished = self.ready = True
 
 
 class Ahead:
@@ -126,16 +108,12 @@ class Ahead:
         self._begin, self._failed = begin, failed
         self._mailbox = threading.Condition()
         self._notes: list[PluckVoices] = []
-        self._known: OrderedDict[tuple[object, ...], NDArray[np.float32]] = OrderedDict()
         self._closing = False
         self._thread: threading.Thread | None = None
 
     def render(self, note: PluckVoices) -> None:
-        """Begin a note, and render the rest of it while it sounds; the samples of a pluck that is known are there."""
+        """Begin a note once it can, and render the rest of it while it sounds."""
         with self._mailbox:
-            for samples in note.ahead:
-                if (known := self._known.get(samples.key)) is not None:
-                    samples.take(known)
             self._notes.append(note)
             self._mailbox.notify()
             if self._thread is None:
@@ -169,13 +147,7 @@ class Ahead:
     def _advance(self, note: PluckVoices) -> None:
         """Render a block of a note's samples, those of which there are fewest; begin the note once it can."""
         if unfinished := note.unfinished:
-            samples = min(unfinished, key=lambda samples: samples.rendered_s)
-            samples.render()
-            if samples.finished and not samples.ran_away:
-                with self._mailbox:
-                    self._known[samples.key] = np.concatenate(samples.blocks)
-                    while len(self._known) > KEPT:
-                        self._known.popitem(last=False)
+            min(unfinished, key=lambda samples: samples.rendered_s).render()
         if note.pending and note.ahead and all(samples.ready for samples in note.ahead):
             self._begin(note)
 

@@ -425,11 +425,7 @@ class Notes:
             voice.begin_at(note.begin_frame)
             if voice.program.rendered:
                 voice.fade_out_by(request.seconds)  # behind it there are no samples
-                initial_m, key = (
-                    loaded.initial_m(request.pluck),
-                    (subject, request.pluck, request.ear, request.seconds),
-                )
-                ahead.append(AheadSamples(voice, loaded.model, initial_m, key, note.from_s))
+                ahead.append(AheadSamples(voice, loaded.motion(request.pluck, request.seconds), note.from_s))
         note.voices, note.ahead = voices, ahead
         if ahead:
             self._ahead.render(note)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 from app.rendering.line import BLOCK_FRAMES, SourceLine
 from app.rendering.rendering import Rendering, RenderRequest
 from app.rendering.strobe import Strobe
-from app.rendering.take import SOURCES, Listened, Pictures, Take
+from app.rendering.take import SOURCES, Listened, Take
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
-from engine.sources import ModelSource
 from engine.values.ear import Ear
 
-PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 
 
@@ -38,9 +34,10 @@ class PluckJob(Rendering[RenderRequest, Take]):
 
     def _begin(self) -> Take:
         request, loaded = self.request, self._load(self.request.preset)
-        info, stride = loaded.preset.info, _stride(loaded.model)
+        info, stride = loaded.preset.info, loaded.stride
         take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
-        self._lines = {name: SourceLine(take, name, loaded, take.motions[name], stride) for name in SOURCES}
+        self._lines = {name: SourceLine(take, name, loaded) for name in SOURCES}
+        take.motions.update({name: line.motion for name, line in self._lines.items()})
         take.listened = self._listened(request.ear)
         return take
 
@@ -50,19 +47,17 @@ class PluckJob(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride, loaded = take.info, take.stride, None
             try:
-                other = self._load(path)
-                info, stride, loaded = other.preset.info, _stride(other.model), other
+                line = SourceLine(take, name, self._load(path))
             except (PresetError, ValueError) as error:
                 self._listener.other_failed(path.stem, str(error))
-            motion = Pictures(info.rate_hz / stride, info.grid_points, take.seconds)
-            line = self._lines[name] = SourceLine(take, name, loaded, motion, stride)
+                line = SourceLine(take, name, None)
+            self._lines[name] = line
             if self._strobe is not None:
                 line.show(self._strobe)
             listened = self._coming or take.listened
             listened.signals[name] = line.listen(listened.ear)
-            take.motions[name] = motion
+            take.motions[name] = line.motion
 
     def _show(self, take: Take) -> None:
         """Begin new flashes where the slow motion has changed; flashes that are under way are finished first."""
@@ -113,8 +108,3 @@ class PluckJob(Rendering[RenderRequest, Take]):
 
     def _source_names(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
-
-
-def _stride(model: ModelSource) -> int:
-    """Samples between pictures; 1 for a model that must step through every frame, which are then all kept."""
-    return math.ceil(model.rate_hz / PICTURE_HZ) if model.any_frame else 1

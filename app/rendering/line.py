@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering.listening import Listening
+from app.rendering.listening import BEYOND, Listening
+from app.rendering.motion import ModelMotion
 from app.rendering.strobe import Flashes, Strobe
 from app.rendering.subject import Loaded
 from app.rendering.take import Pictures, Signal, Take
@@ -22,24 +23,29 @@ class SourceLine:
     Args:
         name: of the source.
         loaded: its preset; None for a string at rest.
-        motion: filled with the pictures, `stride` samples apart.
 
     Attributes:
+        motion: the pictures.
+        stride: samples between two pictures.
         frames: samples in all, the initial displacement first.
         done: samples whose pictures have been rendered.
     """
 
-    def __init__(self, take: Take, name: str, loaded: Loaded | None, motion: Pictures, stride: int) -> None:
+    def __init__(self, take: Take, name: str, loaded: Loaded | None) -> None:
         self.rate_hz = take.rate_hz if loaded is None else loaded.preset.info.rate_hz
-        self.stride = stride
-        self.motion = motion
+        self.stride = take.stride if loaded is None else loaded.stride
         self.frames = int(take.seconds * self.rate_hz + 1e-6) + 1
         self._take = take
         self._name = name
         self._loaded = loaded
         self._source = None if loaded is None else loaded.source(name)
-        self._initial = np.zeros((1, motion.places)) if loaded is None else loaded.initial_m(take.pluck)[None]
-        self._pictures = _Frames(self._source, self._initial)
+        points = take.info.grid_points
+        self._initial = np.zeros((1, points)) if loaded is None else loaded.initial_m(take.pluck)[None]
+        self.motion = Pictures(self.rate_hz / self.stride, self._initial.shape[1], take.seconds)
+        self._pictures: _Frames | _EveryFrame = _Frames(self._source, self._initial)
+        if loaded is not None and name != "truth" and loaded.steps:
+            self.motion = loaded.motion(take.pluck, take.seconds)
+            self._pictures = _EveryFrame(self.motion)
         self._flashes: Flashes | None = None
         self._shown: _Frames | None = None  # renders flashes that were requested after the pictures
         self._listening: Listening | None = None  # until its signal is complete
@@ -84,8 +90,9 @@ class SourceLine:
             signal.end_in_silence()
             self._listening = None
         else:
-            motion = None if self._source.any_frame else self.motion
-            self._listening = Listening(signal, self._loaded, self._name, self._take.pluck, ear, motion)
+            seconds = (signal.frames + BEYOND) / signal.rate_hz
+            voice = self._loaded.voice(self._name, self._take.pluck, ear, signal.rate_hz, seconds)
+            self._listening = Listening(signal, voice, self.motion)
         return signal
 
     def advance(self, samples: int) -> None:
@@ -101,7 +108,8 @@ class SourceLine:
             frames = self._pictures.take(union, stop)
             if flashes is not None and joint:
                 flashes.take(stop, union, frames)
-            self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
+            if isinstance(self._pictures, _Frames):
+                self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
         if self._shown is not None and flashes is not None:
             self._catch_up(self._shown, flashes, max(samples, BLOCK_FRAMES * self.stride))
         if self._listening is not None:
@@ -115,6 +123,24 @@ class SourceLine:
         flashes.take(stop, numbers, frames.take(numbers, stop))
         if stop == self.done:
             self._shown, self.motion.flashes = None, flashes
+
+
+class _EveryFrame:
+    """The frames of a model that steps through all of them; attributes as of `_Frames`."""
+
+    def __init__(self, motion: ModelMotion) -> None:
+        self._motion = motion
+        self.done = 0
+
+    @property
+    def ends(self) -> int | None:
+        return self._motion.ends
+
+    def take(self, numbers: NDArray[np.int64], stop: int) -> NDArray[np.float32]:
+        """Frames as of `_Frames`."""
+        self._motion.render(stop)
+        self.done = stop
+        return self._motion.read()[numbers]
 
 
 class _Frames:

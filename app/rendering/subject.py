@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
+from app.rendering.motion import ModelMotion
 from engine.pluck import Pluck
 from engine.presets import Preset, load_preset
 from engine.presets.of_string import of_string
@@ -16,6 +18,9 @@ from engine.sources import ModelSource, StringSource, TruthSource
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
 from engine.voices import Program, Voice, model_program, truth_program
+
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
+KEPT_MOTIONS = 2  # of a preset, the latest: 19 MB each for 3 s at 16 kHz
 
 
 @dataclass(frozen=True)
@@ -56,11 +61,12 @@ def string_of(subject: Subject) -> StringParameters | None:
 class Loaded:
     """Model and truth of a preset with the programs of their voices, each made when first used; for any thread.
 
-    What is heard and what is drawn are voices of these. Sources and programs have no state: all plucks share them.
+    Sounds and pictures are both made from these voices. Sources and programs have no state: all plucks share them.
     """
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
+        self.motion = lru_cache(maxsize=KEPT_MOTIONS)(self._motion)  # of the model, where that steps
         self._lock = threading.Lock()
         self._programs: dict[tuple[bool, int], Program] = {}  # by whether it is the truth's, and rate
 
@@ -72,6 +78,16 @@ class Loaded:
     @cached_property
     def truth(self) -> TruthSource:
         return TruthSource(self.preset.info)
+
+    @property
+    def steps(self) -> bool:
+        """Return True if the model steps through every frame; those of one without a compiled voice are its sound."""
+        return not self.model.any_frame or self.program("model", self.preset.info.rate_hz).rendered
+
+    @property
+    def stride(self) -> int:
+        """Samples between two pictures of a motion; 1 for a model that steps, all of whose frames are kept."""
+        return 1 if self.steps else math.ceil(self.preset.info.rate_hz / PICTURE_HZ)
 
     def source(self, name: str) -> StringSource:
         """The truth, or for any other name the model."""
@@ -87,6 +103,9 @@ class Loaded:
                     program = truth_program(preset.info, rate_hz) if key[0] else model_program(preset, rate_hz)
                     self._programs[key] = program
         return program
+
+    def _motion(self, pluck: Pluck, seconds: float) -> ModelMotion:
+        return ModelMotion(self.model, self.initial_m(pluck), seconds)
 
     def sounds_at(self, rate_hz: int) -> bool:
         """Return True if the programs of both sources are there."""

@@ -73,7 +73,7 @@ DRUMS_PLAYED = (
 
 @dataclass
 class Duty:
-    """What the window's timer does from time to time."""
+    """A task that the window's timer does from time to time."""
 
     every_s: float
     do: Callable[[], object]

@@ -453,10 +453,8 @@ class PatchDesk(BrowserDesk):
             outside = "; ".join(outside_of_key(entry.info, patch, note.event, note.string))
         elif entry is not None and note is not None and choices.string is not None:
             outside = outside_of_shown(choices, entry)
-        error = math.nan
-        if isinstance(stage.take, Take) and stage.complete and not is_turned:
-            error = stage.take.error
-        self._window.show_outside(*judged(outside, error))
+        measured = stage.take if isinstance(stage.take, Take) and stage.complete and not is_turned else None
+        self._window.show_outside(*judged(outside, math.nan if measured is None else measured.error))
 
     def _show_string(self, patch: Patch) -> None:
         """Show the string or the drum in figures, or why there is none."""

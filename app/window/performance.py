@@ -38,34 +38,15 @@ from engine.plain_text import name_text
 GROWN = 3.0  # times the preset's own error, from which an error has grown
 
 
-class RenderSignals(QObject):
-    """The `RenderListener` of the window: calls of other threads become signals, which Qt queues for its thread."""
-
-    started = Signal(object)  # Take or BlowTake
-    finished = Signal(object)  # the same
-    other_refused = Signal(str, str)  # name of the preset, message
-    failed = Signal(str, str)  # message, details
-    refused = Signal(str, str)  # a pluck cannot be played: message, details
-
-    def take_started(self, take: Take | BlowTake) -> None:
-        self.started.emit(take)
-
-    def take_finished(self, take: Take | BlowTake) -> None:
-        self.finished.emit(take)
-
-    def other_failed(self, preset: str, message: str) -> None:
-        self.other_refused.emit(preset, message)
-
-    def render_failed(self, message: str, detail: str) -> None:
-        self.failed.emit(message, detail)
-
-
 class Performance(QObject):
     """The owner of the notes and the render worker. Times are in s from the pluck or blow.
 
     Attributes:
         compared: a blind test is open: no other note begins, and all is heard without body and room.
     """
+
+    _reported = Signal(str, str)  # a notice and its details, from any thread
+    _rendered = Signal(object, bool)  # from the worker's thread: a take, and whether all of it is; None: it failed
 
     def __init__(
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
@@ -79,15 +60,11 @@ class Performance(QObject):
         self.compared = False
         self._turn: tuple[Note, Note] | None = None  # of a loop: what rings, and what waits for its end
         self._waiting_words = self._error_words = ""
-        mail = self._mail = RenderSignals()
-        mail.started.connect(self._take_started)
-        mail.finished.connect(self._take_finished)
-        mail.other_refused.connect(self._other_refused)
-        mail.failed.connect(self._render_failed)
-        mail.refused.connect(self._window.notices.report)
+        self._reported.connect(window.notices.report)
+        self._rendered.connect(self._take_rendered)
         self._sources = Sources()
-        self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
-        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
+        self.notes = Notes(sound, self._sources, library.find, self._reported.emit, sound.set_effects)
+        self._worker = RenderWorker(self, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -303,11 +280,32 @@ class Performance(QObject):
                 self.notes.keys.recorder.cancel(turn.event)
             note.release_at(0)
 
-    # Signals of the render worker
+    # As the `RenderListener`, in the worker's thread
 
-    def _take_started(self, take: Take | BlowTake) -> None:
-        if not self._is_of_chosen(take):  # overtaken
-            return
+    def take_started(self, take: Take | BlowTake) -> None:
+        self._rendered.emit(take, False)
+
+    def take_finished(self, take: Take | BlowTake) -> None:
+        self._rendered.emit(take, True)
+
+    def other_failed(self, preset: str, message: str) -> None:
+        self._reported.emit(f"{preset} cannot be heard beside this preset: {message}", "")
+
+    def render_failed(self, message: str, detail: str) -> None:
+        self._rendered.emit(None, False)
+        self._reported.emit(message, detail)
+
+    # What has been rendered
+
+    def _take_rendered(self, take: Take | BlowTake | None, complete: bool) -> None:
+        if take is None:
+            self._show_error("")
+        elif complete:
+            self._finish(take)
+        elif self._is_of_chosen(take):  # else overtaken
+            self._begin(take)
+
+    def _begin(self, take: Take | BlowTake) -> None:
         is_shown = take is self._session.stage.take
         self._session.send(Rendered(take))
         if not is_shown:
@@ -316,7 +314,7 @@ class Performance(QObject):
                     panel.take_started(take)
             self._show_error("Rendering …")
 
-    def _take_finished(self, take: Take | BlowTake) -> None:
+    def _finish(self, take: Take | BlowTake) -> None:
         if take is not self._session.stage.take or self._session.stage.complete:
             return
         self._session.send(Rendered(take, complete=True))
@@ -331,13 +329,6 @@ class Performance(QObject):
         parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
         growth = growth_words(errors, take.info.rel_mae)
         self._show_error("Error of this pluck: " + ", ".join(parts), growth)
-
-    def _other_refused(self, preset: str, message: str) -> None:
-        self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
-
-    def _render_failed(self, message: str, detail: str) -> None:
-        self._show_error("")
-        self._window.notices.report(message, detail)
 
     # Helpers
 

@@ -12,7 +12,7 @@ offline    a voice for a file
 """
 
 from engine.voices.mixer import Gap, Mixer
-from engine.voices.offline import OfflineVoice, render_samples, render_voice, voice_blocks
+from engine.voices.offline import ModelFrames, OfflineVoice, render_voice, voice_blocks
 from engine.voices.player import CompiledPlayer
 from engine.voices.program import Program
 from engine.voices.programs import model_program, plain_program, rendered_program, truth_program
@@ -22,12 +22,12 @@ __all__ = [
     "CompiledPlayer",
     "Gap",
     "Mixer",
+    "ModelFrames",
     "OfflineVoice",
     "Program",
     "Voice",
     "model_program",
     "plain_program",
-    "render_samples",
     "render_voice",
     "rendered_program",
     "truth_program",

@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
-from engine.sources import ModelSource, Runaway
+from engine.sources import ModelSource, Runaway, SourceState
 from engine.values.ear import Ear
 from engine.voices.mixer import Mixer
 from engine.voices.program import Program
@@ -21,7 +20,7 @@ from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
-AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # of a block of samples that are rendered ahead, at first and later
+FIRST_FRAMES, MODEL_FRAMES = 256, 1024  # of a block of a model's frames, at first and later
 FILLING = 0.9  # share of the work that these samples are
 
 
@@ -51,31 +50,31 @@ class OfflineVoice:
         return block[:, : self.channels]
 
 
-def render_samples(voice: Voice, source: ModelSource, initial_m: Array) -> Iterator[NDArray[np.float32]]:
-    """Render the samples of a voice that is not compiled, and give them to it: blocks (frames, points).
+class ModelFrames:
+    """The frames of a model, block by block from the release on: the same for pictures, ears and files."""
 
-    They are the same for ears and files. Two short blocks let it begin soon: the first prepares the model, the second
-    shows its speed.
+    def __init__(self, source: ModelSource, initial_m: Array) -> None:
+        self._source, self._initial_m = source, initial_m
+        self._state: SourceState | None = None
+        self._done = 0
 
-    Raises:
-        Runaway: the output stopped being a string's; the voice ends before.
-    """
-    weights = voice.program.grid_weights(voice.ear)
-    state, block, done = source.start(initial_m[None]), (initial_m @ weights)[None], 0
-    while True:
-        samples = (block / FULL_SCALE_M).astype(np.float32)
-        voice.append(samples)
-        yield samples
-        done += len(samples)
-        if not voice.room:
-            return
-        steps = min(AHEAD_FIRST if done < 2 * AHEAD_FIRST else AHEAD_FRAMES, voice.room)
-        try:
-            frames, state = source.advance(state, steps, weights)
-        except Runaway:
-            voice.end_here()
-            raise
-        block = frames[0].astype(np.float64)
+    def advance(self, most: int) -> NDArray[np.float32]:
+        """The next frames, `most` at most, (frames, grid_points) in m.
+
+        Two short blocks let a voice begin soon: the first prepares the model, the second shows its speed.
+
+        Raises:
+            Runaway: the output stopped being a string's.
+        """
+        if self._state is None:
+            self._state = self._source.start(self._initial_m[None])
+            frames = self._initial_m[None]
+        else:
+            steps = FIRST_FRAMES if self._done < 2 * FIRST_FRAMES else MODEL_FRAMES
+            motion, self._state = self._source.advance(self._state, min(steps, most))
+            frames = motion[0]
+        self._done += len(frames)
+        return frames.astype(np.float32)
 
 
 def render_voice(
@@ -121,8 +120,9 @@ def voice_blocks(
     offline = OfflineVoice(voice)
     if program.rendered:
         assert source is not None
-        total = voice.room
-        for _ in render_samples(voice, source, initial_m):
+        model, total = ModelFrames(source, initial_m), voice.room
+        while voice.room:
+            voice.append(voice.sense(model.advance(voice.room)))
             advanced(FILLING * (1 - voice.room / total))
     frames = max(1, round(seconds * program.rate_hz))
     loudest_db = -math.inf

@@ -92,6 +92,8 @@ class Voice(KernelMemory):
             seconds = min(seconds, program.ends_s + END_FADE_S + SPARE_S)
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
+            if program.grid_points:
+                self._senses = (program.grid_weights(ear) / FULL_SCALE_M).astype(np.float32)
             record["samples"], record["length"] = self._samples.ctypes.data, length
         if program.grid_points:
             self._set_weights(0, ear)
@@ -209,6 +211,10 @@ class Voice(KernelMemory):
         self.publish("next_weights", 1)
         self.ear = ear
         return True
+
+    def sense(self, frames_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The samples (frames, points) of full scale that a rendered voice has of a motion (frames, grid_points)."""
+        return np.einsum("fg,gp->fp", frames_m, self._senses)
 
     def append(self, samples: NDArray[np.floating]) -> None:
         """Append samples that a rendered voice reads, (frames, points) of full scale at its own rate."""

@@ -35,6 +35,7 @@ from app.window.controller import LOOK_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.voice_records import ATTACK_S
 from engine.presets import SHIPPED
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
@@ -43,7 +44,7 @@ from tests.app.window.driver import find, press
 
 RATE_HZ = 48_000
 SECONDS = 0.5  # of a pluck; the last part of it fades out
-COMPARED = slice(0, round(0.25 * RATE_HZ))
+COMPARED_S = 0.25
 LEVEL_DB, RESIDUAL_DB = 0.1, -60.0
 KINDS = {
     "dmd": "nylon_linear_gaussian_16k_dmd",
@@ -136,16 +137,27 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     return sound[AHEAD:]
 
 
-def rendered(lab: Controller, source: Source) -> Samples:
+def drawn(qtbot: QtBot, lab: Controller, source: Source) -> tuple[Samples, int]:
+    """The signal that the Lab draws of the chosen pluck, of full scale, and the preset's own rate in Hz."""
+    qtbot.waitUntil(lambda: lab.performance.ready and lab.performance.settled)
+    shown = lab.performance.take
+    assert shown is not None
+    return shown.listened.signals[source].read() / np.float64(shown.full_scale), shown.rate_hz
+
+
+def rendered(lab: Controller, source: Source, rate_hz: int = RATE_HZ) -> Samples:
     """What the command `render` would write of the chosen pluck, (frames, channels)."""
     choices = lab.session.choices
     sound = NoteSound(SHIPPED / f"{choices.preset}.safetensors", choices.pluck, SECONDS, choices.ear)
-    return render_sound(sound, source, WavSettings(rate_hz=RATE_HZ)).reshape(round(SECONDS * RATE_HZ), -1)
+    return render_sound(sound, source, WavSettings(rate_hz=rate_hz)).reshape(round(SECONDS * rate_hz), -1)
 
 
-def assert_same(found: Samples, expected: Samples, words: str, gain_counts: bool = True) -> None:
+def assert_same(
+    found: Samples, expected: Samples, words: str, gain_counts: bool = True, rate_hz: int = RATE_HZ
+) -> None:
     """Level within 0.1 dB, and what is left of the difference after the best gain, below -60 dB."""
-    found, expected = (np.broadcast_to(each[COMPARED], (COMPARED.stop, 2)) for each in (found, expected))
+    frames = round(COMPARED_S * rate_hz)
+    found, expected = (np.broadcast_to(each[:frames], (frames, 2)) for each in (found, expected))
     gain = float((found * expected).sum() / (expected * expected).sum())
     residual = np.sqrt(np.square(found - gain * expected).sum() / np.square(found).sum())
     assert 20 * np.log10(residual + 1e-12) <= RESIDUAL_DB, f"{words}: {20 * np.log10(residual):.1f} dB is left"
@@ -180,7 +192,7 @@ def exported(lab: Controller) -> Samples:
     return soundfile.read(path, always_2d=True)[0]
 
 
-def test_what_is_heard_and_exported_is_what_is_rendered_whatever_was_played_before(
+def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(
     qtbot: QtBot, lab: Controller
 ) -> None:
     """A model of each kind and its truth, in A, in B and blind, after all instruments with sympathy or an amplifier.
@@ -191,8 +203,12 @@ def test_what_is_heard_and_exported_is_what_is_rendered_whatever_was_played_befo
         play_instrument(qtbot, lab, PLAYED[name])
         choose(qtbot, lab, preset)
         expected = {slot: rendered(lab, source) for slot, source in SOURCES.items()}
-        for slot in SOURCES:
+        for slot, source in SOURCES.items():
             assert_same(heard(qtbot, lab, slot), expected[slot], f"{preset}, {slot}, after {name}")
+            signal, own_hz = drawn(qtbot, lab, source)
+            attack = round(ATTACK_S * own_hz)  # a file fades in
+            same = rendered(lab, source, own_hz)
+            assert_same(signal[attack:], same[attack:], f"{preset}, {slot}, drawn", rate_hz=own_hz)
             if kind not in ("fgru", "frnn"):
                 assert_same(exported(lab), expected[slot], f"{preset}, {slot}, exported after {name}")
         for slot, sound in blind(qtbot, lab).items():

@@ -91,9 +91,10 @@ def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
     else:
         program = rendered_program(preset.info, RATE_HZ)
 
-        def hum(state: object, steps: int, weights: Signal) -> tuple[Signal, object]:
-            wave = 1e-4 * np.cos(np.arange(steps) * math.pi / 4)
-            return np.tile(wave[None, :, None], (1, 1, weights.shape[1])), state
+        shape_m = Pluck(0.3, 0.1).displacement(preset.info.grid_points)
+
+        def hum(state: object, steps: int) -> tuple[Signal, object]:
+            return np.cos(np.arange(steps) * math.pi / 4)[None, :, None] * shape_m, state
 
         source.advance = hum
     return replace(program, ends_s=0.3), source
