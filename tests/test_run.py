@@ -4,10 +4,8 @@ import ast
 import collections
 import contextlib
 import csv
-import http.server
 import importlib.util
 import shutil
-import socket
 import subprocess
 import sys
 import threading
@@ -215,74 +213,34 @@ def test_midi_that_cannot_be_installed_is_a_warning(run, monkeypatch, capsys):
             raise run.SetupError("no wheel")
 
     monkeypatch.setattr(run, "pip", pip)
-    run.STAMP.unlink()
-    run.prepare("start", True)
-    assert run.read_stamp()
-    assert "warning: MIDI input was not installed" in capsys.readouterr().err
+    run.environment([])
+    assert run.read_stamp() and "warning: MIDI input was not installed" in capsys.readouterr().err
 
 
-def test_the_site_installs_what_it_needs_once_and_builds_with_warnings_as_errors(run, monkeypatch):
-    installed, called = [], []
-
-    def pip(*arguments):
-        installed.append(arguments[-1])
-        for name in ("mkdocs", "material", "mkdocstrings"):
-            (run.site_packages() / name).mkdir()
-
-    monkeypatch.setattr(run, "pip", pip)
-    monkeypatch.setattr(run.subprocess, "call", lambda command, **_: called.append(command[1:]) or 3)
-    assert [run.main(["docs"]), run.main(["docs"])] == [3, 3]
-    assert installed == [".[docs]"]
-    assert called == [["-m", "mkdocs", "build", "--strict"]] * 2
-    assert run.read_stamp()
+def no_answer(*_, **__):
+    raise OSError("refused")
 
 
-@pytest.fixture
-def cardless(run, monkeypatch, tmp_path):
-    """Return run.py on Linux without an NVIDIA card, with a server of PyTorch's builds that answers."""
-
-    class Handler(http.server.BaseHTTPRequestHandler):
-        def do_GET(self):
-            self.send_response(200 if self.path == "/cpu/torch/" else 404)
-            self.end_headers()
-
-        def log_message(self, *_):
-            pass
-
-    monkeypatch.setattr(run, "torch_source", run.torch_source_here)
-    monkeypatch.setattr(run.sys, "platform", "linux")
-    monkeypatch.setattr(run.shutil, "which", lambda name: None)
-    monkeypatch.setattr(run, "NVIDIA", tmp_path / "nvidia")
-    monkeypatch.setenv("no_proxy", "*")
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        monkeypatch.setattr(run, "CPU_BUILDS", f"http://127.0.0.1:{server.server_port}/cpu")
-        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
-        yield run
-        server.shutdown()
-
-
-@pytest.mark.parametrize(
-    "case", ["no card", "a driver", "a program", "nobody answers", "no such page", "a silent server"]
-)
+@pytest.mark.parametrize("case", ["no card", "a driver", "a program", "nobody answers", "a silent server"])
 def test_torch_comes_without_cuda_only_where_no_card_is_and_the_builds_are_in_reach(
-    cardless, case, monkeypatch, capsys
+    run, case, monkeypatch, capsys, tmp_path
 ):
-    monkeypatch.setattr(cardless, "ANSWER_S", 0.3)
-    builds, reported = cardless.CPU_BUILDS, "no NVIDIA card: taking PyTorch's build without CUDA"
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        if case == "a driver":
-            cardless.NVIDIA.mkdir()
-        elif case == "a program":
-            monkeypatch.setattr(cardless.shutil, "which", {"nvidia-smi": "/usr/bin/nvidia-smi"}.get)
-        elif case == "no such page":
-            monkeypatch.setattr(cardless, "CPU_BUILDS", f"{builds}/absent")
-        elif case != "no card":
-            port = silent.getsockname()[1] if case == "a silent server" else 9
-            monkeypatch.setattr(cardless, "CPU_BUILDS", f"http://127.0.0.1:{port}/cpu")
-        assert cardless.torch_source() == (["--extra-index-url", builds] if case == "no card" else [])
+    silence = threading.Event()
+    answers = {"nobody answers": no_answer, "a silent server": lambda *_, **__: silence.wait(20)}
+    programs = {"nvidia-smi": "/usr/bin/nvidia-smi"} if case == "a program" else {}
+    monkeypatch.setattr(run.sys, "platform", "linux")
+    monkeypatch.setattr(run.shutil, "which", programs.get)
+    monkeypatch.setattr(run, "NVIDIA", tmp_path / ("" if case == "a driver" else "nvidia"))
+    monkeypatch.setattr(run, "ANSWER_S", 0.1)
+    monkeypatch.setattr("urllib.request.urlopen", answers.get(case, lambda *_, **__: contextlib.nullcontext()))
+    wanted = ["--extra-index-url", run.CPU_BUILDS] if case == "no card" else []
+    assert run.torch_source_here() == wanted
+    silence.set()
     err = capsys.readouterr().err
-    wanted = {"no card": reported, "a driver": "", "a program": ""}.get(case, "out of reach")
-    assert wanted in err and (wanted or err == "")
+    said = {"no card": "taking PyTorch's build without CUDA", "a driver": "", "a program": ""}.get(
+        case, "out of reach"
+    )
+    assert said in err and (said or err == "")
 
 
 def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
@@ -372,101 +330,78 @@ def test_a_second_set_up_waits_for_the_first_and_does_nothing_more(run, monkeypa
     assert run.WINDOWS or "waiting for another set-up" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="pip brings everything elsewhere")
-class TestSystemPackages:
-    @pytest.fixture
-    def machine(self, run, monkeypatch):
-        """Return run.py on a machine that lacks PortAudio and Xvfb, with a record of the commands it runs."""
-        lacking = {"libportaudio.so.2", "Xvfb"}
-        monkeypatch.undo()
-        monkeypatch.setattr(run, "torch_source", lambda: [])
-        monkeypatch.setattr(run, "present", lambda sign: sign not in lacking)
-        monkeypatch.setattr(run, "pip", lambda *arguments: None)
-        monkeypatch.setattr(run, "sound", lambda: True)
-        monkeypatch.setattr(run.shutil, "which", {"apt-get": "/usr/bin/apt-get"}.get)
-        commands = []
-        monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: commands.append(command))
-        return collections.namedtuple("Machine", "run lacking commands")(run, lacking, commands)
-
-    def test_signs_are_found_where_they_are(self, run):
-        assert run.present("import ensurepip") and not run.present("import nothing_of_the_kind")
-        assert run.present("libc.so.6") and not run.present("libnothing.so.6")
-        assert run.present("/proc/*/stat") and not run.present("/proc/nothing")
-        assert run.present("sh") and not run.present("nothing-of-the-kind")
-
-    def test_a_user_is_reported_the_line_once_and_again_only_for_the_window(self, machine, monkeypatch, capsys):
-        run = machine.run
-        monkeypatch.setattr(run, "APT", False)
-        monkeypatch.setattr(run, "start", lambda arguments: 0)
-        line = "  sudo apt-get install --no-install-recommends libportaudio2\n"
-        run.STAMP.unlink()
-        assert run.main(["--", "render"]) == 0
-        assert line in capsys.readouterr().err
-        assert run.main(["--", "render"]) == 0
-        assert capsys.readouterr().err == ""
-        assert run.main([]) == 0
-        assert line in capsys.readouterr().err
-        machine.lacking.clear()
-        assert run.main([]) == 0
-        assert capsys.readouterr().err == ""
-        assert machine.commands == []
-
-    def test_root_installs_and_those_of_the_tests_only_for_them(self, machine, monkeypatch):
-        monkeypatch.setattr(machine.run, "APT", True)
-        machine.run.system_packages("start")
-        assert [command[1] for command in machine.commands] == ["update", "install"]
-        assert machine.commands[-1][-1] == "libportaudio2"
-        assert "--no-install-recommends" in machine.commands[-1]
-        machine.run.system_packages("test")
-        assert machine.commands[-1][-1] == "xvfb"
-
-    def test_a_failing_apt_get_is_a_warning(self, machine, monkeypatch, capsys):
-        def failing(command, trouble, **_):
-            raise machine.run.SetupError(trouble)
-
-        monkeypatch.setattr(machine.run, "APT", True)
-        monkeypatch.setattr(machine.run, "run_step", failing)
-        machine.run.STAMP.unlink()
-        assert machine.run.main(["setup"]) == 0
-        err = capsys.readouterr().err
-        assert "warning: apt-get install failed; going on without" in err
-        assert "  apt-get install --no-install-recommends libportaudio2\n" in err
-
-    @pytest.mark.parametrize(
-        ("tool", "line"), [("dnf", "sudo dnf install "), ("pacman", "sudo pacman "), ("", "Debian calls libx")]
-    )
-    def test_other_systems_are_given_a_hint(self, run, tool, line, monkeypatch, capsys):
-        monkeypatch.setattr(run.shutil, "which", {tool: tool}.get)
-        run.say_absent(["libx"])
-        assert line in capsys.readouterr().err
+def test_signs_of_system_packages_are_found_where_they_are(run):
+    for there in ("import ensurepip", "libc.so.6", "/proc/*/stat", "sh") if sys.platform == "linux" else ():
+        assert run.present(there)
+    for absent in ("import nothing_of_the_kind", "libnothing.so.6", "/proc/nothing", "nothing-of-the-kind"):
+        assert not run.present(absent)
 
 
 @pytest.fixture
-def checks(run, monkeypatch):
-    """Return run.py, the lints that are to fail, and a record of pytest's command and environment."""
-    failing, pytests = set(), []
+def machine(run, monkeypatch):
+    """Return run.py on a machine that lacks PortAudio and Xvfb, with a record of the commands it runs."""
+    lacking, commands = {"libportaudio.so.2", "Xvfb"}, []
+    monkeypatch.undo()
+    monkeypatch.setattr(run, "torch_source", lambda: [])
+    monkeypatch.setattr(run, "present", lambda sign: sign not in lacking)
+    monkeypatch.setattr(run, "pip", lambda *arguments: None)
+    monkeypatch.setattr(run, "sound", lambda: True)
+    monkeypatch.setattr(run, "start", lambda arguments: 0)
+    monkeypatch.setattr(run.shutil, "which", {"apt-get": "/usr/bin/apt-get"}.get)
+    monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: commands.append(command))
+    return collections.namedtuple("Machine", "run lacking commands")(run, lacking, commands)
 
-    def lint(command, **_):
-        return subprocess.CompletedProcess(command, int(command[2] in failing if len(command) > 2 else 0), b"")
 
-    monkeypatch.setattr(run.subprocess, "run", lint)
-    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command, env)))
-    return collections.namedtuple("Checks", "run failing pytests")(run, failing, pytests)
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="pip brings everything elsewhere")
+
+
+@LINUX
+def test_a_user_is_reported_the_line_once_and_again_only_for_the_window(machine, monkeypatch, capsys):
+    monkeypatch.setattr(machine.run, "APT", False)
+    machine.run.STAMP.unlink()
+    line = "  sudo apt-get install --no-install-recommends libportaudio2\n"
+    for words, said in ((["--", "render"], True), (["--", "render"], False), ([], True)):
+        assert machine.run.main(words) == 0
+        assert (line in capsys.readouterr().err) == said
+    machine.lacking.clear()
+    assert machine.run.main([]) == 0 and capsys.readouterr().err == "" and machine.commands == []
+
+
+@LINUX
+def test_root_installs_and_those_of_the_tests_only_for_them_and_a_failure_is_a_warning(machine, monkeypatch, capsys):
+    monkeypatch.setattr(machine.run, "APT", True)
+    machine.run.system_packages("start")
+    assert [command[1] for command in machine.commands] == ["update", "install"]
+    assert machine.commands[-1][-1] == "libportaudio2" and "--no-install-recommends" in machine.commands[-1]
+    machine.run.system_packages("test")
+    assert machine.commands[-1][-1] == "xvfb"
+
+    def failing(command, trouble, **_):
+        raise machine.run.SetupError(trouble)
+
+    monkeypatch.setattr(machine.run, "run_step", failing)
+    machine.run.STAMP.unlink()
+    assert machine.run.main(["setup"]) == 0
+    assert "warning: apt-get install failed; going on without" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("lint", [None, "mypy"])
-def test_the_check_runs_the_tests_in_parallel_and_names_a_failed_lint(checks, lint, monkeypatch, capsys):
-    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    checks.failing.update([lint] if lint else [])
-    assert checks.run.main(["test", *(["tests/test_run.py"] if lint else [])]) == (1 if lint else None)
-    ((command, env),) = checks.pytests
+def test_the_check_runs_the_tests_in_parallel_and_names_a_failed_lint(run, lint, monkeypatch, capsys):
+    pytests = []
+    failed = lambda command: int(lint is not None and lint in command[2:3])  # noqa: E731
+    monkeypatch.setattr(
+        run.subprocess, "run", lambda command, **_: subprocess.CompletedProcess(command, failed(command), b"")
+    )
+    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command[3:], env)))
+    for name in ("QT_QPA_PLATFORM", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    assert run.main(["test", *(["tests/test_run.py"] if lint else [])]) == (1 if lint else None)
+    ((words, env),) = pytests
     out, err = capsys.readouterr()
-    assert env["QT_QPA_PLATFORM"] == "offscreen"
-    assert out.count("passed") == len(checks.run.LINTS) - bool(lint)
+    assert env["QT_QPA_PLATFORM"] == "offscreen" and out.count("passed") == len(run.LINTS) - bool(lint)
     if lint:
-        assert command[3:] == ["tests/test_run.py"]
+        assert words == ["tests/test_run.py"]
         assert "mypy: FAILED" in out and err == "run.py: failed before the tests: mypy\n"
     else:
-        assert command[3] == "-n" and command[-2:] == ["--dist", "loadfile"] and err == ""
+        assert words[0] == "-n" and words[-2:] == ["--dist", "loadfile"] and err == ""
         assert env["OMP_NUM_THREADS"] == "1"

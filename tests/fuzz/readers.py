@@ -8,7 +8,6 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import soundfile
@@ -164,12 +163,6 @@ def sounded(path: Path) -> None:
     assert bool(np.isfinite(found).all()) and len(found) <= 3 * 48_000
 
 
-def saved(value: Any) -> bytes:
-    buffer = io.BytesIO()
-    np.save(buffer, value)
-    return buffer.getvalue()
-
-
 def row_file(folder: Path) -> bytes:
     row = Row("d" * 16, "a", "done", "koopman", "linear", "noise", 4000, 400, "ours", 0, rel_mse=0.5)
     add_rows(folder / "rows.csv", [row])
@@ -279,29 +272,26 @@ def recipe(preset: Path) -> Callable[[Path], None]:
     return read
 
 
+PRESETS = (ONE_STRING, MANY_STRINGS, DMD)
+IMPULSES = {"float.wav": ("WAV", "FLOAT"), "pcm.wav": ("WAV", "PCM_16"), "body.flac": ("FLAC", "PCM_24")}
+STRING = (STRINGS / "steel_e4.toml").read_bytes()
+
+
+def preset_target(path: Path) -> Target:
+    return Target(f"{path.stem}.safetensors", lambda _: path.read_bytes(), play, (PresetError,), damaged_preset)
+
+
+def recipe_target(path: Path) -> Target:
+    return Target(f"{path.stem}.wav", lambda p: wav(p, recipe_text(path)), recipe(path), (RecipeError,), damaged_wav)
+
+
 TARGETS = (
-    *(
-        Target(
-            f"{path.stem}.safetensors", lambda p, path=path: path.read_bytes(), play, (PresetError,), damaged_preset
-        )
-        for path in (ONE_STRING, MANY_STRINGS, DMD)
-    ),
-    *(
-        Target(
-            f"{path.stem}.wav",
-            lambda p, path=path: wav(p, recipe_text(path)),
-            recipe(path),
-            (RecipeError,),
-            damaged_wav,
-        )
-        for path in (ONE_STRING, MANY_STRINGS)
-    ),
+    *map(preset_target, PRESETS),
+    *map(recipe_target, PRESETS[:2]),
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
     Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),
-    Target(
-        "string.toml", lambda p: (STRINGS / "steel_e4.toml").read_bytes(), read_string, (SchemaError,), toml_or_bytes
-    ),
+    Target("string.toml", lambda p: STRING, read_string, (SchemaError,), toml_or_bytes),
     Target("rows.csv", row_file, read_results, (SchemaError,)),
     Target("heard.csv", lambda p: HEARD, heard, ()),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
@@ -309,7 +299,5 @@ TARGETS = (
     Target("song.mid", lambda p: SONG, song, (MidiFileError,)),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
-    Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
-    Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
-    Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
+    *(Target(name, lambda p, of=of: impulse(p, *of), sounded, (ImpulseError,)) for name, of in IMPULSES.items()),
 )

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -29,7 +28,7 @@ from engine.presets import preset_digest
 from engine.schema import read_toml
 from engine.whole_file import UnusableFile, read_bounded
 from tests.fuzz.costs import MOST_MB, Costs
-from tests.fuzz.mutations import HOSTILE, attacked, damaged_preset, damaged_value
+from tests.fuzz.mutations import attacked, damaged_preset
 from tests.fuzz.readers import (
     KEYMAP,
     PATCH,
@@ -280,17 +279,3 @@ def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path: Path) -> None:
     with pytest.raises(UnusableFile, match="larger than"):
         read_bounded(tmp_path / "a", 10)
     assert read_bounded(tmp_path / "a", 11) == b"12345678901"
-
-
-# The attack itself: or it would show nothing
-
-
-def test_damage_depends_on_its_seed_alone_and_a_readings_cost_is_measured() -> None:
-    before = repr(HOSTILE)
-    for number in range(400):
-        damaged_value({"a": [1, 2], "b": {"c": 3}}, random.Random(number))
-        assert repr(HOSTILE) == before, number
-    costs = Costs()
-    with costs.reading():
-        np.ones(10_000_000)
-    assert costs.largest_mb is None or 70 <= costs.largest_mb <= 100

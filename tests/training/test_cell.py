@@ -8,7 +8,7 @@ import pytest
 from engine.models import MODELS, OF_MANY_STRINGS
 from engine.models.configurations import LRUConfiguration
 from engine.schema import SchemaError
-from training.cell import Cell, RecipeCase, configuration_of, load, recipe_names
+from training.cell import Cell, configuration_of, load
 from training.start import starts_of
 
 OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
@@ -24,7 +24,7 @@ EVERY_CELL = [
 def test_every_cell_of_the_tables_can_be_built_from_its_name() -> None:
     assert len({cell.name for cell in EVERY_CELL}) == len({cell.title for cell in EVERY_CELL}) == len(EVERY_CELL)
     assert all(Cell.parse(cell.name) == cell for cell in EVERY_CELL)
-    some = EVERY_CELL[::7]  # of every model, string, data set, horizon, recipe and seed
+    some = EVERY_CELL[::31]  # of every model, string, data set, horizon, recipe and seed
     built = [load(cell.name) for cell in some]
     assert len({configuration.digest for configuration in built}) == len(some)
     for cell, made in zip(some, built, strict=True):
@@ -103,14 +103,3 @@ def test_a_name_that_is_no_cell_is_reported(name: str, words: str) -> None:
 def test_wrong_overrides_are_reported(data: dict[str, int], recipe: dict[str, int], words: str) -> None:
     with pytest.raises(SchemaError, match=words):
         configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)
-
-
-def test_a_case_matches_what_it_names() -> None:
-    cell = Cell("koopman", True, "noise", 4000)
-    assert RecipeCase().matches(cell)
-    assert RecipeCase(model=("lru", "koopman"), rate_hz=(4000,), tension_modulated=True).matches(cell)
-    assert not RecipeCase(horizon=(400,)).matches(cell)
-    assert not RecipeCase(tension_modulated=False).matches(cell)
-    with pytest.raises(ValueError, match="model 'koop' is not one of"):
-        RecipeCase(model=("koop",))
-    assert recipe_names() == ["blind", "hinted", "ours", "paper", "published"]

@@ -163,10 +163,10 @@ def test_a_file_that_is_no_table_is_reported_in_one_line(tmp_path: Path, content
 
 
 def test_many_bad_lines_are_reported_in_few(tmp_path: Path) -> None:
-    known, problems = read_heard(table(tmp_path, *["a,b"] * 1_000, line()))
+    known, problems = read_heard(table(tmp_path, *["a,b"] * 100, line()))
     assert known == {GOOD.sha256: GOOD}
     assert len(problems) == MOST_REPORTED + 1
-    assert "997 more lines" in problems[-1]
+    assert "97 more lines" in problems[-1]
 
 
 def test_a_folder_or_a_link_to_nowhere_in_its_place_is_no_table(tmp_path: Path) -> None:

@@ -35,9 +35,3 @@ def test_faults_are_named_the_worst_first(changes: dict[str, float | None], name
     assert word.startswith(named[0] if named else "true")
     assert word.endswith("…") == (len(named) > 1)
     assert all(fault in heard_sentence(heard, "x") for fault in named)
-
-
-def test_a_sound_that_is_off_without_a_name_or_not_measured_is_not_called_true() -> None:
-    assert heard_word(replace(TRUE, distance_db=3.21)) == "3.2 dB off"
-    assert heard_word(None) == "not measured"
-    assert "learned-strings evaluate mine --heard --write" in heard_sentence(None, "mine")

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.analysis import comparison
-from app.analysis.comparison import ComparedRow, compare, same_string
+from app.analysis.comparison import compare
 from app.presets.library import PresetEntry, list_presets
 from app.rendering.note_sound import NoteSound
-from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights, project
@@ -60,16 +58,6 @@ def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: An
     assert job.shares[-1] == 1
 
 
-def test_one_truth_for_presets_of_one_string_and_rate(
-    entries: list[PresetEntry], job: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = []
-    monkeypatch.setattr(comparison, "TruthSource", lambda info: made.append(info) or TruthSource(info))
-    compare(plucked(entries), job)
-    assert [row.name for row in job.results] == ["first", "second"]
-    assert len(made) == 1
-
-
 def test_a_bad_preset_is_a_row_and_the_next_one_follows(entries: list[PresetEntry], job: Any) -> None:
     entries[0].path.write_bytes(b"damaged")
     compare(plucked(entries), job)
@@ -88,17 +76,3 @@ def test_a_model_that_runs_away_has_infinite_errors_and_says_when(entries: list[
     (row,) = job.results
     assert "diverges" in row.note
     assert row.mae == row.past_mae == float("inf")
-
-
-def test_it_stops_between_blocks(entries: list[PresetEntry], job: Any) -> None:
-    job.cancel_after = 1
-    with pytest.raises(Cancelled):
-        compare(plucked(entries), job)
-    assert job.results == []
-
-
-def test_what_is_known_without_computing(entries: list[PresetEntry]) -> None:
-    row = ComparedRow.of(entries[0])
-    assert (row.name, row.model, row.rate_hz) == ("first", "koopman_var", 4000)
-    assert row.parameters == entries[0].parameters
-    assert same_string(entries[0].info, entries[1].info)

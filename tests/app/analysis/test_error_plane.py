@@ -12,9 +12,7 @@ import torch
 from app.analysis import error_plane
 from app.analysis.error_plane import (
     AMPLITUDES_MM,
-    FINEST,
     POSITIONS,
-    STRIDES,
     ErrorPlane,
     error_of_plucks,
     nearest_cell,
@@ -26,11 +24,6 @@ from engine.pluck import Pluck
 from engine.presets import load_preset
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, TruthSource
-
-
-def test_levels_are_nested_in_the_finest() -> None:
-    assert all((points - 1) % STRIDES[0] == 0 for points in FINEST)
-    assert (len(POSITIONS), len(AMPLITUDES_MM)) == FINEST
 
 
 def test_interpolation_keeps_its_points_and_is_linear_between() -> None:

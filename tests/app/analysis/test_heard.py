@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.analysis.heard import HeardMotion, HeardSignal
+from app.analysis.heard import HeardSignal
 from app.rendering import Take
-from app.rendering.take import Pictures, Signal
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
@@ -51,19 +50,3 @@ def test_the_difference_has_its_gain(take: Take, hear: Callable[[Take, Ear], Non
     alone = HeardSignal(take.listened.signals, "truth").read(0, 9_999)
     assert np.abs(alone).max() == pytest.approx(1e-4, rel=1e-3)
     assert difference == pytest.approx(alone, abs=1e-7)  # a tenth, ten times as loud
-
-
-def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Take) -> None:
-    motion, signal = HeardMotion(take.motions, "preset:other"), HeardSignal(take.listened.signals, "preset:other")
-    assert not motion.there
-    assert not signal.there
-    take.motions["preset:other"] = Pictures(1_000, 11, 0.5)
-    take.listened.signals["preset:other"] = Signal(16_000, 1, 0.5)
-    assert not motion.there
-    assert not signal.there
-    take.motions["preset:other"].append(np.ones((40, 11), np.float32))
-    take.listened.signals["preset:other"].append(np.ones((50, 1), np.float32))
-    assert motion.there
-    assert signal.there
-    assert (motion.rate_hz, motion.frames, motion.ready, motion.grid_points) == (1_000, 501, 40, 11)
-    assert (signal.rate_hz, signal.frames, len(signal.read(0, 501))) == (16_000, 8_001, 50)

@@ -10,7 +10,7 @@ import pytest
 
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
-from app.shared.worker import Cancelled, Job
+from app.shared.worker import Job
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import project, to_grid, to_modes
@@ -88,18 +88,6 @@ def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info: PresetInfo, j
     assert rows["all"][0].level_db == pytest.approx(0, abs=0.01)
     take.model_ends_s = 0.0
     assert take_partials(take, job) == {}
-
-
-def test_it_gives_up_when_nobody_waits(info: PresetInfo) -> None:
-    class Over:
-        def check(self) -> None:
-            raise Cancelled
-
-        def report(self, share: float, so_far: object = None) -> None:
-            self.check()
-
-    with pytest.raises(Cancelled):
-        take_partials(take_of(info, Pluck(), list(np.ones(10))), Over())
 
 
 def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Job) -> None:

@@ -157,23 +157,6 @@ def test_progress_on_a_terminal_is_a_bar_and_names_are_shown_as_they_are(
     assert found.out == "" and "[/b].mid by [red]" in found.err
 
 
-DURATIONS = {
-    0.025: "25 ms",
-    0.25: "0.25 s",
-    1 / 3: "0.333 s",
-    1.0: "1 s",
-    8.24: "8.24 s",
-    31.9: "32 s",
-    59.99: "1 min 0 s",
-    200: "3 min 20 s",
-    7500: "2 h 5 min",
-}
-
-
-def test_durations_are_words() -> None:
-    assert {seconds: console.duration(seconds) for seconds in DURATIONS} == DURATIONS
-
-
 def test_json_is_valid_for_any_number_and_a_table_keeps_a_long_cell_on_its_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

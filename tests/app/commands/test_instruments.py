@@ -18,9 +18,7 @@ from app.export.plugin.image import Image
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import SHIPPED, find_patch, list_patches
 from app.shared.parameters import OF_PATCHES
-from engine.presets import preset_digest
 from tests.app.commands.conftest import Run
-from training.heard_file import NAME, Heard, add_heard
 
 
 def test_a_preset_is_found_by_its_name_the_shipped_one_first(
@@ -43,22 +41,6 @@ def test_a_preset_is_found_by_its_name_the_shipped_one_first(
         assert message in run("compare", name, *words).failure
 
 
-def test_a_hostile_table_of_differences_hides_no_preset(run: Run, installed: Path) -> None:
-    digest = preset_digest(installed / "good.safetensors")
-    add_heard(installed, [Heard("good", digest, 4.0, 9.0, 5.2, 3.0, 13.0)])
-    with (installed / NAME).open("a") as table:
-        table.write("<script>,1e999,nan\n")
-    for heard, reported in (
-        ("pitch 13 cents too high …", f"{NAME}: line 3: holds 3"),
-        ("not measured", "not a text"),
-    ):
-        done = run("presets", "--json")
-        (preset,) = json.loads(done.out)
-        assert (done.status, preset["heard"]) == (0, heard)
-        assert reported in done.err
-        (installed / NAME).write_bytes(b"\xff" * 100)
-
-
 def test_instruments_are_listed_and_a_broken_one_is_reported(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -68,17 +50,12 @@ def test_instruments_are_listed_and_a_broken_one_is_reported(
     some = json.loads((SHIPPED / "classical_guitar.json").read_text(encoding="utf-8"))
     (own / "mine.json").write_text(json.dumps({**some, "name": "Mine"}))
     (own / "broken.json").write_text("{")
-    found = run("instruments", "--json")
-    assert found.status == 0
+    found, table = run("instruments", "--json"), run("instruments").out
     assert found.err.startswith(f"learned-strings: {own / 'broken.json'}: not JSON") and found.err.count("\n") == 1
     listed = json.loads(found.out)
     assert [(each["name"], each["title"]) for each in listed if each["own"]] == [("mine", "Mine")]
-    files = {each["file"] for each in listed if not each["own"]}
-    assert files == {str(path) for path in SHIPPED.glob("*.json")}
-    table = run("instruments").out
-    for each in listed:
-        assert set(each) == {"name", "title", "category", "own", "description", "file"}
-        assert each["name"] in table and each["title"] in table
+    assert {each["file"] for each in listed if not each["own"]} == {str(path) for path in SHIPPED.glob("*.json")}
+    assert all(each["name"] in table and each["title"] in table for each in listed)
 
 
 def test_an_instruments_parameters_are_listed_with_its_values(run: Run) -> None:
@@ -117,18 +94,12 @@ def test_an_sfz_with_its_samples(run: Run, notes: list[tuple], folder: Path) -> 
     patch, out = find_patch(GUITAR).patch, folder / "a.sfz"
     plan = SampledPlan(patch, (60, 62), layers=2)
     found = run("sampled", GUITAR, out, *SMALL, "--source", "truth", "--rate", 44_100)
-    assert found.status == 0
+    assert found.status == 0 and found.out.startswith(f"{out}: 6 samples, ")
     assert notes == [(patch.room.mix, z.key, z.velocity, 0.2, 0.2, 44_100, "truth") for z in plan.zones]
-    assert patch.room.mix > 0
-    assert found.out.startswith(f"{out}: 6 samples, ")
-    assert "6 samples (3 keys, 2 velocity layers), at most 0.3 MB" in found.err
-    pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the instrument\n"
-    assert found.out.endswith(pitch) and pitch in found.err
     assert len(list((folder / "a_samples").glob("*.flac"))) == 6
-    room = "a released key ends the room's tail as well; --dry leaves the room to the sampler"
     dry = run("sampled", GUITAR, out, *SMALL, "--dry", "--format", "wav", "--bits", "16")
-    assert room in found.err and room not in dry.err
-    assert {mix for mix, *_ in notes[6:]} == {0.0}
+    assert ["--dry leaves the room" in each.err for each in (found, dry)] == [True, False]
+    assert patch.room.mix > 0 and {mix for mix, *_ in notes[6:]} == {0.0}
     for path in (folder / "a_samples").iterdir():
         facts = soundfile.info(path)
         assert path.stat().st_size == 44 + 2 * facts.channels * facts.frames
@@ -182,17 +153,13 @@ def test_one_bank_does_not_replace_another(run: Run, home: Path) -> None:
     assert run("plugin", "all", "--install").status == 0
     whole = held(home)["Learned Strings.clap"]
     assert whole > 50
-    assert run("plugin", "concert_harp", "electric_bass", "--install").status == 0
-    assert held(home) == {"Learned Strings.clap": whole, "Concert harp + Electric bass.clap": 2}
     many = [entry.name for entry in list_patches(SHIPPED)[0]][:9]
-    made = run("plugin", *many, "--install")
+    assert run("plugin", *many, "--install").status == 0
     (name,) = (name for name, count in held(home).items() if count == 9)
-    assert name.endswith(" + 8 others.clap") and "replaces" not in made.out
-    assert run("plugin", *reversed(many[1:]), many[0], "--install").status == 0  # another first one, another name
+    assert name.endswith(" + 8 others.clap") and held(home)["Learned Strings.clap"] == whole
     others = (many[0], *many[2:], "concert_toms", "--install")
-    refused = run("plugin", *others)
-    assert refused.status == 1 and refused.err.count("\n") == 1
-    assert all(words in refused.err for words in (name, "holds another instrument", "--replace"))
+    refused = run("plugin", *others).failure
+    assert all(words in refused for words in (name, "holds another instrument", "--replace"))
     assert held(home)[name] == 9
     for words in ((*others, "--replace"), ("all", "--install")):  # the latter: the same again
         assert "replaces the one before" in run("plugin", *words).out
@@ -204,15 +171,6 @@ def test_nothing_is_written_where_one_of_several_would_lose_something(run: Run, 
     harp.write_bytes(b"org.learned-strings.another\0")
     assert run("plugin", "concert_harp", "--format", "all", "--out", harp.parent).status == 1
     assert [path.name for path in harp.parent.iterdir()] == [harp.name]
-
-
-def test_names_that_differ_in_marks_and_case_are_three_instruments(run: Run, home: Path) -> None:
-    harp = json.loads((SHIPPED / "concert_harp.json").read_text(encoding="utf-8"))
-    files = [home / f"{stem}.json" for stem in ("one", "two", "three")]
-    for file, name in zip(files, ("My bass!", "my bass-", "My bass"), strict=True):
-        file.write_text(json.dumps({**harp, "name": name}), encoding="utf-8")
-    assert run("plugin", *files, "--out", home / "out").status == 0
-    assert list(held(home).values()) == [3]
 
 
 def test_without_a_compiler_the_extra_is_named(run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import shutil
@@ -71,18 +70,6 @@ def test_the_difference_is_model_minus_truth_and_silence_is_explained(
     assert sounds["difference"] == pytest.approx(sounds["model"] - sounds["truth"], abs=1e-6)
     silent = run("render", small_preset, out, *PLUCK, "--source", "truth", "--amplitude-mm", 0)
     assert silent.status == 0 and "the file is silent; amplitude 0" in silent.err
-
-
-def test_a_full_disk_at_the_last_moment_leaves_no_file(
-    run: Run, small_preset: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(self: Path, target: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "replace", full)
-    failure = run("render", small_preset, folder / "a.wav", *PLUCK).failure
-    assert "a.wav: cannot be written (No space left on device); free some space" in failure
-    assert list(folder.iterdir()) == []
 
 
 @pytest.fixture

@@ -26,9 +26,7 @@ from tests.app.commands.conftest import CONFIGURATION, PLAN, FullDisk, Run
 from training.cell import Cell, configuration_of, load
 from training.cli import console
 from training.cli.sweep import Shown
-from training.cli.training import known_errors
 from training.data.dataset import load_dataset
-from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import FitProgress
 from training.fitting.log import read_log
 from training.heard_file import read_heard
@@ -59,10 +57,6 @@ def log(configuration: Path, name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def weights(path: Path) -> dict[str, torch.Tensor]:
-    return load_preset(path).model.state_dict()
-
-
 def equal(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
     return all(torch.equal(one[name], other[name]) for name in one)
 
@@ -86,13 +80,6 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run: Run, tiny_run
     assert "was trained with other settings; delete it" in run(*train(tiny_run, "a")).failure
     if not torch.cuda.is_available():
         assert "no CUDA device can be used here" in run(*train(tiny_run, "b"), "--device", "cuda").failure
-
-
-def test_known_errors_are_the_papers_and_the_projects() -> None:
-    koopman = known_errors(load("nylon_nonlinear_noise_4k_koopman_400"))
-    assert koopman["paper"] == (0.0036, 0.0353) and koopman["project"][0] < 0.0045
-    assert set(known_errors(load("nylon_nonlinear_noise_4k_koopman_integrated_400_blind"))) == {"project"}
-    assert known_errors(load("studio_nylon_b3")) == {}  # data of its own
 
 
 def test_seeds_are_trained_together_and_no_shipped_preset_is_replaced(
@@ -144,31 +131,6 @@ def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.
     for words in ([], ["--epochs", 9, "--seeds", 2]):
         run("train", cell, *words)
     assert chosen == [(cell, "paper"), (f"{cell}_epochs9", ""), (f"{cell}_seed1_epochs9", "")]
-
-
-def test_a_killed_run_continues_to_the_same_weights(
-    run: Run, tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
-    assert run(*train(tiny_run, "whole")).status == 0
-    save = Checkpoint.save
-
-    def save_and_kill(self: Checkpoint, path: Path) -> None:
-        if self.facts["step"] == 4:
-            raise KeyboardInterrupt  # epoch 2 is in the log, and its checkpoint is not written
-        save(self, path)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Checkpoint, "save", save_and_kill)
-        killed = run(*train(tiny_run, "cut"))
-    assert killed.status == 130 and "the same command continues with" in killed.err
-    assert not (tmp_path / "cut.safetensors").exists()
-
-    assert run(*train(tiny_run, "cut")).status == 0
-    assert equal(weights(tmp_path / "whole.safetensors"), weights(tmp_path / "cut.safetensors"))
-    rows = log(tiny_run, "cut")
-    assert [row["epoch"] for row in rows] == ["1", "2", "3"]
-    assert [row["loss"] for row in rows] == [row["loss"] for row in log(tiny_run, "whole")]
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])

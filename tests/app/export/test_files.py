@@ -31,7 +31,7 @@ from engine.presets import SHIPPED, PresetError
 from engine.resonators.sine_transform import listening_weights, project
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
-from engine.voices import Mixer, Voice, model_program, offline, truth_program
+from engine.voices import Mixer, Voice, model_program, truth_program
 from engine.voices.voice import ATTACK_S
 from engine.whole_file import WriteError
 from tests.app.sounds import export_sound, render_sound
@@ -114,14 +114,6 @@ def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(plucked
     for source, path in paths.items():
         export_sound(plucked, alone, source, settings)  # type: ignore[arg-type]
         assert (soundfile.read(alone)[0] == soundfile.read(path)[0]).all()
-
-
-def test_progress_rises_to_one(plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offline, "BLOCK_FRAMES", 100)
-    shares: list[float] = []
-    export_sound(plucked, tmp_path / "a.wav", "difference", progress=lambda share, *_: shares.append(share))
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1)
 
 
 def test_cancelling_leaves_no_file(plucked: NoteSound, tmp_path: Path) -> None:

@@ -93,13 +93,6 @@ def test_the_source_that_was_heard_last_is_kept(tmp_path: Path) -> None:
     assert (played.source, played.difference_gain_db) == ("difference", 40.0)
 
 
-def test_a_turned_knob_is_a_short_line(tmp_path: Path) -> None:
-    patch = PATCHES[0]
-    turned = patch.model_copy(update={"level_db": patch.level_db - 1})
-    journal = written(tmp_path, [TimedEvent(0.0, PatchTurned(patch)), TimedEvent(1.0, PatchTurned(turned))])
-    assert len(journal.path.read_bytes().splitlines()[-1]) < 80
-
-
 def test_cut_at_any_byte_it_gives_the_whole_lines_before(tmp_path: Path) -> None:
     events = recorded(random.Random(3), 12)
     journal = written(tmp_path, events)

@@ -110,19 +110,6 @@ def heard(source: str = "model", another: bool = False, name: str = "") -> Heard
 
 
 @pytest.mark.parametrize(
-    ("source", "another", "last", "chosen"),
-    [
-        ("truth", False, "model", "truth"),
-        ("model", False, "files", "files"),
-        ("difference", False, "files", "difference"),
-        ("model", True, "files", "model"),
-    ],
-)
-def test_what_is_heard_is_saved_and_both_again(source: str, another: bool, last: str, chosen: str) -> None:
-    assert heard(source, another).chosen(last) == chosen  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
     ("title", "first_hz", "amplitude_mm", "name"),
     [
         ("Steel-string acoustic", 164.8, 0.2, "Steel-string acoustic E3 soft"),

@@ -9,7 +9,7 @@ import pytest
 import soundfile
 
 from app.audio.impulse_file import ImpulseError
-from app.instrument.bodies import body_digest, body_names, body_titles, install_body, own_bodies, own_impulse
+from app.instrument.bodies import body_names, body_titles, install_body, own_bodies, own_impulse
 from app.instrument.effects import body_curves, body_problem, effects_of
 from app.instrument.offline import render_note
 from app.patches.patch import BodyChoice, Patch
@@ -78,17 +78,6 @@ def test_it_is_heard_in_a_file_on_both_sides(patch: Patch, preset: Preset, tmp_p
     assert wet.shape[1] == 2 and np.abs(wet[:LATE_FRAMES]).max() < 0.011 * peak
     for side in (0, 1):
         np.testing.assert_allclose(wet[LATE_FRAMES:, side], dry[:-LATE_FRAMES, 0], atol=0.011 * peak)
-
-
-def test_its_digest_is_that_of_its_file_and_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    name = install_body(late(tmp_path / "late.wav"))
-    first = body_digest(name)
-    assert len(first) == 64 and body_digest("guitar") == body_digest("nothing") == ""
-    with monkeypatch.context() as unread:
-        unread.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} is read again"))
-        assert body_digest(name) == first
-    late(own_bodies() / "late.wav", 7)
-    assert body_digest(name) not in ("", first)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfilt
 from app.instrument import table
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKey, DrumKeys
-from app.instrument.events import Bend, NoteOff, NoteOn
+from app.instrument.events import NoteOn
 from app.instrument.glide import glides_cents
 from app.instrument.offline import render_note
 from app.patches.drums import Drums
@@ -26,7 +26,7 @@ from engine.presets import SHIPPED, load_preset
 from engine.values.drum import Mallet
 from engine.values.ear import Ear
 from engine.voices import Mixer
-from tests.app.instrument.stage import RATE_HZ, Stage, Timed, pitch_hz, play, relative
+from tests.app.instrument.stage import RATE_HZ, Stage, pitch_hz, play, relative
 
 PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KIT, TOM, TIMPANI = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani"))
@@ -157,11 +157,6 @@ def test_the_kernel_strikes_as_the_engine_does_at_any_place() -> None:
     assert np.isfinite(speeds((2.0, 2.0))).all(), "beyond the rim it is the nearest place"
 
 
-def test_every_pad_has_a_drum() -> None:
-    keys = DrumKeys(KIT, Ear((0.5,)))
-    assert [key for key in range(128) if keys.of_key(key) is not None] == list(range(36, 52))
-
-
 def test_the_pitch_drop_follows_velocity() -> None:
     """At the hardest between published ones of toms: almost 8 %, or 133 cents, and 160 cents (`docs/drums.md`)."""
     found = drum_of(TOM, 47)
@@ -179,13 +174,6 @@ def test_keys_tune_a_drum(patch: Patch, keys: tuple[int, int], m: int) -> None:
     modes = [drum_of(patch, key).modes for key in keys]
     low, high = (each.omega[each.surface.m == m].min() for each in modes)
     assert high / low == pytest.approx(2 ** ((keys[1] - keys[0]) / 12), rel=1e-3)
-
-
-def test_a_roll_adds_to_the_motion_without_a_hole() -> None:
-    events: list[Timed] = [(0.05 * number, NoteOn(41, 60)) for number in range(8)]
-    sound = play(KIT, PRESET, 0.6, *events, (0.4, Bend(0.5)), (0.45, NoteOff(41)))
-    assert np.isfinite(sound).all() and 0.01 < np.abs(sound).max() < 2
-    assert np.abs(sound[2_400:19_200]).reshape(-1, 480).max(1).min() > 1e-4
 
 
 def test_a_pluck_by_hand_strikes_a_drum_as_its_velocity_says() -> None:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from app.instrument.events import NoteOn
-from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, outside_of_key, reported, t60_s
-from app.patches.patch import Fretted, Knobs, Patch
+from app.instrument.facts import FIGURES, bright_mode, knob_for, outside_of_key, t60_s
+from app.patches.patch import Fretted, Patch
 from app.shared.parameters import OF_PATCHES
 from engine.presets import Preset
 from engine.values.string import Losses
@@ -17,18 +17,6 @@ from tests.app.instrument.conftest import STEEL
 from tests.app.instrument.stage import changed, string_of
 
 KEY = 57
-
-
-def test_figures_are_three_digits_and_a_unit(patch: Patch) -> None:
-    reported_as = {70.31: "70.3 N", 649.6: "650 N", 17829.0: "17829 N", 0.0512: "0.0512 N", 4.1e-5: "4.1e-05 N"}
-    assert {figure: reported(figure, "N") for figure in reported_as} == reported_as
-    assert (reported(0.0, "N"), reported(0.5, "")) == ("0 N", "0.500")
-    assert {field.removeprefix("knobs.") for field in FIGURES} == set(Knobs.model_fields)
-    expected = {"tension": "75.0 N", "density": "7850 kg/m³", "modulus": "200 GPa", "gauge": "0.798 mm"}
-    figures = figures_of(string_of(patch, KEY).parameters, patch)
-    assert {name: figures[f"knobs.{name}"] for name in expected} == expected
-    facts = {"key": "A3", "pitch": "220.0 Hz", "mass": "3.92 g/m", "stress": "150 MPa"}
-    assert facts_of(string_of(patch, KEY)) == facts
 
 
 def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohertz(patch: Patch) -> None:

@@ -422,9 +422,3 @@ def test_a_folder_is_not_called_too_large_and_too_many_messages_are(tmp_path: Pa
         read_midi(tmp_path)
     with pytest.raises(NotMidi, match=r"more than [0-9,]+ m"):
         read_messages(one_track(*[ON] * (MOST + 1)), MOST)
-
-
-def test_what_does_not_matter_may_be_wrong(file: Path) -> None:
-    """A key signature that nobody knows, and a text in no encoding."""
-    file.write_bytes(one_track(b"\x00\xff\x59\x02\x00\x02", b"\x00\xff\x58\x00", b"\x00\xff\x01\x02\xff\xfe", ON))
-    assert [each.event for each in read_midi(file)] == [NoteOn(60, 64)]

@@ -22,7 +22,6 @@ from app.patches.library import (
     save_patch,
 )
 from app.patches.patch import Patch
-from engine.whole_file import WriteError
 
 Make = Callable[..., Patch]
 
@@ -100,14 +99,6 @@ def test_renaming(make_patch: Make, own: Path) -> None:
     assert spelt.path == second.path and read_patch(spelt.path).name == "SECOND"
 
 
-def test_a_folder_that_cannot_be_written_is_reported(make_patch: Make, own: Path) -> None:
-    own.parent.parent.mkdir(exist_ok=True)
-    own.parent.write_text("a file")
-    with pytest.raises(WriteError, match="own"):
-        save_patch(make_patch())
-    assert list_patches(own) == ([], [])
-
-
 @pytest.mark.parametrize("name", ["..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"])
 def test_a_file_name_is_never_a_path(name: str) -> None:
     stem = file_stem(name)
@@ -173,11 +164,3 @@ def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:
     entries, problems = list_patches()
     assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
     assert len(problems) == 1 and "exists already; rename the file" in problems[0]
-
-
-def test_an_unknown_name_lists_the_known_ones(make_patch: Make) -> None:
-    save_patch(make_patch(name="Mine"))
-    with pytest.raises(PatchError, match=r"no instrument 'other'; .*mine"):
-        find_patch("other")
-    with pytest.raises(PatchError, match="absent"):
-        find_patch("absent.json")

@@ -91,22 +91,3 @@ def test_a_scale_that_miscounts_its_notes_is_refused(tmp_path: Path, said: int, 
     with pytest.raises(ValueError, match=re.escape(message)) as caught:
         read_scala(path)
     assert len(str(caught.value)) < 300
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("absent.scl", None),
-        ("long.scl", b"!\n" * 40_000),
-        ("empty.scl", b" \n"),
-        ("bytes.kbm", bytes(range(256))),
-        ("short.kbm", b"12\n0\n"),
-    ],
-)
-def test_a_file_that_is_no_tuning_is_reported_in_one_line(tmp_path: Path, name: str, content: bytes | None) -> None:
-    path = tmp_path / name
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(ValueError) as caught:
-        read_scala(path)
-    assert name in str(caught.value) and str(caught.value).isprintable() and len(str(caught.value)) <= 500

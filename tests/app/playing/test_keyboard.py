@@ -76,13 +76,6 @@ def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_s
     assert (REACH.amplitude_of(64), REACH.amplitude_of(999), REACH.velocity_of(0.0)) == (3.1623, 10, 1)
 
 
-def test_what_is_played_is_round_and_within_reach() -> None:
-    assert PluckRange((0.05, 0.95)).place(2 / 9) == 0.25
-    odd = PluckRange((1 / 3, 2 / 3), (1 / 3, 2 / 3))
-    assert (odd.place(0), odd.place(1)) == odd.position
-    assert (odd.amplitude_of(1), odd.amplitude_of(127)) == odd.amplitude_mm
-
-
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
     """Of many strings up to the rise of tension; one that bears more than the loudest key is played as any other."""
     assert PluckRange.of(read_info(small_preset)) == REACH

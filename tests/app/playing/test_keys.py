@@ -118,16 +118,6 @@ def played(sound: Any, wait: Wait) -> Iterator[Played]:
 # What is played reaches the strings
 
 
-def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(played: Played) -> None:
-    note = played.handle(NoteOn(45, 100))
-    heard = played.hear(24_000)
-    assert np.abs(heard[:200]).max() > 1e-4
-    assert isinstance(note, KeyNote) and note.began_frame == 64 and played.keys.sounding()[45] > 0.2
-    played.handle(NoteOff(45))
-    played.hear(48_000)
-    assert np.abs(played.hear(4_800)).max() < 1e-3 * np.abs(heard).max()
-
-
 def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(played: Played) -> None:
     for number, value in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, 64)):
         played.handle(ControlChange(number, value))
@@ -226,16 +216,6 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
     assert played.strike(NoteOn(45, 60)).gain == fresh.compiled.reports()[0].gain
     last = [event for event in played.recorded() if isinstance(event, PatchTurned)][-1].patch
     assert (last.knobs.stiffness, last.pickup.points, last.pickup.kind) == (3.0, (0.1, 0.2), "velocity")
-
-
-def test_another_patch_is_played_at_once(played: Played) -> None:
-    """As by a note that is played to hear it."""
-    other = read_patch(PATCHES / "classical_guitar.json")
-    found = []
-    for patch in (other, PATCH):
-        played.notes.set_instrument(patch, EAR)
-        found.append(played.strike(NoteOn(45, 60)).parameters)
-    assert None is not found[0] != found[1]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, release_all
 from app.instrument.midi_file import event_of
@@ -268,13 +267,3 @@ def test_a_controller_turns_a_macro_and_leaves_what_is_impossible() -> None:
         ("pluck.softest_mm", soft, soft),  # it may not be above the hardest
     ):
         assert turns_of(ControlChange(16, 127), MidiChoices().learned(field, 16), patch)["patch"] == expected
-
-
-def test_learn_and_forget() -> None:
-    choices = MidiChoices().learned("width", 74).learned("listen", 1)
-    assert choices.controllers == {"width": 74, "listen": 1}
-    assert choices.learned("listen", 74).controllers == {"listen": 74}  # one controller turns one thing
-    assert choices.forgotten("width").controllers == {"listen": 1}
-    for field, number in (("colour", 1), ("width", 128)):
-        with pytest.raises(ValidationError):
-            choices.learned(field, number)

@@ -29,7 +29,6 @@ from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
 from app.playing.sources import Sources
-from app.rendering import RenderRequest
 from app.rendering.subject import Loaded
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.models.koopman_var import KoopmanVar
@@ -245,15 +244,6 @@ def test_a_note_rings_until_it_is_silent(lab: Lab) -> None:
 
 
 # What must be loaded
-
-
-def test_a_preset_that_is_not_there_yet_is_loaded_and_sounds(lab: Lab, tmp_path: Path) -> None:
-    path = Path(shutil.copy(lab.bank, tmp_path))
-    note = lab.strike(path)
-    assert (lab.notes.ringing, note.seconds) == (1, 0)
-    lab.wait(lambda: not note.pending)
-    assert np.abs(lab.hear(0.05)).max() > 0.01
-    assert not lab.strike(path, position=0.6).pending
 
 
 def test_what_waits_hears_of_switches_and_of_stop(lab: Lab, tmp_path: Path) -> None:
@@ -559,26 +549,3 @@ def test_a_report_that_fails_stops_nothing(lab: Lab, monkeypatch: pytest.MonkeyP
 
 
 SOURCES = ("model", "truth", "preset:b")
-PLUCK = RenderRequest(Path("a"), Pluck(), 2.0, Ear((0.4,)), others=(Path("b.safetensors"),))
-
-
-def test_a_source_belongs_to_its_preset() -> None:
-    note = PluckVoices(PLUCK, SOURCES)
-    assert [note.subject(source) for source in SOURCES] == [Path("a"), Path("a"), Path("b.safetensors")]
-
-
-@pytest.mark.parametrize(
-    ("changes", "same"),
-    [
-        ({"seconds": 5.0}, True),
-        ({"speed": 0.5}, True),
-        ({"pluck": Pluck(0.5)}, False),
-        ({"preset": Path("c")}, False),
-        ({"ear": Ear((0.4,), "velocity")}, False),
-        ({"others": (Path("elsewhere/b.safetensors"),)}, False),
-    ],
-)
-def test_levels_depend_on_all_that_is_heard(changes: dict[str, object], same: bool) -> None:
-    other = replace(PLUCK, **changes)  # type: ignore[arg-type]
-    assert (PluckVoices(other, SOURCES).matching_key == PluckVoices(PLUCK, SOURCES).matching_key) == same
-    assert PluckVoices(PLUCK, SOURCES[:2]).matching_key != PluckVoices(PLUCK, SOURCES).matching_key

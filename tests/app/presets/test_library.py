@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 from app.export.choices import ExportChoices
 from app.instrument.bodies import body_names
 from app.presets.install import install_preset
-from app.presets.library import Library, PresetEntry, display_title, list_presets
+from app.presets.library import Library, PresetEntry, list_presets
 from app.rendering.note_sound import NoteSound
 from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
@@ -24,7 +24,6 @@ from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, preset_digest
 from engine.values.ear import Ear
-from engine.whole_file import WriteError
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
@@ -94,12 +93,6 @@ def test_what_is_no_preset_is_refused_and_leaves_nothing(
     with pytest.raises(PresetError, match=r"bad\.safetensors: not a whole safetensors file"):
         install_preset(given, own, [])
     assert not own.exists()
-
-
-def test_a_folder_that_cannot_be_made_is_reported(small_preset: Path, own: Path) -> None:
-    own.write_text("in the way")
-    with pytest.raises(WriteError, match="cannot be written"):
-        install_preset(small_preset, own, [])
 
 
 def test_a_dropped_preset_that_is_there_is_chosen_and_reported(
@@ -187,22 +180,6 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
 def entry(**changes: object) -> PresetEntry:
     (one, *_), _ = list_presets()
     return replace(one, name=str(changes.pop("name", one.name)), info=replace(one.info, **changes))  # type: ignore[arg-type]
-
-
-def test_a_preset_of_the_tables_is_titled_by_its_facts_and_any_other_by_its_file() -> None:
-    info = entry(
-        title="old", model="lru", rate_hz=4000, tension_modulated=True, initial="noise", horizon_steps=400
-    ).info
-    assert display_title("nylon_nonlinear_noise_4k_lru_400", info) == (
-        "Nylon B3, random shapes, 4 kHz — LRU, trained on 100 ms"
-    )
-    for name in (
-        "nylon_nonlinear_noise_4k_s5_400",
-        "nylon_nonlinear_noise_4k_lru",
-        "mine",
-        "nylon_linear_noise_4k_x",
-    ):
-        assert display_title(name, info) == "old", name
 
 
 def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first() -> None:

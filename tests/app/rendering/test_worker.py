@@ -129,21 +129,6 @@ def test_the_first_motion_waits_until_a_pluck_would_sound(small_preset: Path, he
         worker.close()
 
 
-def test_when_all_is_rendered_free_memory_is_given_back_once(
-    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls: list[str] = []
-    monkeypatch.setattr(worker_module, "return_free_pages", lambda: calls.append("returned"))
-    monkeypatch.setattr(worker_module, "TIDY_AFTER_S", 0.05)
-    time.sleep(0.1)
-    assert calls == [], "nothing was rendered yet"
-    worker.submit(request_of(small_preset))
-    wait_until(lambda: calls != [])
-    assert heard.finished
-    time.sleep(0.1)
-    assert calls == ["returned"]
-
-
 def test_a_broken_preset_is_reported_and_the_worker_lives_on(
     small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
 ) -> None:

@@ -25,14 +25,6 @@ def recorded(session: Session) -> list[frozenset[str]]:
     return seen
 
 
-def test_only_real_changes_are_reported() -> None:
-    session = Session()
-    seen = recorded(session)
-    session.update(listen=0.5, seconds=session.choices.seconds)
-    session.update(listen=0.5)
-    assert seen == [frozenset({"listen"})]
-
-
 @pytest.mark.parametrize(
     ("field", "value"),
     [
@@ -70,13 +62,6 @@ def test_slots_hold_any_two_sources_and_are_switched_there_and_back() -> None:
     for wrong in ("noise", "preset:", "model "):
         with pytest.raises(ValueError, match="a: "):
             session.update(a=wrong)
-
-
-@pytest.mark.parametrize("source", ["model", "truth"])
-def test_choices_from_before_the_slots_are_understood(source: str) -> None:
-    choices = Choices.model_validate_json(f'{{"heard": "{source}", "position": 0.4}}')
-    assert (choices.a, choices.b, choices.source_heard) == ("model", "truth", source)
-    assert choices.position == 0.4
 
 
 def test_keys_play_what_was_chosen_last() -> None:
@@ -162,12 +147,6 @@ def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:
     session.play_patch()  # it is heard as it is
     choices = session.choices
     assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
-
-
-def test_remembered_choices_begin_with_the_pick_up_of_the_patch() -> None:
-    """Those of earlier versions may differ."""
-    session = Session(Choices(instrument=played_patch(0.2), listen=0.9, pickup="velocity"))
-    assert (session.choices.listen, session.choices.pickup) == (0.2, "displacement")
 
 
 def test_a_patch_whose_macro_moves_the_right_point_stays_in_stereo() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
-from app.session.shown import DEFAULT_SOURCES, level_words, part_words, readable_unit, shown_sources
+from app.session.shown import readable_unit, shown_sources
 from engine.presets import read_info
 
 
@@ -17,10 +17,6 @@ from engine.presets import read_info
 def library(small_preset: Path) -> Library:
     info = replace(read_info(small_preset), title="Steel E4, bright")
     return Library([PresetEntry("steel_e4", small_preset, info)])
-
-
-def test_at_first_it_is_model_and_truth(library: Library) -> None:
-    assert shown_sources(Choices(), library) == DEFAULT_SOURCES
 
 
 def test_each_slot_is_reported_with_its_title_and_gain(library: Library) -> None:
@@ -34,14 +30,6 @@ def test_each_slot_is_reported_with_its_title_and_gain(library: Library) -> None
 def test_what_both_slots_hold_is_shown_once(library: Library) -> None:
     (only,) = shown_sources(Choices(a="truth", b="truth", heard="b"), library)
     assert (only.slots, only.heard) == ("A B", True)
-
-
-def test_the_axis_says_what_is_picked_up() -> None:
-    assert part_words(Choices()) == ""
-    assert level_words("bridge") == "dB re 20 N"
-    choices = Choices(pickup="velocity", solo=3, stereo=True)
-    assert part_words(choices) == "mode 3, left"
-    assert (level_words("displacement"), level_words("velocity")) == ("dB re 10 mm", "dB re 30 m/s")
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,5 @@
+"""Memory is returned to the system, and garbage is deleted in the window's own thread."""
+
 from __future__ import annotations
 
 import subprocess
@@ -21,6 +23,29 @@ del blocks
 print((most - before) // 2**20, (process.memory_info().rss - before) // 2**20)
 """
 
+SMALL_BLOCKS = """
+import threading
+import numpy as np
+import psutil
+from app.shared.heap import return_free_pages, return_large_blocks
+
+return_large_blocks()
+process = psutil.Process()
+
+def work():
+    before.append(process.memory_info().rss)
+    blocks = [np.ones(2**15) for _ in range(256)]  # of 256 KiB
+    pinned.extend(np.ones(2**10) for _ in range(8))
+    del blocks
+
+before, pinned = [], []
+thread = threading.Thread(target=work)
+thread.start()
+thread.join()
+kept = process.memory_info().rss
+return_free_pages()
+print((kept - before[0]) // 2**20, (process.memory_info().rss - before[0]) // 2**20)
+"""
 
 GARBAGE = """
 import gc, sys, threading, time
@@ -49,47 +74,16 @@ print(deleted_in)
 """
 
 
+def printed(script: str) -> str:
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.strip()
+
+
 def test_garbage_of_any_thread_is_deleted_in_the_windows() -> None:
-    reported = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=True).stdout
-    assert reported.strip() == "{True}"
+    assert printed(GARBAGE) == "{True}"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's heap")
-def test_large_blocks_are_returned() -> None:
-    reported = subprocess.run([sys.executable, "-c", LARGE_BLOCKS], capture_output=True, text=True, check=True).stdout
-    most_mib, left_mib = map(int, reported.split())
-    assert most_mib > 48
-    assert left_mib < 8
-
-
-SMALL_BLOCKS = """
-import threading
-import numpy as np
-import psutil
-from app.shared.heap import return_free_pages, return_large_blocks
-
-return_large_blocks()
-process = psutil.Process()
-
-def work():
-    before.append(process.memory_info().rss)
-    blocks = [np.ones(2**15) for _ in range(256)]  # of 256 KiB
-    pinned.extend(np.ones(2**10) for _ in range(8))
-    del blocks
-
-before, pinned = [], []
-thread = threading.Thread(target=work)
-thread.start()
-thread.join()
-kept = process.memory_info().rss
-return_free_pages()
-print((kept - before[0]) // 2**20, (process.memory_info().rss - before[0]) // 2**20)
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's heap")
-def test_free_pages_of_a_threads_heap_are_returned() -> None:
-    reported = subprocess.run([sys.executable, "-c", SMALL_BLOCKS], capture_output=True, text=True, check=True).stdout
-    kept_mib, left_mib = map(int, reported.split())
-    assert kept_mib > 32
-    assert left_mib < 8
+@pytest.mark.parametrize(("script", "least_mib"), [(LARGE_BLOCKS, 48), (SMALL_BLOCKS, 32)])
+def test_large_blocks_and_free_pages_of_a_threads_heap_are_returned(script: str, least_mib: int) -> None:
+    most_mib, left_mib = map(int, printed(script).split())
+    assert most_mib > least_mib and left_mib < 8

@@ -17,18 +17,6 @@ def test_each_whole_value_has_its_word(id: str) -> None:
     assert all(" " not in word for word in parameter.words)  # plug-ins keep them with spaces between
 
 
-def test_a_value_beyond_the_words_has_the_nearest() -> None:
-    parameter = OF_PATCHES["technique.strokes"]
-    assert [parameter.shown(value) for value in (-1.0, 0.6, 9.0)] == ["down", "up", "both"]
-
-
-@pytest.mark.parametrize(
-    "parameter", [*OF_PATCHES.values(), *OF_CHOICES.values()], ids=lambda parameter: parameter.id
-)
-def test_help_explains_each_parameter(parameter: Parameter) -> None:
-    assert parameter.tip
-
-
 @pytest.mark.parametrize("parameter", {**OF_PATCHES, **OF_CHOICES}.values(), ids=lambda parameter: parameter.id)
 def test_a_knob_goes_through_its_whole_range_and_back(parameter: Parameter) -> None:
     low, high = parameter.limits

@@ -40,7 +40,3 @@ def test_where_the_system_refuses_nothing_happens(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(os, "setpriority", refuse)
     lower_priority(Rank.BACKGROUND)
-
-
-def test_rendering_goes_before_the_background() -> None:
-    assert 0 < Rank.RENDERING < Rank.BACKGROUND < NICEST

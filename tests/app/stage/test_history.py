@@ -7,7 +7,7 @@ import pytest
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
 from app.session.choices import Choices
-from app.stage.session import GATHER_S, LARGEST_STEPS, RECORDED, Session
+from app.stage.session import GATHER_S, RECORDED, Session
 
 
 class Hand:
@@ -89,12 +89,6 @@ def test_a_new_change_forgets_what_was_undone(hand: Hand) -> None:
     assert not hand.session.redo_words
     assert hand.undone("width") == [0.06]
     assert hand.session.choices.position == 0.35
-
-
-def test_it_is_bounded(hand: Hand) -> None:
-    for step in range(LARGEST_STEPS + 50):
-        hand.change(1, position=0.3 + step / 1000)
-    assert len(hand.undone("position")) == LARGEST_STEPS
 
 
 def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:

@@ -15,7 +15,6 @@ from app.stage.session import Session
 from app.views.string.view import StringView
 from app.window.panels.spectrum import COLUMNS, Analyser, SpectrumPanel
 from app.window.panels.waveform import WaveformPanel, extremes
-from tests.app.gestures import LEFT
 
 
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])
@@ -110,10 +109,3 @@ def test_animated_plots_survive(qtbot: QtBot, waveform: WaveformPanel) -> None:
     assert drawn(waveform).getData()[1].max() > 2
     levels = [curve.getData()[0] for curve in spectrum.plot.getPlotItem().listDataItems()]
     assert COLUMNS in {len(level) for level in levels if level is not None}
-
-
-def test_a_click_on_the_waveform_asks_to_seek(qtbot: QtBot, waveform: WaveformPanel) -> None:
-    with qtbot.waitSignal(waveform.seek_asked) as asked:
-        viewport = waveform.plot.viewport()
-        qtbot.mouseClick(viewport, LEFT, pos=viewport.rect().center())
-    assert 0.35 < asked.args[0] < 0.65

@@ -134,12 +134,3 @@ def test_gaps_count_from_the_reset_and_frequent_ones_are_reported_once_for_a_buf
             desk.dialog.choice_made.emit(None, SoundChoice(buffer=buffer))
         desk.show(gaps=close)
         assert desk.notices.isHidden() is not reported
-
-
-def test_latencies_are_shown_and_those_of_another_buffer_forgotten(desk: Desk) -> None:
-    assert not desk.says("key to device")
-    desk.show(latency_s=0.012, latencies_s=(0.5, 0.004, 0.0031))
-    assert desk.says("48 kHz, buffer 12 ms, key to device 4.0 ms (measured)")
-    for buffer_s in (0.012, 0.05):
-        desk.show(latency_s=buffer_s)
-    assert desk.forgotten == 1

@@ -6,7 +6,6 @@ import shutil
 import threading
 import time
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -257,45 +256,6 @@ def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, An
     lab.press("Motion")
     assert not lab.choices.motion
     lab.wait(lambda: shown["show_frame"] is None)
-
-
-def test_one_picture_is_shown_at_a_time_by_turns_and_fewer_while_nothing_moves(
-    lab: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Between two events keys are heard: the string's picture and a deck's are no part of one event."""
-    lab.wait_for_take()
-    looks: list[tuple[str, float]] = []
-    for panel in lab.panels:
-        monkeypatch.setattr(panel, "show_moment", lambda _, key=panel.key: looks.append((key, time.monotonic())))
-    lab.change(listen=0.3)
-    lab.wait(lambda: len(looks) > 24)
-    names = [key for key, _ in looks][looks.index(next(each for each in looks if each[0] == "string")) :]
-    decks = [key for key in names if key != "string"]
-    assert {first != second for first, second in pairwise(decks)} == {True}, "by turns"
-    assert set(decks) == {"spectrum", "waveform"}
-    looks.clear()
-
-    def idle() -> bool:
-        """The last looks at the string were a tenth of a second apart, or more on a busy machine."""
-        strings = [at_s for key, at_s in looks if key == "string"][-4:]
-        return len(strings) == 4 and strings[3] - strings[0] > 0.27
-
-    lab.wait(idle)
-
-
-def test_only_changes_of_the_sound_are_reported_to_the_notes(lab: Window, monkeypatch: pytest.MonkeyPatch) -> None:
-    lab.wait_for_take()
-    reported: list[object] = []
-    monkeypatch.setattr(lab.notes, "set_monitor", lambda monitor, compared: reported.append((monitor, compared)))
-    monkeypatch.setattr(lab.notes, "listen", reported.append)
-    lab.change(left_view="waveform", speed=0.1, position=0.4)
-    assert reported == []
-    lab.change(heard="b")
-    heard = lab.choices
-    lab.change(listen=0.2)
-    ear = lab.choices.ear
-    lab.change(face="play")
-    assert reported == [(heard, True), ear, (lab.choices, False)]
 
 
 def test_a_window_without_device_or_with_faults_says_so_and_continues(

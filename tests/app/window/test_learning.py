@@ -11,11 +11,10 @@ import soundfile
 
 from app.instrument.bodies import own_bodies
 from app.patches.library import own_patches
-from app.views.dialogs.learn_dialog import NOT_FOUND, ON_KEYS, LearnDialog
+from app.views.dialogs.learn_dialog import ON_KEYS, LearnDialog
 from engine.presets import find_preset, read_info
 from tests.app.questions import answered
 from tests.app.window.driver import KEY, Window
-from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 
 UNWRITTEN = "Nothing is written yet. "
@@ -117,20 +116,6 @@ def test_the_dialog_says_what_a_sound_is_and_that_is_done_all_the_same(
     dialog.start.click()
     assert notice in guitar.window.notices.text and not dialogs(guitar)
     assert (own_bodies() / "sound.wav").exists() == (is_string is not None)
-
-
-def test_where_no_string_is_found_keeping_is_no_default(guitar: Window, tmp_path: Path) -> None:
-    samples, rate_hz = membrane(np.random.default_rng(15))
-    soundfile.write(tmp_path / "drum.wav", samples[:rate_hz], rate_hz, "FLOAT")
-    dialog = dialog_of(guitar, tmp_path / "drum.wav")
-    dialog.string.setChecked(True)
-    dialog.start.click()
-    guitar.wait(lambda: dialog.state.text() == UNWRITTEN + NOT_FOUND)
-    assert "no string found: " in dialog.report.toPlainText()
-    assert dialog.start.text() == "Keep all the same" and not dialog.start.isDefault()
-    with answered("Discard"):
-        dialog.reject()
-    assert not own_patches().exists()
 
 
 def test_a_name_that_is_taken_is_refused_and_the_learning_can_be_cancelled(guitar: Window, note: Path) -> None:

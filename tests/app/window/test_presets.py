@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import soundfile
-from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtCore import QPoint, QRect
 
 from app.audio.sound import Sound
 from app.instrument.bodies import own_bodies
@@ -22,13 +22,12 @@ from app.views.dialogs.learn_dialog import LearnDialog
 from app.window.settings import FIRST_FAVOURITES, load_settings
 from engine.effects import BODIES, Effects
 from engine.pluck import Pluck
-from engine.presets import preset_digest, preset_files
+from engine.presets import preset_files
 from engine.values.ear import Ear
 from tests.app.conftest import no_device
 from tests.app.sounds import export_sound
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, Window
-from training.heard_file import Heard, add_heard
 
 FIVE = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
 FIVE_KEYS, SEVEN_KEYS = (
@@ -171,35 +170,6 @@ def test_studio_presets_and_favourites_come_first_and_favourites_are_kept(
     lab.close()
     kept = load_settings(tmp_path / "settings.json")[0].favourites
     assert kept == tuple(sorted(("studio_zither", *FIRST_FAVOURITES)))
-
-
-def test_browser_and_card_say_how_true_a_preset_sounds(
-    lab: Window, browser: Browser, preset_folder: Path, small_preset: Path
-) -> None:
-    for words in ("A small string", "4 kHz", "the first 0.1 s", "25 % of the motion", "Licence", "MIT", "kB"):
-        assert words in browser.card.text()
-    for width in (1200, 400, 300):
-        lab.window.presets.card.resize(width, 20)
-        assert lab.window.presets.card.shown.endswith("validation error 25 %")
-    second = preset_folder / "second.safetensors"
-    second.write_bytes(small_preset.read_bytes().replace(b"A small string", b"<i>sma</i> str"))
-    add_heard(preset_folder, [Heard("<b>bold</b>", preset_digest(second), 4.0, 7.4, 5.2, 3.0, 13.0)])
-    for _ in range(2):
-        lab.controller.presets.toggle()
-    assert browser.listed == ["second", "first"], "the preset that was not measured is last"
-    rows = [browser.list.index_of(name) for name in browser.listed]
-    assert [row.siblingAtColumn(4).data() for row in rows] == ["pitch 13 cents too high …", "not measured"]
-    assert "&lt;i&gt;sma&lt;/i&gt; str" in rows[0].data(Qt.ItemDataRole.ToolTipRole)
-    assert "evaluate first --heard --write" in browser.card.text()
-    lab.change(preset="second")
-    words = "past training: pitch 13 cents too high; grows, +5 dB; spectra 7.4 dB apart over 4 s"
-    assert words in browser.card.text() and "<b>bold</b>" not in browser.card.text()
-    browser.order.setCurrentIndex(browser.order.findText("By name"))
-    browser.clear_filter()  # the order is no filter
-    assert browser.listed == ["first", "second"]
-    for text, found in (("grows", []), ("13 cents", ["second"])):
-        browser.search.setText(text)
-        assert browser.listed == found
 
 
 def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(

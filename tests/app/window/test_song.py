@@ -49,19 +49,16 @@ def strip(qtbot: QtBot) -> SongStrip:
     return made
 
 
-def test_from_a_time_on_pedals_are_chased_and_notes_are_not() -> None:
+def test_it_plays_stops_where_it_is_goes_elsewhere_and_is_closed(
+    qtbot: QtBot, strip: SongStrip, clock: list[float]
+) -> None:
     assert events_from(EVENTS, 0.0) == list(EVENTS)
-    assert events_from(EVENTS, 2.0) == [TimedEvent(0.0, PEDAL), TimedEvent(2.0, END)]
-
-
-def test_it_plays_stops_where_it_is_and_goes_elsewhere(qtbot: QtBot, strip: SongStrip, clock: list[float]) -> None:
+    assert events_from(EVENTS, 2.0) == [TimedEvent(0.0, PEDAL), TimedEvent(2.0, END)], "pedals are chased, notes not"
     played = Played()
     song = SongPlayer(played, strip)
     assert strip.isHidden()
     song.load("song.mid", EVENTS)
-    assert not strip.isHidden()
-    assert strip.name.text() == "song.mid"
-    assert played.events == list(EVENTS)
+    assert not strip.isHidden() and strip.name.text() == "song.mid" and played.events == list(EVENTS)
     clock[0] += 1.5
     song.tick()
     assert strip.time.text() == "0:01 / 0:04"
@@ -75,19 +72,11 @@ def test_it_plays_stops_where_it_is_and_goes_elsewhere(qtbot: QtBot, strip: Song
     qtbot.mouseClick(strip.play, Qt.MouseButton.LeftButton)
     assert played.events == events_from(EVENTS, 2.5)
     qtbot.keyClick(strip.slider, Qt.Key.Key_Left)
-    assert song.playing
-    assert played.events == events_from(EVENTS, 1.5)
-
-
-def test_at_its_end_it_goes_back_and_can_be_closed(qtbot: QtBot, strip: SongStrip, clock: list[float]) -> None:
-    played = Played()
-    song = SongPlayer(played, strip)
-    song.load("song.mid", EVENTS)
+    assert song.playing and played.events == events_from(EVENTS, 1.5)
     clock[0] += 4.5
-    played.events = None
+    played.events = None  # at the end it goes back
     song.tick()
     assert (song.playing, song.position_s, strip.play.text()) == (False, 0.0, "▶")
     song.play(1.0)
     qtbot.mouseClick(strip.closer, Qt.MouseButton.LeftButton)
-    assert played.events is None
-    assert strip.isHidden()
+    assert played.events is None and strip.isHidden()

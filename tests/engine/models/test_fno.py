@@ -15,23 +15,6 @@ from engine.models.fno import FGRU, FRNN, FieldState, FourierConvolution
 from tests.engine.models.laws import Arrays, ModelLaws, released
 from tests.engine.tensors import convolved
 
-Field = np.ndarray
-
-
-def sigmoid(x: Field) -> Field:
-    return np.asarray(1 / (1 + np.exp(-x)))
-
-
-def convolve(w: dict[str, Field], name: str, field: Field) -> Field:
-    """Complex DFT sums over the doubled string, one frequency and its conjugate after the other."""
-    points, total = len(field), np.zeros_like(field)
-    for k in range(points):
-        wave = np.exp(1j * np.pi * k * np.arange(points) / points)
-        re, im = w[f"{name}.weight"][k].transpose(1, 0, 2)
-        coefficient = wave.conj() @ field @ (re + 1j * im) + np.array([1, 1j]) @ w[f"{name}.bias"][k]
-        total += (1 if k == 0 else 2) * (wave[:, None] * coefficient).real / (2 * points)
-    return total
-
 
 class FourierLaws(ModelLaws):
     """Laws of both; their convolutions and dense layers by our names and theirs."""
@@ -63,23 +46,9 @@ class FourierLaws(ModelLaws):
             elif isinstance(module, torch.nn.Linear):
                 module.weight.normal_(0, 0.5 * module.in_features**-0.5, generator=generator)
 
-    def step(self, w: dict[str, Field], h: Field) -> Field:
-        """A step of the field (points, width) by its equations."""
-        raise NotImplementedError
-
     def tensor_step(self, model: Any, hidden: Tensor) -> Tensor:
         """The same of tensors (batch, points, width), with gradients."""
         raise NotImplementedError
-
-    @torch.no_grad()
-    def test_it_is_its_equations(self) -> None:
-        model, start = self.stirred(grid_points=11).double(), released(1, 12)[:, :11].double()
-        w = {name: tensor.numpy() for name, tensor in model.state_dict().items()}
-        h = start.numpy()[0][:, None] * w["in_mapping.weight"][:, 0] + w["in_mapping.bias"]
-        for frame in model(start, 30)[0].numpy():
-            h = self.step(w, h)
-            expected = h @ w["out_mapping.weight"][0] + w["out_mapping.bias"]
-            np.testing.assert_allclose(frame, expected, rtol=0, atol=1e-11)
 
     @pytest.mark.parametrize("points", [1, 2, 3, 10, 101])
     @torch.no_grad()
@@ -136,10 +105,6 @@ class TestFGRU(FourierLaws):
     count = 640_033
     convolutions: ClassVar = {name: name for name in ("z_layer", "r_layer", "h_layer")}
 
-    def step(self, w: dict[str, Field], h: Field) -> Field:
-        z, r = sigmoid(convolve(w, "z_layer", h)), sigmoid(convolve(w, "r_layer", h))
-        return np.asarray((1 - z) * h + z * np.tanh(convolve(w, "h_layer", r * h)))
-
     def tensor_step(self, model: FGRU, hidden: Tensor) -> Tensor:
         z, r = convolved(model.z_layer, hidden).sigmoid(), convolved(model.r_layer, hidden).sigmoid()
         return (1 - z) * hidden + z * convolved(model.h_layer, r * hidden).tanh()
@@ -161,12 +126,6 @@ class TestFRNN(FourierLaws):
     count = 643_201
     convolutions: ClassVar = {f"fourier_layers.{i}": f"fourier_conv_layers/{i}" for i in range(3)}
     dense: ClassVar = FourierLaws.dense | {f"pointwise_layers.{i}": f"w/{i}" for i in range(3)}
-
-    def step(self, w: dict[str, Field], h: Field) -> Field:
-        for i in range(3):
-            straight = h @ w[f"pointwise_layers.{i}.weight"].T + w[f"pointwise_layers.{i}.bias"]
-            h = np.maximum(convolve(w, f"fourier_layers.{i}", h), 0) + straight
-        return h
 
     def tensor_step(self, model: FRNN, hidden: Tensor) -> Tensor:
         for layer, pointwise in zip(model.fourier_layers, model.pointwise_layers, strict=True):

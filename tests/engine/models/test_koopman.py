@@ -99,7 +99,3 @@ class TestKoopmanVar(ModelLaws):
             x = z * torch.complex(*model.multiplier(z.abs().square()).chunk(2, dim=1))
             expected = torch.cat([x.real, x.imag], 1) @ w["decoder.weight"].T + w["decoder.bias"]
             torch.testing.assert_close(frame, expected, rtol=0, atol=1e-11)
-
-    def test_its_papers_start_lies_in_the_ring(self) -> None:
-        radius = torch.exp(-self.made().nu_log.detach().exp())
-        assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1

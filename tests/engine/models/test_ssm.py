@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
 from engine.models._ssm_kernel import stream
 from engine.models.s5 import S5Layer, hippo_normal
-from engine.models.ssm import DiagonalSSM, GatedBlock, SSMString, evolve, recur
+from engine.models.ssm import GatedBlock, SSMString, evolve, recur
 from tests.engine.models.laws import Arrays, ModelLaws, relative, released
-
-Layer = tuple[np.ndarray, ...]
 
 
 class StateSpaceLaws(ModelLaws):
@@ -27,10 +24,6 @@ class StateSpaceLaws(ModelLaws):
 
     def layer_weights(self, arrays: Arrays) -> Arrays:
         """Those of a layer by our names, from theirs."""
-        raise NotImplementedError
-
-    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
-        """Eigenvalues, B and C of a layer by its equations."""
         raise NotImplementedError
 
     def weights(self, arrays: Arrays) -> Arrays:
@@ -61,33 +54,6 @@ class StateSpaceLaws(ModelLaws):
             for weight in (block.gate.bias, *block.normalization.parameters(), *block.normalization.buffers()):
                 if weight.is_floating_point():
                     weight.uniform_(0.5, 1.5, generator=generator)
-
-    @torch.no_grad()
-    def test_it_is_its_equations(self) -> None:
-        """One step after the other, in NumPy."""
-        model, start, _ = self.of_the_reference()
-
-        def layer(ssm: DiagonalSSM) -> Layer:
-            stored = {name: weight.numpy() for name, weight in ssm.named_parameters()}
-            return *self.plain(stored), stored["D"]
-
-        eigenvalue, B, C, _ = layer(model.first_layer)
-        first = start.numpy() @ B.T
-        blocks = [(block, *layer(block.seq)) for block in model.layers]
-        states = [np.zeros((3, len(eigenvalue)), complex) for _ in blocks]
-        for frame in model(start, 200).unbind(1):
-            first = eigenvalue * first
-            y = (first @ C.T).real
-            for i, (block, block_eigenvalue, block_B, block_C, D) in enumerate(blocks):
-                norm = block.normalization
-                u = (y - norm.running_mean.numpy()) / np.sqrt(norm.running_var.numpy() + 1e-5)
-                u = u * norm.weight.numpy() + norm.bias.numpy()
-                states[i] = block_eigenvalue * states[i] + u @ block_B.T
-                v = (states[i] @ block_C.T).real + D * u
-                v = 0.5 * v * (1 + np.tanh(np.sqrt(2 / np.pi) * (v + 0.044715 * v**3)))
-                value, gate = np.split(v @ block.gate.weight.numpy().T + block.gate.bias.numpy(), 2, axis=-1)
-                y = y + value / (1 + np.exp(-gate))
-            np.testing.assert_allclose(frame.numpy(), y, rtol=0, atol=1e-12)
 
     def test_training_normalises_over_batch_and_time(self) -> None:
         model = self.made().train()
@@ -158,11 +124,6 @@ class TestLRU(StateSpaceLaws):
             stacked[matrix] = torch.stack([arrays[f"{matrix}_{part}"] for part in ("re", "im")], axis)
         return stacked
 
-    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
-        B = np.exp(stored["gamma_log"])[:, None] * (stored["B"][:, 0] + 1j * stored["B"][:, 1])
-        C = stored["C"][..., 0] + 1j * stored["C"][..., 1]
-        return np.exp(-np.exp(stored["nu_log"]) + 1j * np.exp(stored["theta_log"])), B, C
-
     @torch.no_grad()
     def test_its_papers_start_lies_in_the_ring_with_its_gamma(self) -> None:
         for block in self.made().layers:
@@ -182,12 +143,6 @@ class TestS5(StateSpaceLaws):
 
     def layer_weights(self, arrays: Arrays) -> Arrays:
         return arrays | {"B": arrays["B"].mT}
-
-    def plain(self, stored: dict[str, np.ndarray]) -> Layer:
-        rate = stored["Lambda_re"] + 1j * stored["Lambda_im"]
-        eigenvalue = np.exp(rate * np.exp(stored["log_step"][:, 0]))
-        B = ((eigenvalue - 1) / rate)[:, None] * (stored["B"][:, 0] + 1j * stored["B"][:, 1])
-        return eigenvalue, B, 2 * (stored["C"][..., 0] + 1j * stored["C"][..., 1])
 
     @torch.no_grad()
     def test_its_papers_start_is_hippo_in_blocks_with_steps_in_range(self) -> None:

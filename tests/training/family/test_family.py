@@ -15,7 +15,6 @@ from engine.presets import load_preset
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
-from training.family.errors import FamilyErrors, StringError
 from training.family.fit import FitCase, errors, fit_curves, geometric_mean
 from training.family.motion import linear_motion, untrained
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
@@ -102,16 +101,6 @@ def test_players_are_as_good_as_they_should_be() -> None:
     found = family_errors.measure(players, "inside", 2, RATE_HZ, window_s=0.05)
     means = [found[name].geometric_mean for name in players]
     assert means == sorted(means)
-
-
-def test_a_column_reports_its_worst() -> None:
-    strings = tuple(StringError(100.0, 1e-4, rise, 50, error) for rise, error in ((0.1, 1e-6), (0.4, 1e-1)))
-    reported = FamilyErrors(strings)
-    assert reported.worst.tension_rise == 0.4
-    assert reported.share_large == 0.5
-    assert math.isclose(reported.geometric_mean, math.sqrt(1e-7))
-    parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
-    assert [(edges, len(part.strings)) for edges, part in parts] == [((0, 0.2), 1), ((0.3, 0.5), 1)]
 
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:

@@ -25,9 +25,3 @@ def test_descriptions_are_those_of_the_files_where_the_system_has_another_encodi
         assert info.description == f"{description} Played by the model of every string."
         assert info == read_info(find_preset(f"studio_any_{name}"))
     assert "1140 kg/m³" in read_info(tmp_path / "studio_any_nylon_e4.safetensors").description
-
-
-def test_every_string_file_is_on_the_shelf_and_described() -> None:
-    files = {path.stem: path for path in STRINGS.glob("*.toml")}
-    assert files.keys() == TITLES.keys()
-    assert all(len(read_described_string(path)[1]) > 100 for path in files.values())

@@ -54,15 +54,21 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
     return dict(Checkpoint.load(folder / "checkpoint.safetensors").model)
 
 
-@pytest.mark.parametrize("recipe", ["ours", "paper", "published"])
-@pytest.mark.parametrize("model", SMALL)
-def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
+LEARNING = [
+    *((model, "ours") for model in ("koopman", "koopman_integrated", "fgru")),
+    *((model, "paper") for model in ("koopman_var", "s5")),
+    *((model, "published") for model in ("koopman", "lru", "frnn")),
+]
+
+
+@pytest.mark.parametrize(("model", "recipe"), LEARNING)
+def test_every_model_learns(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
     seen: list[FitProgress] = []
     horizon = 40 if model not in ("fgru", "frnn") else 12  # they take every frame one after the other
-    configuration = small(model, recipe, horizon, epochs=6, patience=0, first_horizon=horizon // 2)
+    configuration = small(model, recipe, horizon, epochs=4, patience=0, first_horizon=horizon // 2)
     found = fit(configuration, small_dataset, runs, report=seen.append)
     seen = [p for p in seen if p.ends_epoch]  # a slow machine reports more
-    assert [p.epoch for p in seen] == [1, 2, 3, 4, 5, 6]
+    assert [p.epoch for p in seen] == [1, 2, 3, 4]
     assert seen[-1].loss < seen[0].loss or seen[-1].horizon > seen[0].horizon
     assert math.isfinite(found.validation.total().rel_mae)
     starts = [found.start] if found.start else []  # FRNN may run away before it is trained
@@ -99,13 +105,8 @@ def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs:
 
 
 CUTS: list[tuple[str, dict[str, Any]]] = [
-    *((model, {}) for model in ("koopman_var", "lru")),
-    *((model, {"average_decay": 0.9}) for model in ("koopman_var", "lru")),
-    ("koopman_var", {"schedule": "constant", "patience": 100}),
-    ("lru", {"loss": "log10_mse"}),
-    *(
-        (model, {"optimiser": "soap", "batch_size": 3}) for model in ("koopman_var", "lru")
-    ),  # refreshes its basis, too
+    ("koopman_var", {"average_decay": 0.9, "schedule": "constant", "patience": 100}),
+    ("lru", {"optimiser": "soap", "batch_size": 3, "loss": "log10_mse"}),  # refreshes its basis, too
     ("lru", {"batch_statistics_until": 0.5}),
     ("koopman", {"latent_epochs": 2}),
 ]
@@ -248,18 +249,13 @@ def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
     assert found.validation.total().rel_mae < 0.3  # 10 ms of a string that is nearly linear
 
 
-def test_learning_rates_follow_the_recipe() -> None:
+def test_learning_rate_and_horizon_follow_the_recipe() -> None:
     cycle = Recipe(epochs=1, peak_learning_rate=1.0, start_share=0.1, warm_up=0.25)
-    assert [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)] == pytest.approx(
-        [0.1, 0.55, 1, 0.5, 0]
-    )
+    rates = [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)]
+    assert rates == pytest.approx([0.1, 0.55, 1, 0.5, 0])
     assert learning_rate_at(Recipe(epochs=1, schedule="constant", peak_learning_rate=3e-3), 0.9) == 3e-3
-
-
-def test_the_horizon_grows_geometrically() -> None:
     recipe = Recipe(epochs=1, first_horizon=100, grow_until=0.5)
     assert [horizon_at(recipe, share, 1600) for share in (0, 0.125, 0.25, 0.5, 0.9)] == [100, 200, 400, 1600, 1600]
-    assert horizon_at(recipe, 0, 40) == 40
 
 
 class Shifted(torch.nn.Module):
@@ -305,7 +301,7 @@ def mapped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module.together, "MAPPED_ON", ("cpu",))
 
 
-BY_RECIPE = [*((name, "ours") for name in SMALL), *((name, "published") for name in ("koopman", "s5", "frnn"))]
+BY_RECIPE = [(name, "published" if name in ("s5", "frnn") else "ours") for name in SMALL]
 
 
 @pytest.mark.parametrize(("model", "recipe"), BY_RECIPE)
@@ -321,7 +317,7 @@ def test_a_seed_trained_with_others_is_the_seed_alone(
         changes["steps_per_batch"] = 0  # the same frames for all
     if (model, recipe) == ("koopman", "ours"):
         changes |= {"latent_epochs": 5, "latent_polish": 1}
-    configurations = [small(model, recipe, horizon, seed=seed, **changes) for seed in range(3)]
+    configurations = [small(model, recipe, horizon, seed=seed, **changes) for seed in range(2)]
     seeds = named(configurations)
     losses: dict[str, dict[str, list[float]]] = {
         way: {run.name: [] for run in seeds} for way in ("alone", "together")
@@ -337,7 +333,7 @@ def test_a_seed_trained_with_others_is_the_seed_alone(
         train("alone", seed)
     train("together", *seeds)
     alone, together = (list(of_way.values()) for of_way in losses.values())
-    assert [len(own) for own in together] == [epochs] * 3
+    assert [len(own) for own in together] == [epochs] * 2
     torch.testing.assert_close(torch.tensor(together), torch.tensor(alone), rtol=1e-5, atol=0)
 
 

@@ -22,8 +22,7 @@ class Rendered:
         return self.learned.render(np.arange(round(self.seconds * rate_hz)) / rate_hz)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("impulse_hz", [22_050, 44_100])
+@pytest.mark.parametrize(("seed", "impulse_hz"), [(0, 22_050), (1, 44_100), (2, 44_100)])
 def test_a_knock_through_the_body_is_found_again_without_the_body(seed: int, impulse_hz: int) -> None:
     learned, note, _ = modelled_note(seed, 1, seconds=0.4)
     rate, random = note.rate_hz, np.random.default_rng(seed)

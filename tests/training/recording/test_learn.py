@@ -14,9 +14,8 @@ from engine.resonators.recorded import RecordedString
 from tests.training.recording.synthetic import SyntheticNote
 from training.recording.learn import Learned, combined, examined, learn
 from training.recording.physics import Partial
-from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
+from training.recording.preset import Source, recorded_note, recorded_string, write_preset
 from training.recording.report import figures
-from training.recording.table import as_data, as_text
 
 
 def recorded_of(learned: Learned) -> RecordedString:
@@ -28,11 +27,6 @@ def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -
     errors = learned.report.errors
     assert errors.esr < 2e-3 and errors.log_spectral_distance_db < 4
     assert errors.esr < 0.5 * learned.verdict.linear_esr
-
-
-def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: SyntheticNote) -> None:
-    assert abs(1200 * math.log2(learned.physics.f0_hz / synthetic.f0_hz)) < 3
-    assert learned.physics.stiffness == pytest.approx(synthetic.stiffness, rel=0.1)
 
 
 def test_a_note_survives_its_preset(learned: Learned, tmp_path: Path) -> None:
@@ -56,18 +50,6 @@ def test_modes_of_the_recorded_pitch_are_the_notes(learned: Learned) -> None:
     for each in learned.physics.partials[:6]:
         lower = each.poles[0]
         assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / lower.hz)) < 0.5
-
-
-def test_a_body_is_finite_and_begins_at_once(learned: Learned) -> None:
-    response = body_response(learned.physics, learned.strung, 30, 48_000)
-    assert np.isfinite(response).all() and int(np.argmax(np.abs(response))) < 100
-
-
-def test_reports_are_plain(learned: Learned) -> None:
-    data = as_data(learned)
-    assert data["errors"]["esr"] == learned.report.errors.esr
-    assert any("density" in words for words in data["assumed"])
-    assert "error-to-signal ratio" in "\n".join(as_text(learned))
 
 
 def test_progress_may_cancel(synthetic: SyntheticNote) -> None:

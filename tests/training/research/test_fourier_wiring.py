@@ -1,6 +1,5 @@
 """Fourier cells that are wired as strings of known modes, against closed forms."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -107,20 +106,6 @@ def test_kernels_pass_spread_and_gather() -> None:
     expected[5, 0], expected[-4, 1], expected[:, 2] = 1.5, 6.0, 3 * shape
     torch.testing.assert_close(found[:, :3], expected[:, :3], rtol=0, atol=1e-12)
     assert float(found[7, 3]) == pytest.approx(3 * float(shape[-1]))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: frnn(modes(), width=6), "5 modes need a width of 7 and a depth of 3, not 6 and 3"),
-        (lambda: frnn(modes(), depth=2), "not 8 and 2"),
-        (lambda: fgru(modes(), width=15), "5 modes need a width of 16 and 16 points"),
-        (lambda: fgru(modes(points=15), points=15), "5 modes need a width of 16 and 16 points"),
-    ],
-)
-def test_a_string_that_does_not_fit_is_refused(make: Callable[[], object], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        make()
 
 
 def test_a_mean_motion_is_the_linear_strings_own() -> None:

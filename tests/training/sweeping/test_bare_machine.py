@@ -31,10 +31,9 @@ from training.sweeping.task import perform
 import training.cli.__main__
 
 plan = load_plan("tiny")
-for first in (0, 2):  # of the linear string and of the other
-    ended = perform(write(Options().task(plan, plan.runs[first])))
-    assert not ended["error"], ended["error"]
-    add_rows(Path("rows.csv"), [read(Row, row, "row") for row in ended["rows"]])
+ended = perform(write(Options().task(plan, plan.runs[0])))
+assert not ended["error"], ended["error"]
+add_rows(Path("rows.csv"), [read(Row, row, "row") for row in ended["rows"]])
 """
 
 
@@ -43,12 +42,4 @@ def test_engine_and_training_alone_sweep(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-P", "-c", RUN], cwd=tmp_path, env=environment, check=True, timeout=300)
     rows = read_results(tmp_path / "rows.csv")
     assert {(row.status, row.device, row.commit) for row in rows} == {("done", "cpu", "abc")}
-    assert {row.string for row in rows} == {"linear", "nonlinear"}
     assert all(row.hardware and row.torch for row in rows)
-
-
-def test_the_script_names_what_it_installs_and_a_plan_that_there_is() -> None:
-    script = (CODE / "training" / "sweeping" / "piece.sh").read_text(encoding="utf-8")
-    assert 'packages="numba numpy pydantic safetensors typer"' in script
-    assert (CODE / "training" / "sweeping" / "plans" / "published.toml").is_file()
-    assert "published --device cuda --minutes 9" in script

@@ -2,14 +2,12 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from training.cell import Cell, configuration_of
 from training.results import Row
-from training.start import PHASES
 from training.tables.compact import as_compact
 from training.tables.paper import COLUMNS, DatasetColumn, MeanFigure
 from training.tables.sections import sections
@@ -147,21 +145,6 @@ def test_a_compact_line_has_start_seeds_figures_and_ratio() -> None:
     by_mae = as_compact(TWO, metric="rel_mae")
     assert compact_lines(by_mae, 4000, "nonlinear", "LRU")[0][2] == "0.13 (0.1571) ×0.83"  # equal: not bold
     assert compact_lines(as_compact([row(mse=1.5)]), 4000, "nonlinear", "LRU")[0][2] == "*1.5 (0.0260) ×58*"
-
-
-def test_compact_lines_name_what_the_start_was_given() -> None:
-    def given(initialisation: str, **cell: Any) -> str:
-        run = row(Cell(**({"tension_modulated": True, "initial": "gaussian", "rate_hz": 4000} | cell)))
-        run = replace(run, initialisation=initialisation)
-        name = {"koopman_integrated": "integrated phase", "dmd": "DMD", "koopman": "Koopman"}[cell["model"]]
-        ((start, *_),) = compact_lines(as_compact([run]), 4000, "nonlinear", name)
-        return start
-
-    assert given("averaging", model="koopman_integrated") == "averaged equations"
-    assert given(PHASES, model="koopman_integrated", recipe="blind") == "displacement only"
-    assert given(PHASES, model="koopman_integrated", recipe="hinted") == "displacement only, hinted"
-    assert given("least squares", model="dmd") == "fitted"
-    assert given("paper", model="koopman", recipe="paper") == "random weights, paper's recipe"
 
 
 def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:

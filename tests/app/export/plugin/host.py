@@ -237,17 +237,18 @@ class Instance:
         def offered(_host: int, id: bytes) -> int | None:
             return c.addressof(self._offers[id]) if id in self._offers else None
 
+        def call_back(_host: int) -> None:
+            self.callbacks += 1
+
+        texts = {"name": b"tests", "vendor": b"", "url": b"", "host_version": b"1"}
+        calls = dict.fromkeys(("request_restart", "request_process"), lambda host: None)
         self._host = filled(
             HostStructure,
             version=Version(1, 2, 0),
-            name=b"tests",
-            vendor=b"",
-            url=b"",
-            host_version=b"1",
             get_extension=offered,
-            request_restart=lambda host: None,
-            request_process=lambda host: None,
-            request_callback=lambda host: setattr(self, "callbacks", self.callbacks + 1),
+            request_callback=call_back,
+            **texts,
+            **calls,
         )
         self.at = library.factory.create(library.at, c.addressof(self._host), id.encode())
         assert self.at, f"{id} is not in the library"
@@ -381,10 +382,8 @@ class Instance:
         audio = Audio(c.addressof(rows), None, 2, 0, 0)
         lists = c.addressof(incoming), c.addressof(outgoing)
         process = Process(self.frame, frames, None, None, c.addressof(audio), 0, 1, *lists)
-        at, memory = (
-            c.addressof(process),
-            (out, rows, audio, incoming, outgoing, process),
-        )  # which the call keeps alive
+        at = c.addressof(process)
+        memory = (out, rows, audio, incoming, outgoing, process)  # which the call keeps alive
 
         def call() -> None:
             self.status = self._own.process(self.at, at)

@@ -17,7 +17,7 @@ from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
 from app.export.plugin.identity import held_in
 from app.export.plugin.image import Image, image_of
-from app.export.plugin.objects import ObjectError, digest, objects_of, reason_of
+from app.export.plugin.objects import ObjectError, digest, objects_of
 from engine.kernels import cache as kernel_cache
 from engine.python_process import python_command, python_environment
 from engine.whole_file import WriteError
@@ -172,16 +172,3 @@ def test_what_a_killed_build_left_goes_with_the_next(
     build_plugin(images[:1], "lv2", this_target(), out / "b", objects)
     assert not list(aside.iterdir())
     assert [each.name for each in out.iterdir()] == ["b.lv2"]
-
-
-@pytest.mark.parametrize(
-    ("said", "wanted"),
-    [
-        ("warning\nlib.c:1:2: error: no\nnote", "lib.c:1:2: error: no"),
-        ("Traceback\n  x\nFileNotFoundError: zig", "FileNotFoundError: zig"),
-        ("a\nb\n\n", "b"),
-        ("", "its process ended with status -9; free some memory and try again"),
-    ],
-)
-def test_why_a_process_failed_is_one_line(said: str, wanted: str) -> None:
-    assert reason_of(-9, said) == wanted

@@ -46,30 +46,22 @@ def in_app(timed: Sequence[Timed], rate_hz: int) -> NDArray[np.float32]:
 
 
 def in_host(bank: Library, events: Sequence[Event], rate_hz: int) -> NDArray[np.float32]:
-    instance = bank.create(next(id for id, shown in bank.plugins.items() if shown == patch_of(MEMBERS).name))
+    instance = bank.create_named(patch_of(MEMBERS).name)
     instance.activate(rate_hz)
     latency = instance.latency
-    sound = instance.render(round(SECONDS * rate_hz) + latency, events)[latency:]
-    instance.destroy()
-    return sound
+    return instance.render(round(SECONDS * rate_hz) + latency, events)[latency:]
 
 
-@pytest.mark.parametrize("rate_hz", (44_100, 48_000, 96_000))
+@pytest.mark.parametrize("rate_hz", (44_100, 96_000))
 def test_member_channels_bend_and_slide_as_in_the_app(bank: Library, rate_hz: int) -> None:
     events = [to_host(event, round(time_s * rate_hz)) for time_s, event in MEMBERS_PLAY]
     wanted = in_app(MEMBERS_PLAY, rate_hz)
-    assert difference_db(in_host(bank, events, rate_hz), wanted) < EQUAL_DB
+    pressed = [*events, midi(9_000, 0xD1, 100, 0), midi(9_100, 0xA1, 52, 100)]  # changes nothing
+    assert difference_db(in_host(bank, pressed, rate_hz), wanted) < EQUAL_DB
     still = [each for each in MEMBERS_PLAY if not isinstance(each[1], Bend)]
     unslid = [each for each in MEMBERS_PLAY if not (isinstance(each[1], ControlChange) and each[1].number == SLIDE)]
     for other in (still, unslid):  # both are heard
         assert difference_db(in_app(other, rate_hz), wanted) > -40
-
-
-def test_pressure_changes_nothing_as_in_the_app(bank: Library) -> None:
-    rate_hz = 48_000
-    events = [to_host(event, round(time_s * rate_hz)) for time_s, event in MEMBERS_PLAY]
-    pressed = [*events, midi(9_000, 0xD1, 100, 0), midi(9_100, 0xA1, 52, 100)]
-    assert np.array_equal(in_host(bank, pressed, rate_hz), in_host(bank, events, rate_hz))
 
 
 def test_expressions_of_notes_are_what_bend_and_slide_of_a_member_are(bank: Library) -> None:

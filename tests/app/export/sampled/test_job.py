@@ -49,18 +49,6 @@ def test_an_instrument_is_replaced_with_its_samples(patch: Patch, render: Render
     assert names == {f"{zone.stem}.flac" for zone in small(patch).zones if zone.key <= 51}
 
 
-def test_progress_has_the_note_and_the_time_left(patch: Patch, render: Render, tmp_path: Path) -> None:
-    reported: list[tuple[float, str, float | None]] = []
-
-    def progress(share: float, text: str, left_s: float | None = None) -> None:
-        reported.append((share, text, left_s))
-
-    export_sampled(small(patch), tmp_path / "a.sfz", render, progress=progress)
-    assert [share for share, _, _ in reported] == [part / 10 for part in range(10)]
-    assert reported[0][1:] == (f"D3, velocity {small(patch).zones[0].velocity}", None)
-    assert [left_s is None for _, _, left_s in reported[:4]] == [True, True, False, False]  # the first also compiles
-
-
 @KINDS
 def test_what_a_killed_export_left_goes_with_the_next(
     kind: str, patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

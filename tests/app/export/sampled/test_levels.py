@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.export.sampled.levels import by_key, headroom_db, velocity_levels
-from app.export.sampled.plan import SampledPlan, Zone
+from app.export.sampled.levels import headroom_db, velocity_levels
+from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sample import StoredSample
 from app.patches.patch import Patch
 
@@ -67,11 +67,3 @@ def test_headroom_is_up_to_the_loudest_velocity_of_a_layer(patch: Patch) -> None
     levels_db = levels(patch, [-30.0, -20.0])
     assert list(found.values()) == pytest.approx([levels_db[63] + 30, levels_db[127] + 20])
     assert min(found.values()) > 1
-
-
-def test_layers_come_by_key_from_soft_to_hard(patch: Patch) -> None:
-    zones = SampledPlan(patch, (50, 51), layers=3).zones
-    samples: dict[Zone, StoredSample] = {zone: stored(-zone.key) for zone in reversed(zones)}
-    found = list(by_key(samples))
-    assert [[zone.velocities for zone in layers] for layers, _ in found] == [[(1, 42), (43, 84), (85, 127)]] * 2
-    assert [[each.level_db for each in own] for _, own in found] == [[-51] * 3, [-50] * 3]

@@ -10,7 +10,7 @@ import pytest
 
 from app.export.sampled.job import export_sampled
 from app.export.sampled.plan import SampledPlan
-from app.export.sampled.words import instrument_bytes, needed_bytes, size_words
+from app.export.sampled.words import instrument_bytes, needed_bytes
 
 
 @pytest.mark.parametrize("points", [(0.2,), (0.2, 0.3)])
@@ -34,10 +34,3 @@ def test_no_instrument_is_larger_than_reported(
     assert size <= reported
     assert size > (0.5 if form == "flac" and not soundfont else 0.97) * reported
     assert needed_bytes(plan, soundfont) == reported + (plan.largest_bytes if soundfont else 0)
-
-
-def test_a_soundfont_is_reported_with_what_it_takes_meanwhile(patch_of: Callable) -> None:
-    stereo = patch_of(pickup={"points": (0.2, 0.3)})
-    reported = size_words(SampledPlan(stereo, (50, 59), layers=2, seconds=10), soundfont=True)
-    assert reported == "at most 38 MB (16-bit), and up to 58 MB more while it is written"
-    assert size_words(SampledPlan(stereo, (50, 59), seconds=10, format="wav", bits="16"), False) == "at most 77 MB"

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QMenu, QPlainTextEdit, QPushButton, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QMenu
 from pytestqt.qtbot import QtBot
 
-from app.presets.library import PresetEntry
-from app.session.choices import Choices
 from app.views.controls.app_menu import ENTRIES, MENUS, AppMenu
-from app.views.controls.elided_label import ElidedLabel, Readout
+from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
-from app.views.controls.notice_bar import MOST_KEPT, NoticeBar, NoticeList
-from app.views.controls.segments import Segments
-from app.views.controls.slot_buttons import NARROW_WIDTH, WIDTH, SlotButtons
-from app.views.controls.transport_bar import TransportBar
-from engine.presets import read_info
-from tests.app.gestures import LEFT, Paints, named, picture, reported
+from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
+from tests.app.gestures import Paints, picture
 
 
 def test_every_entry_is_in_its_menu_and_undo_says_what_it_would_change(qtbot: QtBot) -> None:
@@ -47,17 +38,6 @@ def test_the_longest_wording_that_fits_is_shown(qtbot: QtBot) -> None:
     label.resize(20, 20)
     assert label.shown.endswith("…")
     assert label.text() == wordings[0]
-
-
-def test_a_readout_rests_on_its_own_words(qtbot: QtBot) -> None:
-    readout = Readout()
-    qtbot.addWidget(readout)
-    readout.resize(400, 20)
-    readout.rest("every frame")
-    readout.report("1.305 s   106 Hz", "106 Hz")
-    assert readout.shown == readout.toolTip() == "1.305 s   106 Hz"
-    readout.report("")
-    assert readout.shown == "every frame"
 
 
 def test_the_meter_is_painted_when_it_looks_another_way_and_not_sixty_times_a_second(qtbot: QtBot) -> None:
@@ -112,96 +92,3 @@ def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(bar: NoticeB
     for number in range(MOST_KEPT + 5):
         bar.inform(f"Fact {number}.")
     assert (len(bar.notices), label.objectName()) == (MOST_KEPT, "")
-
-
-@pytest.mark.parametrize(
-    ("message", "details", "offered"),
-    [("No sound.", "code -9996", True), ("Broken.", "", False), ("x: y", "y", False)],
-)
-def test_details_are_offered_where_they_add_something(
-    bar: NoticeBar, message: str, details: str, offered: bool
-) -> None:
-    bar.report(message, details)
-    assert named(bar, "Notice details", QToolButton).isHidden() is not offered
-
-
-def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) -> None:
-    bar.report("No sound.", "what the driver said")
-    bar.inform("Saved.")
-    bar.bell.click()
-    opened = bar.window().findChild(NoticeList)
-    assert bar.bell.unseen == 0
-    assert "none unread" in bar.bell.accessibleName()
-    rows, details = opened.findChild(QListWidget), opened.findChild(QPlainTextEdit)
-    assert [rows.item(row).text().split("   ")[1:] for row in range(2)] == [
-        ["note", "Saved."],
-        ["error", "No sound."],
-    ]
-    rows.setCurrentRow(1)
-    assert "what the driver said" in details.toPlainText()
-    bar.report("Later.")
-    assert "Later." in rows.item(0).text()
-    assert "No sound.\nwhat the driver said" in opened.report()
-    opened.close()
-
-
-def test_only_another_choice_by_the_user_is_reported(qtbot: QtBot) -> None:
-    segments = Segments("Shown", [("model", "Model", ""), ("truth", "Truth", ""), ("error", "Error", "")])
-    qtbot.addWidget(segments)
-    chosen = reported(segments.chosen)
-    for key in ("model", "truth", "truth"):
-        qtbot.mouseClick(segments.findChild(QToolButton, key), LEFT)
-    assert (segments.key, chosen) == ("truth", ["truth"])
-    segments.show_key("error")
-    assert (segments.key, chosen) == ("error", ["truth"])
-
-
-def test_the_slots_say_what_they_hold_with_much_room_and_with_little(qtbot: QtBot, small_preset: Path) -> None:
-    slots = SlotButtons()
-    qtbot.addWidget(slots)
-    info = replace(read_info(small_preset), title="Steel E4")
-    slots.set_entries([PresetEntry("studio_steel_e4", small_preset, info)])
-    slots.show_choices(Choices(a="preset:studio_steel_e4", b="difference"))
-    slots.show_gains({"a": -1.2, "b": 20.0})
-
-    def shown() -> list[str]:
-        return [button.text() for button in slots.findChildren(QPushButton) if button.text()[:1] in "AB"]
-
-    first, second = (each for each in slots.findChildren(QPushButton) if each.text()[:1] in "AB")
-    assert first.text().startswith("A  Steel E4") and "studio_steel_e4" not in first.accessibleName()
-    assert (second.width(), second.text()) == (WIDTH, "B  DIFF.  +20 dB")
-    slots.set_narrow(True)
-    assert second.width() == NARROW_WIDTH and second.text().endswith("+20")
-    slots.set_narrow(False)
-    assert (second.width(), second.text()) == (WIDTH, "B  DIFF.  +20 dB")
-    slots.show_choices(Choices(a="model", b="truth"))
-    slots.show_gains({"a": 0.1, "b": -12.3})
-    assert shown() == ["A  MODEL  +0.1 dB", "B  TRUTH  -12.3 dB"]
-    slots.show_gains({})
-    slots.set_narrow(True, tight=True)
-    assert shown() == ["A  MODEL", "B  TRUTH"]
-
-
-def test_the_button_that_plays_says_what_a_click_does(qtbot: QtBot) -> None:
-    bar = TransportBar()
-    qtbot.addWidget(bar)
-    play = named(bar, "Pluck or stop", QPushButton)
-    for playing, clicked in ((True, False), (False, False), (False, True), (True, True)):
-        if clicked:
-            qtbot.mouseClick(play, LEFT)  # it checks itself
-        bar.show_playing(playing)
-        assert (play.isChecked(), play.text()) == (playing, "■  Stop" if playing else "▶  Pluck")
-
-
-def test_listening_points_are_barred_at_the_bridge(qtbot: QtBot) -> None:
-    bar = TransportBar()
-    qtbot.addWidget(bar)
-    for pickup, stereo, enabled in (
-        ("bridge", True, (False, False)),
-        ("displacement", True, (True, True)),
-        ("bridge", False, (False, False)),
-        ("velocity", False, (True, False)),
-    ):
-        bar.show_choices(Choices(pickup=pickup, stereo=stereo))
-        assert tuple(bar.knobs[field].isEnabled() for field in ("listen", "listen_right")) == enabled
-        assert ("The bridge hears the whole string" in bar.knobs["listen"].toolTip()) == (pickup == "bridge")

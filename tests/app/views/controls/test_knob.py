@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolTip, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolTip, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.shared.parameters import Parameter, Taper
@@ -93,12 +93,6 @@ def test_keys(knob: Knob, key: Qt.Key, held: Qt.KeyboardModifier, value: float) 
     assert keeps(knob, key) == (key in (Key.Key_PageUp, Key.Key_PageDown))  # shortcuts of the window
 
 
-def test_a_double_click_resets(qtbot: QtBot, knob: Knob) -> None:
-    knob.set_value(12)
-    qtbot.mouseDClick(knob, LEFT)
-    assert knob.value == 4.0
-
-
 @pytest.mark.parametrize(
     ("text", "end", "value", "words"),
     [
@@ -132,15 +126,6 @@ def test_the_focus_returns_to_playing_or_where_keys_had_brought_it(
     knob.setFocus(reason)
     type_in(qtbot, knob, "7", end)
     assert QApplication.focusWidget() is (knob if reason == Qt.FocusReason.TabFocusReason else knob.window())
-
-
-def test_another_widget_that_is_clicked_takes_the_number_and_keeps_the_focus(qtbot: QtBot, knob: Knob) -> None:
-    other = QPushButton("other", knob.window())
-    other.show()
-    qtbot.keyClicks(knob, "7")
-    other.setFocus(Qt.FocusReason.MouseFocusReason)
-    assert knob.value == 7.0
-    assert other.hasFocus()
 
 
 def test_value_figure_and_bar_are_seen_and_said(qtbot: QtBot, knob: Knob) -> None:

@@ -85,18 +85,6 @@ def test_a_refused_text_leaves_the_value_says_so_and_presses_no_button(qtbot: Qt
     assert len(pressed) == 1 and box.value() == 1.2
 
 
-def test_a_word_for_no_value(qtbot: QtBot, locale: str) -> None:
-    box = made(qtbot, "length", 0)
-    box.setSpecialValueText("assumed")
-    assert box.text() == "assumed"
-    type_in(qtbot, box, "0,65", whole=True)
-    assert (box.value(), box.text()) == (0.65, "0.650 m")
-    box.lineEdit().selectAll()
-    qtbot.keyClick(box, Qt.Key.Key_Delete)
-    qtbot.keyClick(box, Qt.Key.Key_Return)
-    assert (box.value(), box.text()) == (0, "assumed")
-
-
 def test_counts_are_whole(qtbot: QtBot, locale: str) -> None:
     box = CountBox("trials", 5000, 16, "")
     qtbot.addWidget(box)

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QVBoxLayout, Q
 from pytestqt.qtbot import QtBot
 
 from app.views.controls.playing_keys import X11, PlayingKeys
-from app.views.instrument.patch_card import patch_browser
 from tests.app.gestures import CONTROL, NONE
 
 DOWN, UP = QEvent.Type.KeyPress, QEvent.Type.KeyRelease
@@ -62,20 +61,6 @@ def test_a_list_does_not_take_the_notes_and_who_writes_is_left_alone(
         focus(focused)
         qtbot.keyClicks(focused or box, "a")
         assert (letters, line.text(), box.currentText()) == (heard, text, chosen)
-
-
-def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
-    letters, browser, box = hear("windows"), patch_browser(window), window.findChild(QComboBox)
-    browser.show_over()
-    for focused in (browser.list, browser, box, window):
-        browser.search.clear()
-        focus(focused)
-        qtbot.keyClicks(focused, "ah")
-        assert (browser.search.text(), letters) == ("ah", [])
-    assert box.currentText() == "first"
-    browser.dismiss()
-    qtbot.keyClicks(window, "a")
-    assert letters == ["A", "a"]
 
 
 def test_a_key_that_is_held_down_is_reported_once_and_shortcuts_are_not_notes(

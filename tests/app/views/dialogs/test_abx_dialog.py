@@ -19,10 +19,9 @@ from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
 from app.playing.pair import Pair
-from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
 from engine.voices import Mixer
-from tests.app.gestures import LEFT, named
+from tests.app.gestures import named
 from tests.app.questions import answered
 
 RATE_HZ = 48_000
@@ -105,12 +104,6 @@ def texts(widget: QWidget) -> str:
 def saved(tmp_path: Path) -> AbxRecord:
     (path,) = (tmp_path / "records").iterdir()
     return AbxRecord.model_validate_json(path.read_bytes())
-
-
-def test_enter_starts_the_test_from_the_number_of_trials(qtbot: QtBot, open_dialog: Open) -> None:
-    dialog = open_dialog()
-    qtbot.keyClick(dialog.findChild(CountBox), Qt.Key.Key_Return)
-    assert dialog.testing
 
 
 def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
@@ -283,22 +276,3 @@ def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
     named(dialog, "Save elsewhere …", QPushButton).click()
     assert len(list((tmp_path / "other").iterdir())) == 1
     assert "cannot be written" not in texts(dialog)
-
-
-def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
-    dialog = open_dialog(trials=16)
-    assert "12 right of 16" in texts(dialog)
-    trials = dialog.findChild(CountBox)
-    trials.setValue(25)
-    assert "18 right of 25" in texts(dialog)
-    trials.setValue(4)
-    assert "Too few" in texts(dialog)
-    assert dialog.choices().trials == 4
-
-
-def test_clicks_hear_and_answer(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
-    dialog = open_dialog(trials=1)
-    start(dialog)
-    for name in ("Hear X", "←  X is A"):
-        qtbot.mouseClick(named(dialog, name, QPushButton), LEFT)
-    assert saved(tmp_path).trials[0].answer == "A"

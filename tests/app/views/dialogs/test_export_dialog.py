@@ -114,28 +114,6 @@ def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made, tmp_pa
     assert dialog.note.names.isHidden()
 
 
-def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog = made({"until_decayed": True, "decay_db": 100, "longest_s": 0.3})
-    assert dialog.note["decay_db"].isVisible()
-    assert not dialog.note["seconds"].isVisible()
-    run(qtbot, dialog, "Not decayed at the maximum length")
-    assert soundfile.info(tmp_path / "A small string B3 medium.wav").frames == 1200
-
-
-def test_what_a_rate_means_is_reported(dialog: ExportDialog) -> None:
-    rate = dialog.wav["rate_hz"]
-    rate.setCurrentIndex(rate.findData(96_000))
-    assert dialog.wav.note.text() == "adds no bandwidth: the model ends at 2 kHz"
-
-
-def test_a_folder_that_is_not_there_is_reported(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
-    dialog.note.file.edit.setText(str(tmp_path / "nowhere" / "x.wav"))
-    run(qtbot, dialog, "nowhere")
-    assert "make the folder first" in dialog.state.text()
-    assert dialog.save.isEnabled()
-    assert not dialog.show_folder.isVisible()
-
-
 def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
     dialog.note["seconds"].setValue(600)
     dialog.save.click()
@@ -216,20 +194,6 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     assert read_recipe(path).struck is None
     again = made(dialog.choices()[0].model_dump(), {"instrument": GUITAR})
     assert again.note.through.isChecked(), "the audible sound is offered first"
-
-
-@pytest.mark.parametrize(
-    ("heard", "words"),
-    [
-        # the instrument is kept, as is its page then
-        ({"single": "small", "patch": GUITAR}, "None: the string alone, as it is heard"),
-        ({"instrument": GUITAR, "a": "difference"}, "without amplifier, body and room, as a difference is heard"),
-    ],
-)
-def test_a_note_without_its_instrument_says_so(made, heard: dict[str, object], words: str) -> None:
-    page = made({}, heard).note
-    assert words in page.through_words.text()
-    assert page.through.isVisible() == (page.job().sound.struck is not None) == ("a" in heard)
 
 
 def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made) -> None:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-import pytest
 from pytestqt.qtbot import QtBot
 
 from app.presets.words import model_word
 from app.shared.log import log_file
 from app.views.controls.app_menu import ENTRIES
 from app.views.dialogs.help_dialog import HelpDialog, help_parts
-from app.window.about import about_text, library_versions
 from app.window.controller import Controller
 from engine.models import MODELS as KNOWN_MODELS
 
@@ -38,12 +35,3 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
     controller.window.action["about"].trigger()
     assert dialog.tabs.tabText(dialog.tabs.currentIndex()) == "About" and "DAFx24" in texts["About"]
     dialog.close()
-
-
-def test_about_has_versions_files_and_the_paper(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", "my/own")
-    text = about_text(Path("here/settings.json"), Path("there"))
-    paths = [str(Path(path)) for path in ("here/settings.json", "there", "my/own")]
-    for part in ("Learned Strings", "MIT", "DAFx24", "torch", "PySide6", *paths):
-        assert part in text
-    assert "not installed" not in library_versions().values()

@@ -116,12 +116,3 @@ def test_it_can_be_cancelled_while_it_compiles(qtbot: QtBot, dialog: ExportDialo
     dialog.close_button.click()
     qtbot.waitUntil(lambda: "Cancelled; nothing was written." in dialog.state.text())
     assert not dialog.plugin.file.path.exists()
-
-
-def test_without_a_compiler_the_extra_is_named(
-    qtbot: QtBot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: None)
-    choose(dialog, "lv2", this_target())
-    qtbot.waitUntil(lambda: "learned-strings[plugin]" in dialog.state.text())
-    assert not dialog.save.isEnabled()

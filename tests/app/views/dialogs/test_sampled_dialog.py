@@ -22,7 +22,6 @@ from app.export.sampled.words import pitch_words
 from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
-from app.views.dialogs import export_pages
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
 from tests.app.questions import answered
@@ -154,65 +153,6 @@ def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
     assert list(folder.iterdir()) == [] and notes.rendered == []
 
 
-def test_more_than_there_is_room_for_is_reported(made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.views.dialogs.export_pages.disk_usage", lambda path: SimpleNamespace(free=100_000))
-    assert "; 0.1 MB are free there" in made().sampler.size_text.text()
-
-
-def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch) -> None:
-    assert patch.room.mix > 0
-    dialog = made(keys=(60, 60), layers=1)
-    run(qtbot, dialog, "Dry leaves the room to the sampler")
-    dialog.sampler["dry"].setChecked(True)
-    run(qtbot, dialog, "1 sample, ")
-    assert "the room" not in dialog.state.text()
-    assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
-
-
-def test_a_body_that_is_not_here_is_reported(made, patch: Patch, preset: PresetEntry) -> None:
-    dialog = made()
-    gone = patch.model_copy(update={"body": patch.body.model_copy(update={"name": "gone", "mix": 0.5})})
-    show(dialog, gone, preset)
-    assert "the body gone is not here" in dialog.sampler.what.text()
-
-
-def test_progress_is_shown_and_the_choices_wait(
-    qtbot: QtBot, made, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.shared.worker.REPORT_EVERY_S", 0.0)
-    notes.last = 3
-    dialog = made()
-    dialog.save.click()
-    assert not dialog.sampler.isEnabled()
-    assert not dialog.save.isEnabled()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
-    qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
-    fourth = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
-    assert f"C♯4, velocity {fourth.velocity}, about " in dialog.state.text()
-    assert " s left. You can play on meanwhile." in dialog.state.text()
-    notes.gate.set()
-    qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
-    assert dialog.sampler.isEnabled()
-    assert dialog.bar.isHidden()
-
-
-def test_what_the_choices_mean_is_computed_once_they_settle(
-    qtbot: QtBot, made, patch: Patch, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    dialog = made()
-    says(qtbot, dialog, "6 samples")
-    computed: list[int] = []
-    planned = export_pages.planned
-    monkeypatch.setattr(
-        export_pages, "planned", lambda plan, out: computed.append(len(plan.zones)) or planned(plan, out)
-    )
-    for layers in (3, 4, 5):
-        dialog.sampler["layers"].setValue(layers)
-        show(dialog, patch.with_value("knobs.decay", layers), preset)
-    says(qtbot, dialog, "15 samples")
-    assert computed == [15]
-
-
 @pytest.mark.parametrize("form", ["flac", "sf2"])
 def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
     notes.last = 3
@@ -271,32 +211,6 @@ def test_what_cannot_be_is_reported_before_it_begins(
 def edit(form, text: str) -> None:
     form.file.edit.setText(text)
     form.file.edit.textEdited.emit(text)
-
-
-def test_an_error_of_the_work_is_one_line(qtbot: QtBot, made, notes: Notes, folder: Path) -> None:
-    (folder / "Classical_guitar_samples").mkdir()
-    (folder / "Classical_guitar_samples" / "mine.txt").write_text("mine")
-    dialog = made()
-    run(qtbot, dialog, "holds other files; remove it, or choose another name")
-    assert dialog.state.objectName() == "warning"
-    assert "\n" not in dialog.state.text()
-    assert dialog.save.isEnabled()
-    assert dialog.show_folder.isHidden()
-    assert notes.rendered == []
-
-
-@pytest.mark.parametrize("gone", [True, False])
-def test_a_preset_that_cannot_be_read_ends_the_work(
-    qtbot: QtBot, made, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch, gone: bool
-) -> None:
-    dialog = made()
-    if gone:
-        preset.path.unlink()
-    else:
-        monkeypatch.setattr("app.export.sampled.job.load_preset", lambda path: {}["absent"])
-    run(qtbot, dialog, preset.path.name if gone else "failed: 'absent'")
-    assert dialog.state.objectName() == "warning"
-    assert dialog.save.isEnabled()
 
 
 def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from app.session.shown import DEFAULT_SOURCES
 from app.views import theme
 from app.views.drum.axes import HeadAxes
-from app.views.drum.ink import HeadFrame, angle_words, fitting_scale_m, image_of, kept_scale_m
+from app.views.drum.ink import HeadFrame, fitting_scale_m, image_of, kept_scale_m
 from app.views.drum.view import DrumView
 from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, colour_at, drag, picture, press_keys, reported
 
@@ -90,13 +90,6 @@ def test_keys_move_the_place_the_mark_and_reset_them(view: DrumView) -> None:
     view.set_place((0.97, 0.0))
     press_keys(view, Key.Key_Right)
     assert len(places) == 4, "the rim is not struck"
-
-
-def test_it_says_what_it_shows(view: DrumView) -> None:
-    view.set_place((0.25, -0.5))
-    view.set_listening_points(0.25)
-    assert view.accessibleDescription() == "Tom, A2, struck at +0.25, -0.50, heard from 30° left"
-    assert [angle_words(point) for point in (0.0, 0.5, 0.75, 1.0)] == ["90° left", "above", "30° right", "90° right"]
 
 
 def test_up_is_amber_down_is_blue_and_rest_is_the_panel(view: DrumView) -> None:

@@ -62,25 +62,6 @@ def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck, no
     assert len(notes) == 10, "beyond the range nothing is played"
 
 
-def test_lower_in_a_row_is_harder_and_the_velocity_is_shown(qtbot: QtBot, neck: Neck) -> None:
-    assert neck.cell(5, 3).top() == 0 < neck.cell(0, 3).top(), "the highest string is above"
-    pressed = reported(neck.pressed)
-    assert neck.figure == ""
-    for share in (0.15, 0.85):
-        before = picture(neck)
-        qtbot.mouseMove(neck, on(neck, 2, 4, share))
-        hovered = neck.figure
-        assert picture(neck) != before
-        qtbot.mousePress(neck, LEFT, pos=on(neck, 2, 4, share))
-        assert neck.figure == hovered == f"velocity {pressed[-1][1]}"
-        qtbot.mouseMove(neck, on(neck, 3, 4))  # a strum keeps it
-        assert neck.figure == hovered
-        qtbot.mouseRelease(neck, LEFT, pos=on(neck, 3, 4))
-    assert pressed[0][1] + 40 < pressed[-1][1]
-    qtbot.mouseMove(neck, NUMBERS)
-    assert neck.figure == ""
-
-
 def lit_x(neck: Neck, string: int) -> float:
     """The share of the width left of the dot of a string; not a number where there is none."""
     image = picture(neck)
@@ -113,15 +94,6 @@ def test_many_strings_or_one_are_a_fan_of_the_keys(
     for key in (40, 63, 86):
         qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
     assert [key for what, key in notes if what == "on"] == [40, 63, 86]
-
-
-@pytest.mark.parametrize("levels", [{}, {20: 1.0, 127: 0.5}, {40: 0.2, 64: 2.0}])
-def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) -> None:
-    for strings in (GUITAR, ()):
-        neck.set_strings(strings)
-        neck.show_sounding(levels)
-        neck.show_notes([SoundingNote(key, level, key % 7 - 1, 0.3) for key, level in levels.items()])
-        assert not picture(neck).isNull()
 
 
 def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
@@ -190,14 +162,3 @@ def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Ne
     assert [what for what, _ in notes] == ["on"] * 6 + ["off"] * 6
     press_keys(neck, up, up)
     assert neck.chosen == (58, 2), "the same fret of another string"
-
-
-def test_the_cursor_on_the_neck_is_seen_on_its_string(qtbot: QtBot, neck: Neck) -> None:
-    neck.activateWindow()
-    neck.setFocus()
-    qtbot.waitUntil(neck.hasFocus)
-    seen = []
-    for arrow in (Key.Key_Down, Key.Key_Down, Key.Key_Right, Key.Key_Left):
-        press_keys(neck, arrow)
-        seen.append(picture(neck))
-    assert seen[0] != seen[1] != seen[2] and seen[3] == seen[1]

@@ -42,18 +42,6 @@ def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: Inst
         panel.show_surface("neck")
 
 
-def test_the_hint_goes_with_the_first_note_and_is_not_cut_when_the_theme_changes(
-    qtbot: QtBot, panel: InstrumentPanel
-) -> None:
-    hint = hint_of(panel)
-    before = hint.size()
-    panel.setStyleSheet("QLabel#hint { padding: 3px 30px; font-size: 20px; }")
-    qtbot.waitUntil(lambda: hint.size() == hint.sizeHint() != before)
-    for sounding, visible in (({}, True), ({60: 0.2}, False)):
-        panel.show_sounding(sounding)
-        assert hint.isVisible() == visible
-
-
 def test_in_a_low_window_the_knobs_of_the_string_take_the_place_of_the_keys(
     qtbot: QtBot, panel: InstrumentPanel
 ) -> None:
@@ -79,20 +67,6 @@ def test_in_a_low_window_the_knobs_of_the_string_take_the_place_of_the_keys(
         click(qtbot, panel, words)
         assert (panel.unfolded, panel.knobs.isVisible(), panel.surface) == (False, False, name)
         assert panel.findChild(QStackedWidget).isVisible()
-
-
-def test_what_keys_play_is_chosen_from_words(panel: InstrumentPanel) -> None:
-    asked = reported(panel.keys_play_asked)
-    for action in panel.plays.menu().actions():
-        action.trigger()
-    assert sorted(asked) == ["pitch", "place"]
-    for plays, words in (("place", "Keys set pluck position"), ("pitch", "Keys play notes")):
-        panel.show_keys_play(plays, possible=True)
-        assert panel.plays.text().startswith(words)
-        assert panel.bar.octave.isVisible() == panel.bar.velocity.isVisible() == (plays == "pitch")
-    panel.show_keys_play("place", possible=False)
-    assert not panel.plays.isEnabled()
-    assert "Choose an instrument" in panel.plays.toolTip()
 
 
 def test_what_keys_do_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:

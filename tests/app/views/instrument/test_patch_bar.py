@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QMenu, QToolTip
+from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Macro, MacroTarget, Patch
 from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
-from tests.app.gestures import LEFT, named, press_keys, reported
+from tests.app.gestures import LEFT, press_keys, reported
 
 
 @pytest.fixture
@@ -23,32 +23,6 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
     made.show_octave(3, 2, 6)
     made.show()
     return made
-
-
-@pytest.mark.parametrize(
-    ("name", "signal"),
-    [
-        ("Previous instrument", "step_asked"),
-        ("Next instrument", "step_asked"),
-        ("Instrument: Classical guitar, changed", "browse_asked"),
-        ("Save the instrument", "save_asked"),
-        ("Rename the instrument", "rename_asked"),
-        ("Revert the instrument", "revert_asked"),
-        ("Record what is played", "record_asked"),
-        ("Octave up", "octave_asked"),
-    ],
-)
-def test_each_button_asks(qtbot: QtBot, bar: PatchBar, name: str, signal: str) -> None:
-    asked = reported(getattr(bar, signal))
-    qtbot.mouseClick(named(bar, name, QAbstractButton), LEFT)
-    assert asked == [{"Previous instrument": -1, "Next instrument": 1, "Octave up": 1}.get(name, ())]
-
-
-def test_it_says_whether_it_was_changed_and_whose_it_is(bar: PatchBar, guitar: Patch) -> None:
-    assert bar.name.text() == "●  Classical guitar   ▾"
-    bar.show_patch(guitar, own=False, changed=False)
-    assert bar.name.text() == "Classical guitar   ▾"
-    assert not (bar.save.isEnabled() or bar.revert.isEnabled() or bar.rename.isEnabled())
 
 
 def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, guitar: Patch) -> None:
@@ -72,30 +46,6 @@ def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, g
         macro = Macro(name="Tone", targets=tuple(MacroTarget(field=field, low=0.2, high=0.4) for field in fields))
         bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
         assert bar.macros[0].toolTip().splitlines()[0] == words
-
-
-def test_body_and_mixes(bar: PatchBar, guitar: Patch) -> None:
-    asked = reported(bar.body_chosen, bar.changed)
-    assert bar.body.currentText() == "Guitar"
-    bar.body.activated.emit(0)
-    press_keys(bar.knobs["room.mix"], Qt.Key.Key_End)
-    assert asked == ["", ("room.mix", 1.0)]
-    unknown = guitar.model_copy(update={"body": guitar.body.model_copy(update={"name": "a lost one"})})
-    bar.show_patch(unknown, own=True)
-    assert (bar.body.currentText(), bar.body.currentData()) == ("a lost one", "a lost one")
-    bar.set_bodies([("", "none"), ("guitar", "Guitar")])
-    assert [bar.body.itemData(row) for row in range(bar.body.count())].count("") == 1
-
-
-def test_what_the_instrument_does_is_shown(bar: PatchBar) -> None:
-    for shown, words in (((1,), "1 voice"), ((6, 64), "6 of 64 voices")):
-        bar.show_voices(*shown)
-        assert bar.voices.text() == words
-    bar.show_octave(-1, -2, 3)
-    bar.show_velocity(17)
-    assert (bar.octave.text(), bar.velocity.text()) == ("octave C-1", "velocity 17")
-    bar.show_note("Choose an instrument")
-    assert bar.note.objectName() == "faint"
 
 
 def test_the_record_button_shows_its_time_and_saves_or_discards_what_is_not_saved(
@@ -132,18 +82,3 @@ def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, 
         qtbot.mouseClick(bar.scala, LEFT)
     bar.show_patch(guitar, own=True)
     assert not bar.scala.isVisible()
-
-
-def test_the_octave_buttons_stop_where_no_key_sounds_and_say_why(qtbot: QtBot, bar: PatchBar) -> None:
-    lower, higher = (named(bar, name, QAbstractButton) for name in ("Octave down", "Octave up"))
-    for octave, ends in ((2, (False, True)), (3, (True, True)), (6, (True, False))):
-        bar.show_octave(octave, 2, 6)
-        assert (lower.isEnabled(), higher.isEnabled()) == ends
-    bar.say_octave("Highest octave: a <b>harp</b>")
-    assert QToolTip.isVisible()
-    assert "Highest octave: a &lt;b&gt;harp" in QToolTip.text()
-    QToolTip.hideText()
-    qtbot.waitUntil(lambda: not QToolTip.isVisible())
-    bar.show_pitches(False)
-    bar.say_octave("It is not shown.")
-    assert not QToolTip.isVisible()

@@ -6,16 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.patches.library import SHIPPED, PatchEntry
 from app.patches.patch import Patch
 from app.views.controls.browser import REALLY, Browser
-from app.views.controls.notice_bar import NoticeBar
 from app.views.instrument.patch_card import patch_browser, patch_row
-from tests.app.gestures import CONTROL, LEFT, press_keys, reported
+from tests.app.gestures import LEFT, press_keys, reported
 
 Key = Qt.Key
 
@@ -63,15 +62,6 @@ def chosen(browser: Browser) -> list[str]:
     return reported(browser.chosen)
 
 
-def test_all_are_listed_under_their_categories_favourites_first(browser: Browser) -> None:
-    assert browser.listed == ["steel", "nylon", "mine", "harp of brass"]
-    model = browser.list.model()
-    rows = [[model.index(row, column).data() for column in range(2)] for row in range(model.rowCount())]
-    lines = [" ".join(filter(None, texts)) for texts in rows]
-    assert lines == ["GUITAR", "★ steel", "☆ nylon", "☆ mine   (own)", "HARP", "☆ harp of brass"]
-    assert browser.accessibleName() == "Browser of instruments"
-
-
 @pytest.mark.parametrize(
     ("words", "category", "bank", "starred", "listed"),
     [
@@ -110,17 +100,6 @@ def test_arrows_pass_headings_load_and_play_when_they_rest(qtbot: QtBot, browser
     assert chosen[-1] == "steel"
 
 
-def test_space_plays_and_is_a_blank_in_a_search_and_control_d_makes_a_favourite(
-    qtbot: QtBot, browser: Browser
-) -> None:
-    asked = reported(browser.played, browser.favourite_asked)
-    press_keys(browser.search, Key.Key_Space)
-    press_keys(browser.list, Key.Key_D, held=CONTROL)
-    assert asked == ["steel", "steel"]
-    qtbot.keyClicks(browser.search, "of b")
-    assert browser.search.text() == "of b"
-
-
 def test_the_first_hit_is_selected_shown_and_what_buttons_are_for(
     qtbot: QtBot, browser: Browser, chosen: list[str]
 ) -> None:
@@ -154,51 +133,6 @@ def test_a_hit_by_its_name_is_better_than_one_by_its_description(
     assert browser.selected == "bass" and "<b>bass</b>" in browser.card.text()
 
 
-@pytest.mark.parametrize("loads", ["arrow", "click", "Enter"])
-def test_the_first_hit_is_loaded_although_it_is_selected_already(
-    qtbot: QtBot, browser: Browser, chosen: list[str], loads: str
-) -> None:
-    browser.search.setText("harp")
-    if loads == "click":
-        where = browser.list.visualRect(browser.list.currentIndex()).center()
-        qtbot.mouseClick(browser.list.viewport(), LEFT, pos=where)
-    else:
-        press_keys(browser.search, Key.Key_Down if loads == "arrow" else Key.Key_Return)
-    assert chosen == ["harp of brass"]
-    assert browser.isVisible() == (loads != "Enter")
-
-
-def test_typing_searches_wherever_the_focus_is(qtbot: QtBot, browser: Browser) -> None:
-    for focused in (browser.list, browser.filters["Category"], browser.starred, browser.play_button, browser.search):
-        browser.search.clear()
-        focused.setFocus()
-        qtbot.keyClicks(focused, "h")
-        assert browser.search.hasFocus()
-        qtbot.keyClicks(browser.search, "arp")
-        assert browser.search.text() == "harp"
-        assert browser.filters["Category"].currentIndex() == 0
-    press_keys(browser.filters["Category"], Key.Key_Escape)
-    assert not browser.isVisible()
-
-
-def test_headings_and_what_is_shown_do_not_load(
-    qtbot: QtBot, browser: Browser, guitar: Patch, chosen: list[str]
-) -> None:
-    qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place(browser, 0).center())
-    assert state(browser) == ("steel", "steel")
-    browser.set_chosen("nylon")
-    show(browser, [entry(guitar, name) for name in ("nylon", "new")], "new")
-    assert state(browser) == ("new", "new")
-    assert chosen == []
-
-
-def test_an_entry_that_a_search_hides_is_revealed(browser: Browser) -> None:
-    browser.search.setText("harp")
-    for name, words in (("harp of brass", "harp"), ("mine", "")):
-        browser.reveal(name)
-        assert browser.search.text() == words and name in browser.listed
-
-
 def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: QtBot, browser: Browser) -> None:
     renamed, deleted = reported(browser.rename_asked), reported(browser.delete_asked)
     assert not browser.rename.isVisible() and not browser.delete.isVisible()
@@ -212,17 +146,6 @@ def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: 
     for asked in ([], ["mine"]):  # first: another was looked at meanwhile
         qtbot.mouseClick(browser.delete, LEFT)
         assert deleted == asked
-
-
-def test_a_notice_is_not_hidden_behind_it(browser: Browser) -> None:
-    notices = NoticeBar(browser.parentWidget())
-    notices.place(QPoint(14, 50), 1200)
-    browser.place()
-    alone = browser.y()
-    notices.report("No sound.")
-    assert browser.y() > notices.geometry().bottom()
-    notices.hide()
-    assert browser.y() == alone == notices.y()
 
 
 @pytest.mark.parametrize("name", ["steel", "mine"])

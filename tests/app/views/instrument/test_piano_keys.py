@@ -125,13 +125,6 @@ def test_what_sounds_is_seen_as_loud_as_it_is(keys: PianoKeys) -> None:
     assert len(set(colours)) == 4
 
 
-def test_letters_are_printed_on_the_keys_that_they_play(keys: PianoKeys) -> None:
-    rects = [keys.key_rect(key).toRect() for key in (60, 76)]
-    before = [keys.grab(rect).toImage() for rect in rects]
-    keys.show_letters({60: "A", 61: "W"})
-    assert [keys.grab(rect).toImage() == bare for rect, bare in zip(rects, before, strict=True)] == [False, True]
-
-
 def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, notes: Notes) -> None:
     keys.activateWindow()
     keys.setFocus()

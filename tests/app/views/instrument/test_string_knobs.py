@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.patches.library import SHIPPED, read_patch
@@ -14,7 +14,7 @@ from app.patches.tuning import TuningChoice
 from app.views import theme
 from app.views.controls.sideways import Sideways
 from app.views.instrument.string_knobs import StringKnobs
-from tests.app.gestures import LEFT, SHIFT, picture, press_keys, reported
+from tests.app.gestures import LEFT, SHIFT, press_keys, reported
 
 Key = Qt.Key
 
@@ -87,27 +87,6 @@ def test_what_a_patch_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs:
     assert not knobs.shape.isEnabled(), "drums have no pluck to shape"
 
 
-def test_a_knob_shows_what_it_makes_of_the_string_and_asks_for_a_figure(
-    qtbot: QtBot, knobs: StringKnobs, guitar: Patch
-) -> None:
-    knobs.show_patch(guitar.with_value("knobs.tension", 1.5))
-    knobs.show_figures({"knobs.tension": "107 N"})
-    tension, asked = knobs.knobs["knobs.tension"], reported(knobs.figure_asked)
-    assert tension.accessibleDescription() == "107 N (× 1.50)"
-    assert knobs.knobs["knobs.length"].accessibleDescription() == "× 1.00"
-    qtbot.keyClicks(tension, "9")
-    press_keys(tension.findChild(QLineEdit), Key.Key_Return)
-    assert asked == [("knobs.tension", 9.0)]
-    assert tension.value == 1.5
-
-
-def test_the_facts_are_reported_in_their_units(knobs: StringKnobs) -> None:
-    before = picture(knobs.facts)
-    knobs.facts.show_facts({"tension": "72.3 N", "length": "650 mm"})
-    assert knobs.facts.accessibleDescription() == "tension 72.3 N, length 650 mm"
-    assert picture(knobs.facts) != before
-
-
 def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qapp: QApplication) -> None:
     row = Sideways(knobs := StringKnobs())
     qtbot.addWidget(row)
@@ -123,26 +102,3 @@ def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qa
         assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
     finally:
         theme.apply_theme(qapp, "dark")
-
-
-class Counted(Sideways):
-    """Counts how often it is asked to lay out."""
-
-    requests = 0
-
-    def event(self, event: QEvent) -> bool:
-        self.requests += event.type() == QEvent.Type.LayoutRequest
-        return super().event(event)
-
-
-def test_a_row_at_rest_is_not_laid_out_again(qtbot: QtBot) -> None:
-    row = Counted(StringKnobs())
-    qtbot.addWidget(row)
-    with qtbot.waitExposed(row):
-        row.show()
-    for _ in range(20):
-        QApplication.processEvents()
-    row.requests = 0
-    for _ in range(20):
-        QApplication.processEvents()
-    assert row.requests == 0

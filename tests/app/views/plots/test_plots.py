@@ -13,15 +13,12 @@ from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.presets.library import Library
 from app.session.shown import DEFAULT_SOURCES, ShownSource
-from app.stage.session import Session
 from app.views import theme
 from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow
 from app.views.plots.legend import SHARE, Legend
 from app.views.plots.time_plot import TimePlot
-from app.window.panels.error_plane import ErrorPlanePanel
 from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_keys, reported, turn_wheel
 
 Key = Qt.Key
@@ -190,20 +187,6 @@ def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbo
         first, *_, last = numbers(axis)
         assert (first, last) == ("0", str(highest))
         assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
-
-
-def test_a_low_error_map_has_no_clipped_words(qtbot: QtBot) -> None:
-    view = ErrorPlanePanel(Session(), Library([]))
-    qtbot.addWidget(view)
-    view.show()
-    for height, label, foot in ((400, "amplitude (mm)", True), (130, "mm", False), (400, "amplitude (mm)", True)):
-        view.resize(420, height)
-        item = view.map.getPlotItem()
-        qtbot.waitUntil(lambda item=item, label=label: item.getAxis("left").labelText == label)
-        assert item.getAxis("bottom").label.isVisible() == foot
-        shown = numbers(item.getAxis("left"))
-        assert len(shown) >= 2
-        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(shown.values()))
 
 
 def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot) -> None:

@@ -24,17 +24,6 @@ class Recorder(QPainter):
         self.written.append(str(arguments[-1]))
 
 
-@pytest.mark.parametrize(("pluck", "count"), [(0, 2), (None, 0)])
-def test_words_are_written_beside_a_pluck_and_not_under_a_motion_that_covers_them(
-    qtbot: QtBot, pluck: int | None, count: int
-) -> None:
-    image = QImage(1200, 300, QImage.Format.Format_ARGB32)  # the painter does not keep it
-    painter = Recorder(image)
-    paint_ground(painter, StringAxes(1200, 300, 5.0), TrainedPlucks((0.3, 0.7)), pluck)
-    painter.end()
-    assert painter.written.count("not trained here") == count
-
-
 @pytest.mark.parametrize(("height", "figures"), [(300, 5), (112, 3), (90, 1)])
 def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, height: int, figures: int) -> None:
     axes = StringAxes(1200, height, 5.0)

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
-from app.views.stage import WORDS_HEIGHT
 from app.views.string.axes import StringAxes
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
@@ -22,7 +20,6 @@ from tests.app.gestures import (
     Paints,
     colour_at,
     drag,
-    named,
     picture,
     reported,
     turn_wheel,
@@ -146,18 +143,6 @@ def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view:
         assert (len(resets), len(released)) == seen, "the first click brings the handle there: twice plucked"
 
 
-def test_the_pointer_reports_what_can_be_grabbed_and_all_of_a_warning(qtbot: QtBot, view: StringView) -> None:
-    cursors, tips = set(), set()
-    for at in (QPoint(200, 200), HANDLE, QPoint(round(AXES.x(0.37)), FOOT)):
-        qtbot.mouseMove(view, at)
-        cursors.add(view.cursor().shape())
-        tips.add(view.toolTip())
-    assert len(cursors) == len(tips) == 3
-    view.set_warning("amplitude 15.39 mm is outside the trained 0.5 … 10 mm")
-    qtbot.mouseMove(view, QPoint(200, WORDS_HEIGHT // 2))
-    assert view.toolTip() == "amplitude 15.39 mm is outside the trained 0.5 … 10 mm"
-
-
 def test_two_markers_are_reported_apart_and_reset_and_the_bridge_has_none(qtbot: QtBot, view: StringView) -> None:
     moved, resets = reported(view.listening_point_moved), reported(view.listening_point_reset)
     for points in ((0.2, 0.6), (None, None)):
@@ -243,14 +228,3 @@ def test_the_scale_follows_the_decay_and_the_pluck_comes_back(view: StringView, 
     view.show_frame(None)
     picture(view)  # its scale comes back first
     assert picture(view) == rest
-
-
-def test_the_switches_say_what_is_wanted_and_show_what_is(qtbot: QtBot, view: StringView) -> None:
-    motion, envelope = (named(view, name, QToolButton) for name in ("Motion", "Envelope"))
-    view.set_shown(True, False)
-    assert (motion.isChecked(), envelope.isChecked()) == (True, False)
-    asked = reported(view.motion_toggled)
-    qtbot.mouseClick(motion, LEFT)
-    assert asked == [False]
-    view.set_shown(False, True)
-    assert not envelope.isEnabled()

@@ -8,7 +8,6 @@ from threading import Event
 from typing import Any
 
 import pytest
-import torch
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QAbstractButton, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
@@ -191,11 +190,3 @@ def test_a_job_rests_while_nobody_looks(qtbot: QtBot, panel: Panel, monkeypatch:
     assert shares == []
     qtbot.waitUntil(lambda: panel.look() or bool(ended))  # again and again: each look holds for UNSEEN_S
     assert shares == [0.5]
-
-
-def test_a_job_has_one_core_and_gives_the_others_back(qtbot: QtBot, panel: Panel) -> None:
-    usual = torch.get_num_threads()
-    with qtbot.waitSignal(panel.background.finished) as finished:
-        panel.compute(lambda job: torch.get_num_threads())
-    assert finished.args == [1]
-    assert torch.get_num_threads() == usual

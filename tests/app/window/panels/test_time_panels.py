@@ -76,15 +76,6 @@ def test_the_map_shows_motion_and_error_in_mm_and_bar_and_readout_agree(make: Ma
     assert panel.readout.text() == "0.0000 s   position 0.50   +40 µm"
 
 
-def test_each_quantity_keeps_its_gain(make: Make) -> None:
-    panel = make(SpaceTimePanel)
-    choose_in(panel.gains, 10)
-    assert panel.scale_mm == 0.4
-    for name, gain in (("Error", 0), ("Truth", 10)):
-        press(panel, name)
-        assert panel.gains.currentData() == gain
-
-
 def test_a_click_on_the_map_seeks_and_with_shift_listens_there(qtbot: QtBot, make: Make) -> None:
     panel = make(SpaceTimePanel)
     plot, before = panel.plot, panel.session.choices.listen
@@ -365,44 +356,3 @@ def test_the_string_shows_both_motions_at_one_moment_however_late_they_are(
     shapes = frames[-1].shapes
     assert np.abs(shapes["truth"]).max() > 0.1
     assert shapes["model"] == pytest.approx(1.01 * shapes["truth"], rel=1e-4, abs=1e-6)
-
-
-def draw_waveform(view: Any, turn: int) -> None:
-    view.set_scale(1.0, "displacement", "mm")
-    view.show_signal("model", np.sin(np.arange(100 * (turn + 1)) / 9).astype(np.float32), 16_000)
-
-
-def draw_spectrum(view: Any, turn: int) -> None:
-    view.show_signal("model", np.sin(np.arange(4096) / (9 + turn)).astype(np.float32), analyser_at(16_000))
-
-
-@pytest.mark.parametrize(("kind", "draw"), [(WaveformPanel, draw_waveform), (SpectrumPanel, draw_spectrum)])
-def test_axes_are_painted_when_they_change_and_not_with_every_curve(
-    qtbot: QtBot, make: Make, monkeypatch: pytest.MonkeyPatch, kind: type[Panel], draw: Callable[[Any, int], None]
-) -> None:
-    """That is most of what a painting takes."""
-    painted, paint = list[pg.AxisItem](), pg.AxisItem.paint
-    monkeypatch.setattr(pg.AxisItem, "paint", lambda axis, *rest: painted.append(axis) or paint(axis, *rest))
-    view = make(kind)
-
-    def still() -> bool:
-        painted.clear()
-        qtbot.wait(1)
-        view.plot.viewport().repaint()
-        return not painted
-
-    draw(view, 0)
-    qtbot.waitUntil(still)
-    for turn in range(1, 6):
-        draw(view, turn)
-        view.plot.viewport().repaint()
-        qtbot.wait(1)
-    assert painted == []
-    if kind is WaveformPanel:
-        for change, side in (
-            (lambda: view.plot.zoom(0.5), "bottom"),
-            (lambda: view.set_scale(3.0, "v", "m/s"), "left"),
-        ):
-            painted.clear()
-            change()
-            qtbot.waitUntil(lambda side=side: view.plot.getPlotItem().getAxis(side) in painted)
