@@ -19,7 +19,7 @@ from typing import TypeVar
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.patch import Patch
-from app.playing.ahead import Ahead, AheadSamples
+from app.playing.ahead import STOLEN_S, Ahead, AheadSamples
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
@@ -40,7 +40,6 @@ from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 
 MOST_NOTES = 40  # that ring at once; the oldest makes room
-STOLEN_S = 0.03  # the fade of one that makes room
 STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
@@ -425,7 +424,8 @@ class Notes:
             voice.begin_at(note.begin_frame)
             if voice.program.rendered:
                 voice.fade_out_by(request.seconds)  # behind it there are no samples
-                ahead.append(AheadSamples(voice, loaded.motion(request.pluck, request.seconds), note.from_s))
+                key = subject, request.pluck, request.ear, request.seconds
+                ahead.append(AheadSamples(voice, loaded.motion(request.pluck, request.seconds), key, note.from_s))
         note.voices, note.ahead = voices, ahead
         if ahead:
             self._ahead.render(note)

@@ -36,9 +36,11 @@ class ModelMotion(Pictures):
 
     def render(self, stop: int) -> None:
         """Render up to a frame at least, as far as there are any."""
-        with self._lock:
-            while self.ready_frames < min(stop, self.frames):
-                self._render_block()
+        rendered = False
+        while not rendered:
+            with self._lock:  # for a block: who hears the motion must not wait for who draws all of it
+                if not (rendered := self.ready_frames >= min(stop, self.frames)):
+                    self._render_block()
 
     def _render_block(self) -> None:
         began_s, left = time.monotonic(), self.frames - self.ready_frames

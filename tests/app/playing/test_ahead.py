@@ -49,10 +49,9 @@ class Ahead4k:
         pluck = Pluck(0.4, amplitude_mm)
         voice = self.model.voice("model", pluck, EAR, RATE_HZ, seconds)
         note = PluckVoices(RenderRequest(Path(), pluck, seconds, EAR), ("model",), from_s, voices={"model": voice})
-        motion = self.motions.setdefault(
-            key or object(), ModelMotion(self.model.model, self.model.initial_m(pluck), seconds)
-        )
-        samples = AheadSamples(voice, motion, from_s)
+        key = key or object()
+        motion = self.motions[key] = ModelMotion(self.model.model, self.model.initial_m(pluck), seconds)
+        samples = AheadSamples(voice, motion, key, from_s)
         note.ahead.append(samples)
         self.notes.append(note)
         self.ahead.render(note)
@@ -115,6 +114,7 @@ def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
     at.finished(key="b")  # the first is remembered by now: one thread renders both
     again = at.finished(key="a")
     assert at.begun_s[-1] == first.rendered_s, "with all of it"
+    assert at.motions["a"].ready_frames == 0, "the motion need not be rendered for it"
     np.testing.assert_array_equal(heard(again.voice, 3_000), heard(first.voice, 3_000))
 
 
@@ -165,6 +165,25 @@ def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pyte
     first, second = (at.render(seconds=20.0) for _ in range(2))
     at.wait(lambda: not any(note.pending for note in at.notes))
     assert not first.finished and first.given < 10 * second.given + 10 * RATE_HZ
+
+
+def test_where_more_sound_than_can_be_rendered_the_oldest_make_room(
+    at: Ahead4k, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow_down(monkeypatch, speed=3.0)
+    mixer, began_s = Mixer(RATE_HZ, limited=False), time.monotonic()
+    for _ in range(6):
+        voice = at.render(seconds=20.0).voice
+        at.wait(lambda: not at.notes[-1].pending)
+        mixer.add(voice)
+
+    def some_released() -> bool:
+        mixer.render(max(0, round((time.monotonic() - began_s) * RATE_HZ) - mixer.frames))
+        return any(note.released for note in at.notes)
+
+    at.wait(some_released)
+    released = [note.released for note in at.notes]
+    assert released == sorted(released, reverse=True) and not released[-1]
 
 
 def test_a_string_that_is_silent_is_not_rendered_to_its_end(at: Ahead4k) -> None:
