@@ -53,6 +53,14 @@ def train(
             min=1, max=MOST_SEEDS, metavar="N", help="Train N seeds together, the run's own or --seed first."
         ),
     ] = 1,
+    epochs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="In place of the recipe's, its schedule with them; the run is named CONFIG_epochsN then.",
+        ),
+    ] = None,
     device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "cpu",
     threads: Annotated[
         int | None, typer.Option(min=1, max=MOST_WORKERS, help="Threads of the CPU; default all cores.")
@@ -74,7 +82,7 @@ def train(
         )
     folder = runs or default_runs()
     begun: list[FitProgress] = []  # empty where all was finished already
-    with_seeds = [_with_seed(config, seed, number) for number in range(seeds)]
+    with_seeds = [_with_epochs(*_with_seed(config, seed, number), epochs) for number in range(seeds)]
     if threads is not None:
         torch.set_num_threads(threads)
     try:
@@ -88,7 +96,8 @@ def train(
 
             named = []
             for name, configuration in with_seeds:
-                cell = Cell.parse(name)
+                shortened = name.endswith(f"_epochs{epochs}")  # no row of its recipe then
+                cell = None if shortened else Cell.parse(name)
                 named.append(NamedRun(name, cell.recipe if cell else "", configuration, output, follow))
             rows = run_rows(
                 named,
@@ -129,6 +138,16 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
         return name, load(name)
     title, recipe = f"{configuration.title}, seed {wanted}", replace(configuration.recipe, seed=wanted)
     return name, replace(configuration, title=title, recipe=recipe)
+
+
+def _with_epochs(
+    name: str, configuration: TrainingConfiguration, epochs: int | None
+) -> tuple[str, TrainingConfiguration]:
+    """Name and configuration of a run that takes `epochs`, where they are given and not its recipe's own."""
+    if epochs is None or epochs == configuration.recipe.epochs:
+        return name, configuration
+    title, recipe = f"{configuration.title}, {epochs} epochs", replace(configuration.recipe, epochs=epochs)
+    return f"{name}_epochs{epochs}", replace(configuration, title=title, recipe=recipe)
 
 
 def _tell_row(file: Path, row: Row) -> None:
