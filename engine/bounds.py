@@ -112,6 +112,7 @@ AMP_TONE_DB = (-12.0, 12.0)
 MOST_RUNS = 2_000  # of a plan
 MOST_WORKERS = 1_024  # processes, and threads of one of them
 MOST_SEEDS = 100  # that are trained together
+MOST_EPOCHS = 1_000_000
 MOST_RETRIES = 100  # of a run that fails
 LARGEST_SEED = 2**63 - 1
 MOST_TRAJECTORIES = 1_000_000  # of a data set

@@ -351,12 +351,15 @@ class MainWindow(QMainWindow):
         width, height = self._size_px
         is_high, tests = height >= HIGH, self._shows("test")
         self._brand.setVisible(width >= (WIDE if self.face == "play" else WIDE_LAB))
-        buttons = (self._keys_button, self._test_button)
-        for button in buttons:
+        buttons = [self._keys_button, self._test_button] if tests and width < WIDE else []
+        for button in (self._keys_button, self._test_button):
             button.setVisible(width >= WIDE and tests)
+        if tests and width < TIGHT:
+            buttons.append(self._audio_button)
+        self._audio_button.setVisible(self._audio_button not in buttons)
         facts = (self.presets.card, self.through_label, self.outside_label, self.error_label)
         hides_facts = self._shows("facts") and not is_high
-        self._more.hold(*(buttons if tests and width < WIDE else ()), *(facts if hides_facts else ()))
+        self._more.hold(*buttons, *(facts if hides_facts else ()))
         self._facts.setVisible(is_high and self._shows("facts"))
         self.instrument.set_low(height < KNOBS_HIGH)
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)

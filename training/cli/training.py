@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from engine.bounds import LARGEST_SEED, MOST_SEEDS, MOST_WORKERS
+from engine.bounds import LARGEST_SEED, MOST_EPOCHS, MOST_SEEDS, MOST_WORKERS
 from engine.plain_text import duration, name_text
 from training.cli.arguments import Cache, Device, Runs
 from training.cli.console import Failure, number, progress, say
@@ -57,6 +57,7 @@ def train(
         int | None,
         typer.Option(
             min=1,
+            max=MOST_EPOCHS,
             metavar="N",
             help="In place of the recipe's, its schedule with them; the run is named CONFIG_epochsN then.",
         ),

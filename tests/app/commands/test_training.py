@@ -30,6 +30,7 @@ from training.cli.training import known_errors
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import FitProgress
+from training.fitting.log import read_log
 from training.heard_file import read_heard
 from training.heard_words import heard_sentence
 from training.results import Row, add_rows, read_results
@@ -136,6 +137,38 @@ def test_a_killed_run_continues_to_the_same_weights(
     rows = log(tiny_run, "cut")
     assert [row["epoch"] for row in rows] == ["1", "2", "3"]
     assert [row["loss"] for row in rows] == [row["loss"] for row in log(tiny_run, "whole")]
+
+
+def test_a_shortened_run_has_its_whole_schedule_and_a_name_of_its_own(
+    run: Run, tiny_run: Path, tmp_path: Path
+) -> None:
+    words = ["train", tiny_run, "--seed", 1, "--runs", tmp_path / "runs", "--cache", tmp_path / "cache"]
+    for epochs, name, title in (
+        (3, "tiny_seed1", ""),
+        (2, "tiny_seed1_epochs2", ", 2 epochs"),
+    ):  # 3: its recipe's own
+        assert run(*words, "--epochs", epochs).status == 0
+        folder = tmp_path / "runs" / name
+        info = load_preset(folder / f"{name}.safetensors").info
+        assert (info.title, info.training["recipe"]["epochs"]) == (f"Tiny, seed 1{title}", epochs)
+        rates = [epoch.learning_rate for epoch in read_log(folder / "log.csv")]
+        assert len(rates) == epochs and rates[-1] == 0  # the cycle ends with the run
+    assert "--epochs" in run(*words, "--epochs", 0).usage
+
+
+def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen: list[tuple[str, str]] = []
+
+    def begin(runs: Any, *_: Any, **__: Any) -> None:
+        chosen.extend((one.name, one.recipe) for one in runs)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("training.cli.training.load_data", lambda *_: None)
+    monkeypatch.setattr("training.run.run_rows", begin)
+    cell = "nylon_linear_noise_4k_lru_400_paper"
+    for words in ([], ["--epochs", 9, "--seeds", 2]):
+        run("train", cell, *words)
+    assert chosen == [(cell, "paper"), (f"{cell}_epochs9", ""), (f"{cell}_seed1_epochs9", "")]
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])
