@@ -74,7 +74,6 @@ def train(
     """
     import torch
 
-    from training.cell import Cell
     from training.run import NamedRun, default_runs, device_of, run_rows
 
     if seeds > 1 and output is not None:
@@ -83,11 +82,11 @@ def train(
         )
     folder = runs or default_runs()
     begun: list[FitProgress] = []  # empty where all was finished already
-    with_seeds = [_with_epochs(*_with_seed(config, seed, number), epochs) for number in range(seeds)]
+    chosen = [_chosen(config, seed, number, epochs) for number in range(seeds)]
     if threads is not None:
         torch.set_num_threads(threads)
     try:
-        load_data(with_seeds[0][1].data, cache)
+        load_data(chosen[0][2].data, cache)
         with progress("train") as report:
             shown = training_report(report)
 
@@ -95,11 +94,7 @@ def train(
                 begun.append(latest)
                 shown(latest)
 
-            named = []
-            for name, configuration in with_seeds:
-                shortened = name.endswith(f"_epochs{epochs}")  # no row of its recipe then
-                cell = None if shortened else Cell.parse(name)
-                named.append(NamedRun(name, cell.recipe if cell else "", configuration, output, follow))
+            named = [NamedRun(*run, output, follow) for run in chosen]
             rows = run_rows(
                 named,
                 folder,
@@ -108,7 +103,7 @@ def train(
                 waits=lambda: say(f"{folder / named[0].name}: another process trains there; waiting for its end"),
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command continues with {folder / with_seeds[0][0]}")
+        say(f"stopped; the same command continues with {folder / chosen[0][0]}")
         raise
     for run, row in zip(named, rows, strict=True):
         if row.status != "done":
@@ -116,7 +111,7 @@ def train(
         _tell_row(run.output(folder), row)
     if seeds > 1:
         _tell_mean(rows)
-    print_known(known_errors(with_seeds[0][1]))
+    print_known(known_errors(chosen[0][2]))
     if not begun:
         print("finished earlier, nothing was trained now")
     for run in named:
@@ -141,14 +136,16 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
     return name, replace(configuration, title=title, recipe=recipe)
 
 
-def _with_epochs(
-    name: str, configuration: TrainingConfiguration, epochs: int | None
-) -> tuple[str, TrainingConfiguration]:
-    """Name and configuration of a run that takes `epochs`, where they are given and not its recipe's own."""
+def _chosen(config: str, seed: int | None, number: int, epochs: int | None) -> tuple[str, str, TrainingConfiguration]:
+    """Name, recipe ("": it fills no cell) and configuration of a run; `epochs` in place of its recipe's own."""
+    from training.cell import Cell
+
+    name, configuration = _with_seed(config, seed, number)
     if epochs is None or epochs == configuration.recipe.epochs:
-        return name, configuration
+        cell = Cell.parse(name)
+        return name, cell.recipe if cell else "", configuration
     title, recipe = f"{configuration.title}, {epochs} epochs", replace(configuration.recipe, epochs=epochs)
-    return f"{name}_epochs{epochs}", replace(configuration, title=title, recipe=recipe)
+    return f"{name}_epochs{epochs}", "", replace(configuration, title=title, recipe=recipe)
 
 
 def _tell_row(file: Path, row: Row) -> None:
