@@ -1,7 +1,7 @@
 """Models that are no compiled voice: their samples are rendered ahead of the playhead, by one thread.
 
-A model that renders slower than it sounds begins only when the rest will be ready in time. Where more notes sound than
-can be rendered in time, the oldest makes room. A voice without samples pauses by itself; the others continue.
+A model that renders slower than it sounds begins only when the rest will be ready in time. Where more notes sound
+than can be rendered in time, the oldest makes room. A voice without samples pauses by itself; the others continue.
 """
 
 from __future__ import annotations

@@ -29,9 +29,7 @@ EVERY = 8
 APART = 0.02  # in units of 10 µm
 FRNN_APART = 0.5  # what it computes in single precision differs by up to 0.2 between an AMD and an Intel processor
 OFFSET_M = 1e-6  # a decoder's bias may leave so much, 80 dB below full scale; it does not sound
-OFFSETS_M = {
-    "nylon_nonlinear_noise_4k_koopman_400_published_epochs500": 1e-4
-}  # learned from random weights; constant
+OFFSETS_M = {"nylon_nonlinear_noise_4k_koopman_400_published_epochs500": 1e-4}  # of random weights; constant
 MOVES_M = 1e-9  # 140 dB below
 
 
