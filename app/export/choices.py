@@ -21,9 +21,8 @@ class ExportChoices(BaseModel):
         alone: the string without its instrument; not remembered, so that each dialog offers the audible sound first.
     """
 
-    model_config = ConfigDict(extra="ignore")  # versions with a page for batches have more fields
+    model_config = ConfigDict(extra="ignore")  # earlier versions have more fields
 
-    folder: str = ""
     source: Chosen = "model"
     rate_hz: int = 48_000
     bits: Bits = "24"

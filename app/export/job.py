@@ -18,14 +18,14 @@ class ExportJob(Protocol):
     """An export whose choices are made.
 
     Attributes:
-        folder: where the files are written.
+        file: that is written, or the first of several.
         cancelled: the files that are left after it was cancelled, in words.
     """
 
     cancelled: str
 
     @property
-    def folder(self) -> Path: ...
+    def file(self) -> Path: ...
 
     def run(self, progress: Progress) -> str:
         """Write the files and return the result in words, a line each. Any thread.

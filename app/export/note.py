@@ -209,8 +209,8 @@ class NoteExport:
     cancelled = "no file was written."
 
     @property
-    def folder(self) -> Path:
-        return next(iter(self.paths.values())).parent
+    def file(self) -> Path:
+        return next(iter(self.paths.values()))
 
     def run(self, progress: Progress) -> str:
         choices, settings = self.choices, self.choices.wav

@@ -119,8 +119,8 @@ class PlayedExport:
     cancelled = "the MIDI file is kept."
 
     @property
-    def folder(self) -> Path:
-        return self.path.parent
+    def file(self) -> Path:
+        return recorded_files(self.path)[0]
 
     def run(self, progress: Progress) -> str:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject
 
 from app.presets.library import Library
 from app.stage.session import Session
@@ -14,6 +13,7 @@ from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import BrowserRow
 from app.views.controls.choosers import ChoiceBar
 from app.views.dialogs.preset_card import preset_browser, preset_row
+from app.views.file_manager import open_folder
 from app.window.main_window import MainWindow
 from engine.folders import user_folder
 
@@ -96,8 +96,7 @@ class BrowserDesk(QObject):
             remedy = "choose another with LEARNED_STRINGS_PRESETS"
             self._notices.report(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
             return
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self._notices.report(f"No file manager was found here; your own {self.browser.what} are in {folder}.")
+        open_folder(folder, self._notices.report)
 
 
 class PresetDesk(BrowserDesk):

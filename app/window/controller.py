@@ -94,6 +94,7 @@ class Controller(QObject):
         window.closing.connect(self.sound.close)  # in case the rest of this fails
         self.audio.open()  # it is opened while all else is made
         window.show_look(settings.look)
+        window.places.choices = settings.files
         self._timer = QTimer(self, interval=LOOK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
         self._lively_until_s = 0.0
@@ -288,7 +289,7 @@ class Controller(QObject):
         self.performance.stop()
         render = partial(self.performance.notes.compute, partial(compared_sounds, sound))
         self.performance.compare(True)
-        self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
+        self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window.places, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
@@ -383,6 +384,7 @@ class Controller(QObject):
                 "choices": self.session.choices,
                 "export": self.exports.choices[0],
                 "sampled": self.exports.choices[1],
+                "files": self.window.places.choices,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.window.look,

@@ -63,7 +63,7 @@ class Exports(QObject):
             self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
-            self.dialog = ExportDialog(self._choices, self._window)
+            self.dialog = ExportDialog(self._choices, self._window.places, self._window)
             self.dialog.finished.connect(self._end_dialog)
             self.dialog.exported.connect(self._forget_saved)
             self.dialog.ended.connect(self.ended)

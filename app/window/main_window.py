@@ -25,7 +25,6 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QComboBox,
-    QFileDialog,
     QGraphicsView,
     QHBoxLayout,
     QMainWindow,
@@ -53,6 +52,7 @@ from app.views.controls.sideways import Sideways
 from app.views.controls.song_strip import SongStrip
 from app.views.controls.transport_bar import TransportBar
 from app.views.faces import FACES, TITLES, Area
+from app.views.file_places import FilePlaces
 from app.views.instrument.panel import InstrumentPanel
 from app.views.look import Look
 from engine.kernels import cache  # and not the compiler
@@ -91,7 +91,7 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
 class MainWindow(QMainWindow):
     """The main window.
 
-    Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`.
+    Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`, `places`.
     """
 
     pluck_asked = Signal()
@@ -106,7 +106,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(760, 480)
         self.resize(1280, 800)
         self._painted = False
-        self._folder = ""  # of the file that was opened last
+        self.places = FilePlaces()
         self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
         self.look = Look()
         self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
@@ -469,10 +469,8 @@ class MainWindow(QMainWindow):
     # Files: dropped, or chosen in a dialog
 
     def _ask_for_files(self) -> None:
-        paths, _ = QFileDialog.getOpenFileNames(self, "Open", self._folder, FILE_FILTER)
-        for path in paths:
-            self._folder = str(Path(path).parent)
-            self.file_dropped.emit(Path(path))
+        for file in self.places.ask(self, "open", "Open", "open", FILE_FILTER):
+            self.file_dropped.emit(file)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         ours = event.source() is not None  # dragged out of this window

@@ -19,6 +19,7 @@ from app.export.sampled.choices import SampledChoices
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
 from app.shared.value import Value
+from app.views.file_places import FileChoices
 from app.views.look import Look
 from engine import bounds
 from engine.plain_text import one_line
@@ -46,6 +47,7 @@ class Settings(Value):
     export: ExportChoices = ExportChoices()
     sampled: SampledChoices = SampledChoices()
     abx: AbxChoices = AbxChoices()
+    files: FileChoices = FileChoices()
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()
     look: Look = Look()

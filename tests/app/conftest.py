@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -27,6 +28,8 @@ from engine.values.ear import Ear
 from engine.voices import Mixer
 from engine.voices.ear import weights_of
 from tests.app.questions import none_unanswered
+
+os.environ["DBUS_SESSION_BUS_ADDRESS"] = "disabled:"  # no test opens the desktop's file manager
 
 Hear = Callable[[Take, Ear], None]
 

@@ -23,11 +23,12 @@ LEVEL = 0.05  # below it, luck is an unlikely explanation
 
 
 class AbxChoices(Value):
-    """The last settings. `restart`: each switch starts the sound again; `folder`: "" for `record.default_folder`."""
+    """The last settings. `restart`: each switch starts the sound again."""
+
+    model_config = ConfigDict(extra="ignore")  # earlier versions have more fields
 
     trials: int = Field(16, ge=1, le=MOST_TRIALS)
     restart: bool = False
-    folder: str = ""
 
 
 def draw_order(seed: int, trials: int) -> tuple[Identity, ...]:

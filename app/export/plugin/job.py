@@ -29,8 +29,8 @@ class PluginExport:
     cancelled = "nothing was written."
 
     @property
-    def folder(self) -> Path:
-        return self.path.parent
+    def file(self) -> Path:
+        return self.path
 
     def replaces(self) -> str:
         """The plug-in that would be replaced, in words; "": nothing. Raises PluginError: it must not be."""

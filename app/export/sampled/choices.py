@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
 from app.patches.patch import Key
@@ -16,7 +16,8 @@ SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's sampl
 class SampledChoices(Value):
     """The last settings. `keys`: the lowest and the highest; None: all of the patch's range."""
 
-    folder: str = ""
+    model_config = ConfigDict(extra="ignore")  # earlier versions have more fields
+
     form: SampledKind = "flac"
     bits: SampleBits = "24"
     rate_hz: int = 48_000

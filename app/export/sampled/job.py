@@ -187,8 +187,8 @@ class SampledExport:
     cancelled = "nothing was written."
 
     @property
-    def folder(self) -> Path:
-        return self.out.parent
+    def file(self) -> Path:
+        return self.out
 
     def run(self, progress: Progress) -> str:
         progress(0.0, "Loading the model")

@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from PySide6.QtCore import QStandardPaths, Qt, Signal, SignalInstance
+from PySide6.QtCore import Qt, Signal, SignalInstance
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -23,6 +22,7 @@ from app.views import theme
 from app.views.controls.number_box import CountBox, NumberBox
 from app.views.controls.parts import NO_MARGINS, combo_box, filled, tool_button
 from app.views.controls.plain import Label
+from app.views.file_places import FileKind, FilePlaces
 
 Part = TypeVar("Part", bound=QWidget)
 LABEL_WIDTH = 104
@@ -82,10 +82,11 @@ class Form(QWidget):
         box = CountBox(name, most, getattr(self._choices, field), self._tips[field])
         return self._known(field, box, box.valueChanged)
 
-    def file_picker(self) -> FilePicker:
-        """The choice of the file that is written; its folder is the field."""
-        picker = FilePicker(getattr(self._choices, "folder", ""), self._tips["folder"])
-        return self._known("folder", picker, picker.changed)
+    def file_picker(self, places: FilePlaces, kind: FileKind) -> FilePicker:
+        """The choice of the file that is written, which is no field."""
+        picker = FilePicker(places, kind, self._tips["file"])
+        picker.changed.connect(self.changed)
+        return picker
 
     def values(self) -> dict[str, Any]:
         """The values of all controls, by field."""
@@ -99,8 +100,6 @@ class Form(QWidget):
 
 def value_of(control: QWidget) -> Any:
     """The value that is chosen in a control of a form."""
-    if isinstance(control, FilePicker):
-        return control.folder
     if isinstance(control, QComboBox):
         return control.currentData()
     return control.isChecked() if isinstance(control, QCheckBox) else control.value()  # type: ignore[attr-defined]
@@ -135,15 +134,15 @@ class FilePicker(QWidget):
     """The path of a file that will be written; a name is suggested until the user gives one.
 
     Attributes:
+        places, kind: where it is suggested.
         suffix: of the file, one of FILTERS; a name without it gets it.
     """
 
     changed = Signal()
 
-    def __init__(self, folder: str, tip: str, suffix: str = ".wav") -> None:
+    def __init__(self, places: FilePlaces, kind: FileKind, tip: str, suffix: str = ".wav") -> None:
         super().__init__()
-        music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
-        self._folder = folder or (music if music and Path(music).is_dir() else str(Path.home()))
+        self.places, self.kind = places, kind
         self.suffix = suffix
         self._named_by_user = False
         self.edit = QLineEdit()
@@ -154,17 +153,6 @@ class FilePicker(QWidget):
         row.insertWidget(0, self.edit, 100)
         self.setLayout(row)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-
-    @property
-    def folder(self) -> str:
-        return str(Path(self.edit.text().strip()).parent)
-
-    def follow(self, folder: str) -> None:
-        """Suggest names in this folder from now on, where another file was saved; keep a name that was given."""
-        self._folder = folder
-        typed = self.edit.text().strip()
-        if typed:
-            self.edit.setText(str(Path(folder) / Path(typed).name))
 
     @property
     def path(self) -> Path:
@@ -178,15 +166,19 @@ class FilePicker(QWidget):
         """Set a name with its suffix, unless the user has given one; that gets the suffix of the format."""
         typed = self.edit.text().strip()
         if not self._named_by_user:
-            self.edit.setText(str(Path(self._folder) / name))
+            self.edit.setText(str(self.places.folder(self.kind) / name))
         elif Path(typed).suffix.lower() in FILTERS:
             self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
 
+    def remember(self, file: Path) -> None:
+        """Suggest names in the folder of a file that was saved from now on."""
+        self.places.remember(self.kind, file.parent)
+
     def browse(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Save as", self.edit.text(), FILTERS[self.suffix])
-        if path:
-            self.edit.setText(path)
-            self.edit.setText(str(self.path))
+        named = Path(self.edit.text().strip()).name
+        suggested = self.path if named else Path(f"untitled{self.suffix}")
+        for path in self.places.ask(self, self.kind, "Save as", "save", FILTERS[self.suffix], suggested):
+            self.edit.setText(str(path))
             self._name_edited()
 
     def _name_edited(self) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QMargins, QTimer
-from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QStackedWidget, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import AbxRecord, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
@@ -25,6 +25,7 @@ from app.playing.pair import Pair
 from app.views.controls.parts import filled
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from app.views.dialogs.question import ask
+from app.views.file_places import FilePlaces
 from engine.whole_file import WriteError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
@@ -59,6 +60,7 @@ class AbxDialog(QDialog):
         material: AbxRecord,
         choices: AbxChoices,
         render: Render,
+        places: FilePlaces,
         parent: QWidget | None = None,
         seed: Callable[[], int] = lambda: secrets.randbelow(LARGEST_SEED),
     ) -> None:
@@ -78,7 +80,7 @@ class AbxDialog(QDialog):
         self._sounding: Sound | None = None
         self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
         self._record: AbxRecord | None = None
-        self._folder = choices.folder
+        self._places = places
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
         self._setup, self._trial = SetupPage(material.words, labels, choices), TrialPage(labels)
@@ -101,7 +103,7 @@ class AbxDialog(QDialog):
 
     def choices(self) -> AbxChoices:
         setup = self._setup
-        return AbxChoices(trials=setup.trials.value(), restart=setup.restart.isChecked(), folder=self._folder)
+        return AbxChoices(trials=setup.trials.value(), restart=setup.restart.isChecked())
 
     def abandon(self) -> None:
         """Close without a question; a test under way is recorded as incomplete."""
@@ -217,7 +219,7 @@ class AbxDialog(QDialog):
         )
         self._pages.setCurrentWidget(self._result)
         self._result.show_record(self._record)
-        self._save(Path(self._folder) if self._folder else default_folder())
+        self._save(self._places.folder("test", default_folder()))
 
     def _save(self, folder: Path) -> None:
         assert self._record is not None
@@ -229,9 +231,8 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        if folder := QFileDialog.getExistingDirectory(self, "Folder of the result"):
-            self._folder = folder
-            self._save(Path(folder))
+        for folder in self._places.ask(self, "test", "Folder of the result", "folder"):
+            self._save(folder)
 
     # What is shown, and leaving
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QTabBar, QVBoxLayout, QWidget
 
 from app.export.job import EXPECTED, ExportJob
@@ -27,6 +26,8 @@ from app.views.dialogs.export_pages import (
 )
 from app.views.dialogs.question import ask
 from app.views.dialogs.work_dialog import WorkDialog
+from app.views.file_manager import reveal
+from app.views.file_places import FilePlaces
 from engine.whole_file import WriteError
 
 KINDS = tuple(PAGES)
@@ -46,14 +47,14 @@ class ExportDialog(WorkDialog):
     exported = Signal(object)  # the job that has ended well
     ended = Signal(bool)  # a job, well or not; the dialog shows its result by then
 
-    def __init__(self, remembered: Remembered, parent: QWidget | None = None) -> None:
+    def __init__(self, remembered: Remembered, places: FilePlaces, parent: QWidget | None = None) -> None:
         export, sampled = remembered
         super().__init__("Export", 680, "export", EXPECTED, parent)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
         self.wav = WavForm(export)
-        self.note, self.performance = NotePage(export, self.wav), PerformancePage(export, self.wav)
-        self.sampler, self.plugin = SamplerPage(sampled), PluginPage()
+        self.note, self.performance = NotePage(export, self.wav, places), PerformancePage(self.wav, places)
+        self.sampler, self.plugin = SamplerPage(sampled, places), PluginPage(places)
         self.pages: dict[Kind, ExportPage] = dict(
             zip(KINDS, (self.note, self.performance, self.sampler, self.plugin), strict=True)
         )
@@ -72,8 +73,8 @@ class ExportDialog(WorkDialog):
     def _lay_out(self) -> None:
         self.state.setMinimumHeight(52)
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
-        tip = "Open the folder of what was saved"
-        self.show_folder = push_button("Show in folder", tip, pressed=self._open_folder)
+        tip = "Show what was saved in the file manager"
+        self.show_folder = push_button("Show in folder", tip, pressed=self._reveal)
         tip = "Render and save"
         self.save = push_button("Export", tip, kind="primary", pressed=self._start, autoDefault=True)
         self.close_button = push_button("Close", "Close (Escape)", pressed=self._close_or_cancel)
@@ -162,9 +163,8 @@ class ExportDialog(WorkDialog):
         return f"{text or 'Rendering'}{left and f', {left}'}. {MEANWHILE}"
 
     def _show_finished(self, words: str) -> None:
-        if self._job is not None and self.page.writes_wav:
-            for page in (self.note, self.performance):
-                page.file.follow(str(self._job.folder))
+        assert self._job is not None
+        self.page.file.remember(self._job.file)
         self.exported.emit(self._job)
         self._end(words)
         self.show_folder.show()
@@ -192,10 +192,9 @@ class ExportDialog(WorkDialog):
         show_kind(self.state, "warning" if failed else "faint")
         self.state.setText(text)
 
-    def _open_folder(self) -> None:
+    def _reveal(self) -> None:
         assert self._job is not None
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._job.folder))):
-            self._show_text(f"No file manager was found here; the folder is {self._job.folder}.")
+        reveal(self._job.file, self._show_text)
 
     def done(self, result: int) -> None:
         """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""

@@ -31,6 +31,7 @@ from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
 from app.views.controls.form import FilePicker, Form, check_box
 from app.views.controls.number_box import NoteBox
 from app.views.controls.parts import faint, label
+from app.views.file_places import FilePlaces
 from engine.whole_file import WriteError, explain
 
 Kind = Literal["note", "performance", "sampler", "plugin"]
@@ -131,10 +132,10 @@ class NotePage(ExportPage):
         "decay_db": "The sound ends where model and truth are this far below their peak",
         "longest_s": "A string that rings longer is faded out at this length",
         "seconds": "The end is faded out within 10 ms",
-        "folder": "With two files, the source is appended to each name",
+        "file": "With two files, the source is appended to each name",
     }
 
-    def __init__(self, export: ExportChoices, wav: WavForm) -> None:
+    def __init__(self, export: ExportChoices, wav: WavForm, places: FilePlaces) -> None:
         super().__init__(export, self.TIPS)
         self._wav = wav
         self._subject: HeardNote | None = None
@@ -142,7 +143,7 @@ class NotePage(ExportPage):
         self.through = check_box("On", True, "Off: the string alone, without the instrument")
         self.through.setAccessibleName("Instrument")
         self.through.toggled.connect(self.changed)
-        self.file = self.file_picker()
+        self.file = self.file_picker(places, "note")
         gain, limits = "Gain of the difference", (0.1, LONGEST_S)
         self.row("Sound", self.what)
         self.row(
@@ -224,11 +225,11 @@ class PerformancePage(ExportPage):
     title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
     window_title = "Save the recording"
 
-    def __init__(self, export: ExportChoices, wav: WavForm) -> None:
-        super().__init__(export, {"folder": "The MIDI file has the same name"})
+    def __init__(self, wav: WavForm, places: FilePlaces) -> None:
+        super().__init__(None, {"file": "The MIDI file has the same name"})
         self._wav = wav
         self._subject: HeardPerformance | None = None
-        self.what, self.file = label("faint"), self.file_picker()
+        self.what, self.file = label("faint"), self.file_picker(places, "recording")
         self.row("Sound", self.what)
         self.row("File", self.file)
 
@@ -272,14 +273,15 @@ class SamplerPage(ExportPage):
         "seconds": "Silent ones end sooner; one that still rings is faded out",
         "source": "What plays the instrument",
         "dry": "A room in the samples ends with the release of each key",
-        "folder": "Where the instrument is written",
+        "file": "Where the instrument is written",
     }
 
-    def __init__(self, choices: SampledChoices) -> None:
+    def __init__(self, choices: SampledChoices, places: FilePlaces) -> None:
         super().__init__(choices, self.TIPS)
         self._subject: HeardInstrument | None = None
         self._chosen_keys = choices.keys
-        self.what, self.size_text, self.file = label(), label(selectable=True), self.file_picker()
+        self.what, self.size_text = label(), label(selectable=True)
+        self.file = self.file_picker(places, "sampler")
         self.size_text.setMinimumHeight(36)  # of two lines
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
         self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
@@ -382,13 +384,13 @@ class PluginPage(ExportPage):
     TIPS: ClassVar = {
         "form": "CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux",
         "system": "Of the computer that it is for",
-        "folder": "Where the plug-in is written; hosts look for it where it is suggested",
+        "file": "Where the plug-in is written; hosts look for it where it is suggested",
     }
 
-    def __init__(self) -> None:
+    def __init__(self, places: FilePlaces) -> None:
         super().__init__(None, self.TIPS)
         self._subject: HeardInstrument | None = None
-        self.what, self.file = label(), self.file_picker()
+        self.what, self.file = label(), self.file_picker(places, "plugin")
         formats = self.combo("form", "Format", [(name, form) for form, name in PLUGIN_NAMES.items()])
         systems = self.combo("system", "System", [(name, target) for target, name in SYSTEM_NAMES.items()])
         systems.setCurrentIndex(systems.findData(_this_system()))
@@ -419,8 +421,9 @@ class PluginPage(ExportPage):
         form, system = self["form"].currentData(), self["system"].currentData()
         self.file.suffix = f".{form}"
         if self._subject is not None:
-            folder = install_folder(form, system) if system == _this_system() else Path.home()
-            self.file.suggest(str(folder / (self._subject.patch.name + self.file.suffix)))
+            name = self._subject.patch.name + self.file.suffix
+            own = system == _this_system()
+            self.file.suggest(str(install_folder(form, system) / name) if own else name)
 
 
 PAGES: dict[Kind, type[ExportPage]] = {

@@ -26,7 +26,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDialog,
-    QFileDialog,
     QLabel,
     QLineEdit,
     QMenu,
@@ -72,11 +71,13 @@ from app.views.dialogs import (
     help_dialog,
     learn_dialog,
 )
+from app.views.file_places import FilePlaces
 from app.views.instrument import patch_card
 from app.views.plots import figures_table, kept_plot, legend, plots, time_plot
 from app.views.plots import plot as plot_module
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
+from tests.app.places import choose_files
 
 BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog"}
 SCREEN = 1280, 720
@@ -123,7 +124,7 @@ def made_legend() -> QWidget:
 
 def export_at(kind: export_pages.Kind) -> Callable[[], QWidget]:
     def make() -> QWidget:
-        made = export_dialog.ExportDialog((ExportChoices(), SampledChoices()))
+        made = export_dialog.ExportDialog((ExportChoices(), SampledChoices()), FilePlaces())
         made.open_at(kind)
         return made
 
@@ -141,7 +142,7 @@ def abx() -> QWidget:
     rendered: Future[dict[str, np.ndarray]] = Future()
     rendered.set_result({name: np.ones((480, 1), np.float32) for name in ("model", "truth")})
     sound = make_sound()
-    made = abx_dialog.AbxDialog(sound, MATERIAL, AbxChoices(), lambda rate_hz: rendered)
+    made = abx_dialog.AbxDialog(sound, MATERIAL, AbxChoices(), lambda rate_hz: rendered, FilePlaces())
     made.finished.connect(sound.close)
     return made
 
@@ -166,7 +167,7 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
     choosers.FilterButton: filtered,
     focus_ring.FocusRing: with_ring,
-    form.FilePicker: lambda: form.FilePicker("", "Where it is saved"),
+    form.FilePicker: lambda: form.FilePicker(FilePlaces(), "note", "Where it is saved"),
     knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
     choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print)),
     number_box.NoteBox: lambda: number_box.NoteBox("Lowest key", "The lowest"),
@@ -267,8 +268,7 @@ def view(
     qapp: QApplication,
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[QWidget]:
-    for name in ("getSaveFileName", "getOpenFileName", "getExistingDirectory"):
-        monkeypatch.setattr(QFileDialog, name, lambda *_: ("", ""))
+    choose_files(monkeypatch)
     if theme.present != replace(theme.DARK, scale=size_percent / 100):
         theme.apply_theme(qapp, "dark", size_percent)
     with shown(request.param, qtbot) as made:

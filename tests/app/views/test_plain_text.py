@@ -30,6 +30,7 @@ from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.exports import heard_note
 from engine.presets import read_info
+from tests.app.places import places_in
 
 EVIL = "<img src=evil>"
 
@@ -66,8 +67,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     qtbot: QtBot, entry: PresetEntry, tmp_path: Path
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
-    export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog((export, SampledChoices(folder=str(tmp_path / EVIL))))
+    dialog = ExportDialog((ExportChoices(), SampledChoices()), places_in(tmp_path / EVIL))
     patch = read_patch(SHIPPED / "classical_guitar.json")
     note = heard_note(Choices(single=entry.name), Library([entry]), None)
     dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})

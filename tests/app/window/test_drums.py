@@ -13,7 +13,6 @@ from PySide6.QtCore import QPoint
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QToolButton
 
-from app.export.choices import ExportChoices
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import render_events
@@ -26,6 +25,7 @@ from app.window.controller import DRUMS_PLAYED
 from engine.presets import SHIPPED, load_preset
 from engine.values.effects import Room
 from tests.app.instrument.seen import seen
+from tests.app.places import files_in
 from tests.app.window.conftest import Open
 from tests.app.window.driver import KEY, LEFT, Window, press
 from tests.app.window.midi import FakeBackend
@@ -46,8 +46,7 @@ def levels_of(w: Window, monkeypatch: pytest.MonkeyPatch) -> Levels:
 
 @pytest.fixture
 def kit(backend: FakeBackend, opened: Open, tmp_path: Path) -> Window:
-    export = ExportChoices(folder=str(tmp_path))
-    made = opened("studio_any_string", settings={"export": export}, instrument=KIT)
+    made = opened("studio_any_string", settings={"files": files_in(tmp_path)}, instrument=KIT)
     made.wait_for_keys()
     return made
 

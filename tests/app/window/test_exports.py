@@ -33,6 +33,7 @@ from app.views.dialogs.export_dialog import ExportDialog
 from app.window.settings import load_settings
 from engine.presets import find_string, load_preset, read_string
 from engine.presets.finding import SHIPPED
+from tests.app.places import files_in
 from tests.app.questions import answered
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, choose
@@ -44,8 +45,9 @@ GUITAR = find_patch("Classical guitar").patch
 @pytest.fixture
 def briefly(tmp_path: Path) -> dict[str, Any]:
     """The settings of a dialog that was last set to short sounds."""
-    note = ExportChoices(folder=str(tmp_path), until_decayed=False, seconds=0.3, normalise=False)
-    return {"export": note, "sampled": SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)}
+    note = ExportChoices(until_decayed=False, seconds=0.3, normalise=False)
+    sampled = SampledChoices(keys=(60, 61), layers=1, seconds=0.2)
+    return {"export": note, "sampled": sampled, "files": files_in(tmp_path)}
 
 
 @pytest.fixture
@@ -384,8 +386,9 @@ def test_the_patch_is_exported_for_samplers_while_the_window_plays_and_choices_a
     dialog.close()
     assert open_sampler(short).sampler["layers"].value() == 7
     short.close()
-    remembered = load_settings(tmp_path / "settings.json")[0].sampled
-    assert (remembered.layers, remembered.keys, remembered.folder) == (7, (60, 61), str(tmp_path))
+    remembered = load_settings(tmp_path / "settings.json")[0]
+    assert (remembered.sampled.layers, remembered.sampled.keys) == (7, (60, 61))
+    assert remembered.files.folders["sampler"] == str(tmp_path)
 
 
 def test_keys_and_shortcuts_work_while_an_export_runs_and_it_is_cancelled_by_a_question(

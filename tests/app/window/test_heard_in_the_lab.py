@@ -39,6 +39,7 @@ from engine.kernels.voice_records import ATTACK_S
 from engine.presets import SHIPPED
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
+from tests.app.places import files_in
 from tests.app.sounds import render_sound
 from tests.app.window.driver import find, press
 
@@ -87,8 +88,8 @@ def lab(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     window = MainWindow()
     qtbot.addWidget(window)
     choices = Choices(seconds=SECONDS, face="lab", volume_db=0.0, level_match=False, amplitude_mm=2.0)
-    exported = ExportChoices(folder=str(tmp_path), until_decayed=False, seconds=SECONDS, normalise=False, bits="32f")
-    settings = Settings(choices=choices, export=exported)
+    exported = ExportChoices(until_decayed=False, seconds=SECONDS, normalise=False, bits="32f")
+    settings = Settings(choices=choices, export=exported, files=files_in(tmp_path))
     device = HeldOutput.device
     make_sound = lambda report: Sound(report, look_up=lambda *_: device, open_output=HeldOutput)  # noqa: E731
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)

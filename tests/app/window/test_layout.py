@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QComboBox,
-    QFileDialog,
     QLabel,
     QListWidget,
     QMenu,
@@ -34,6 +33,7 @@ from app.views.controls.notice_bar import NoticeList
 from app.views.controls.overflow import Overflow
 from app.views.controls.sideways import Sideways
 from app.window.main_window import COMPILING, LOADING, MainWindow
+from tests.app.places import choose_files
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, Window, find, names_of
 
@@ -256,7 +256,7 @@ def test_files_are_dropped_and_opened_with_all_of_their_names(
         ):
             QApplication.sendEvent(window, event)
         assert os.fsencode(taken[-1]) == b"/tmp/caf\xe9/100% caf\xe9 \xc3\xa9.mid"
-    monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *_: (["/tmp/a.mid", "/tmp/b.scl"], ""))
+    choose_files(monkeypatch, Path("/tmp/a.mid"), Path("/tmp/b.scl"))
     window.action["open"].trigger()
     assert taken[-2:] == [Path("/tmp/a.mid"), Path("/tmp/b.scl")]
     for panel in lab.panels:

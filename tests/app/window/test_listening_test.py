@@ -25,10 +25,10 @@ from tests.app.window.driver import CONTROL, KEY, Window, find, press
 
 
 @pytest.fixture
-def heard(opened: Open, speakers: Any, tmp_path: Path) -> Window:
+def heard(opened: Open, speakers: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
     """A window whose pluck is rendered, with a device that makes no sound."""
-    abx = AbxChoices(trials=2, folder=str(tmp_path / "records"))
-    made = opened(sound=speakers, settings={"abx": abx}, volume_db=-6)
+    monkeypatch.setattr("app.views.dialogs.abx_dialog.default_folder", lambda: tmp_path / "records")
+    made = opened(sound=speakers, settings={"abx": AbxChoices(trials=2)}, volume_db=-6)
     made.wait_for_take()
     return made
 

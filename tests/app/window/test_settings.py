@@ -21,6 +21,7 @@ from app.patches.library import SHIPPED as PATCHES
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.background import Background
+from app.views.file_places import FileChoices
 from app.views.look import Look
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
@@ -39,12 +40,13 @@ def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
     assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
     settings = Settings(
         choices=Choices(position=0.7, heard="b", b="difference", loop=True),
-        export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
-        sampled=SampledChoices(folder="/music", form="sf2", keys=(40, 76), layers=8, dry=True),
+        export=ExportChoices(bits="32f", rate_hz=0),
+        sampled=SampledChoices(form="sf2", keys=(40, 76), layers=8, dry=True),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
         look=Look(theme="light", size_percent=125),
         midi=MidiChoices(port="Keys", notes="preset", controllers={"width": 74}),
+        files=FileChoices(folders={"note": str(tmp_path)}, recent=(str(tmp_path / "song.mid"),)),
         window_geometry="AdnQyw==",
     )
     save_settings(path, settings)
@@ -58,6 +60,7 @@ def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
         ('{"version": 1, "choices": {"position": 0.6}}', Settings(choices=Choices(position=0.6))),  # without MIDI
         ('{"version": 1, "choices": {"loop": true}, "device": null}', Settings(choices=Choices(loop=True))),
         ('{"choices": {"heard": "truth"}}', Settings(choices=Choices(heard="b"))),  # from before the slots
+        ('{"sampled": {"folder": "/music"}, "abx": {"folder": ""}}', Settings()),  # from before `files`
         ('{"look": {"face": "light"}}', Settings(look=Look(theme="light"))),  # of version 0.1
     ],
 )

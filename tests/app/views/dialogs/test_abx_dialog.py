@@ -20,8 +20,10 @@ from app.audio.output import Output
 from app.audio.sound import Sound
 from app.playing.pair import Pair
 from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
+from app.views.file_places import FilePlaces
 from engine.voices import Mixer
 from tests.app.gestures import named
+from tests.app.places import choose_files
 from tests.app.questions import answered
 
 RATE_HZ = 48_000
@@ -63,13 +65,15 @@ def done(sounds: Sounds) -> Future[Sounds]:
 
 
 @pytest.fixture
-def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
+def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Open:
+    monkeypatch.setattr("app.views.dialogs.abx_dialog.default_folder", lambda: tmp_path / "records")
+
     def open_dialog(
         seed: int = 1, trials: int = 3, rendered: Future[Sounds] | None = None, through: Sound = sound
     ) -> AbxDialog:
-        choices = AbxChoices(trials=trials, folder=str(tmp_path / "records"))
+        choices = AbxChoices(trials=trials)
         rendering = rendered or done(sounds_of())
-        dialog = AbxDialog(through, MATERIAL, choices, lambda rate_hz: rendering, seed=lambda: seed)
+        dialog = AbxDialog(through, MATERIAL, choices, lambda rate_hz: rendering, FilePlaces(), seed=lambda: seed)
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
         with qtbot.waitExposed(dialog):
             dialog.open()
@@ -251,7 +255,7 @@ def test_at_another_rate_of_the_device_it_is_rendered_again(
         asked.append(rate_hz)
         return done(sounds_of())
 
-    dialog = AbxDialog(sound, MATERIAL, AbxChoices(folder=str(tmp_path)), render)
+    dialog = AbxDialog(sound, MATERIAL, AbxChoices(), render, FilePlaces())
     qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
     dialog.open()
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):
@@ -270,9 +274,7 @@ def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
     start(dialog)
     press(qtbot, dialog, "x", "1")
     assert "cannot be written" in texts(dialog)
-    monkeypatch.setattr(
-        "app.views.dialogs.abx_dialog.QFileDialog.getExistingDirectory", lambda *_: str(tmp_path / "other")
-    )
+    choose_files(monkeypatch, tmp_path / "other")
     named(dialog, "Save elsewhere …", QPushButton).click()
     assert len(list((tmp_path / "other").iterdir())) == 1
     assert "cannot be written" not in texts(dialog)

@@ -31,6 +31,7 @@ from app.views import theme
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.exports import heard_note
 from engine.presets import SHIPPED
+from tests.app.places import places_in
 from tests.app.questions import answered
 
 Make = Callable[..., ExportDialog]
@@ -55,8 +56,8 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
     dialogs = []
 
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
-        settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
-        dialog = ExportDialog((ExportChoices.model_validate(settings), SampledChoices()))
+        settings = {"rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
+        dialog = ExportDialog((ExportChoices.model_validate(settings), SampledChoices()), places_in(tmp_path))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         dialog.show_subjects({"note": note(heard or {})})
@@ -134,7 +135,7 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
     dialog.note["difference_gain_db"].setValue(30)
     assert "difference.wav" in dialog.note.file.edit.text()
     choices, _ = dialog.choices()
-    assert (choices.source, choices.folder, choices.seconds) == ("difference", str(tmp_path), 0.5)
+    assert (choices.source, choices.seconds) == ("difference", 0.5)
     assert choices.difference_gain_db == 30
     assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices()[0] == choices
 

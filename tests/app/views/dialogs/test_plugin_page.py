@@ -17,6 +17,7 @@ from app.patches.library import find_patch
 from app.presets.library import list_presets
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PLUGIN_NAMES, PLUGIN_NOTE, SYSTEM_NAMES, HeardInstrument
+from app.views.file_places import FilePlaces
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def dialog(
     monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
     monkeypatch.setattr("app.export.plugin.image.image_of", lambda patch, preset: patch.name)
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
-    made = ExportDialog((ExportChoices(), SampledChoices()))
+    made = ExportDialog((ExportChoices(), SampledChoices()), FilePlaces())
     qtbot.addWidget(made)
     preset = list_presets(preset_folder)[0][0]
     made.show_subjects({"plugin": HeardInstrument(find_patch("Classical guitar").patch, preset)})

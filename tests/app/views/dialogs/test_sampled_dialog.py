@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import soundfile
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
@@ -24,6 +23,7 @@ from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
+from tests.app.places import choose_files, places_in
 from tests.app.questions import answered
 
 SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
@@ -79,8 +79,8 @@ def made(
     dialogs = []
 
     def make(**choices: object) -> ExportDialog:
-        remembered = SampledChoices.model_validate({"folder": str(folder), **SMALL, **choices})
-        dialog = ExportDialog((ExportChoices(), remembered))
+        remembered = SampledChoices.model_validate({**SMALL, **choices})
+        dialog = ExportDialog((ExportChoices(), remembered), places_in(folder))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
         show(dialog, patch, preset)
@@ -227,7 +227,7 @@ def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
     form["dry"].setChecked(True)
     choices = dialog.choices()[1]
     assert choices == SampledChoices(
-        folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
+        form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
     )
     assert made(**choices.model_dump()).choices()[1] == choices
     whole = made(keys=None)
@@ -245,7 +245,7 @@ def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
     assert dialog.sampler.file.path == folder / "Concert_harp.sfz"
     assert dialog.sampler.what.text().startswith("Concert harp")
     assert dialog.choices()[1].keys == (60, 62)
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *words: (str(folder / "mine"), words[-1]))
+    choose_files(monkeypatch, folder / "mine")
     dialog.sampler.file.browse()
     assert dialog.sampler.file.path == folder / "mine.sfz"
     dialog.sampler["form"].setCurrentIndex(2)
