@@ -17,7 +17,7 @@ from typing import BinaryIO
 from app.export.choices import Chosen, ExportChoices
 from app.export.recipe import SoundRecipe
 from app.export.recording import SoundSamples
-from app.export.sound import Mixed, check_sources, render_voices
+from app.export.sound import VOICES, Mixed, check_sources, render_voices
 from app.export.wav import WavSettings, WrittenSound, write_wav
 from app.rendering.note_sound import NoteSound, Struck
 from app.shared.key_names import note_name
@@ -189,10 +189,25 @@ class HeardNote:
         both = last == "files" and self.source != "difference" and not self.another
         return "files" if both else self.source
 
-    def file_name(self, source: Source) -> str:
-        """The name of its file, with the source where that is not the model."""
-        kind = "" if source == "model" else f" {source}"
+    def file_name(self, source: Chosen) -> str:
+        """The name of its file, with the source where that is neither the model nor both."""
+        kind = "" if source in ("model", "files") else f" {source}"
         return f"{self.name}{kind}.wav"
+
+    def export(self, choices: ExportChoices, folder: Path) -> NoteExport:
+        """Its export with these choices; the difference has the gain with which it is heard."""
+        if choices.source == self.source == "difference":
+            choices = choices.model_copy(update={"difference_gain_db": self.difference_gain_db})
+        path = folder / self.file_name(choices.source)
+        return NoteExport(self.sound, paths_of(path, choices.source), choices)
+
+
+def paths_of(path: Path, source: Chosen) -> dict[Source, Path]:
+    """The files to write, by source; of both the names have the source."""
+    if source != "files":
+        return {source: path}
+    stem = path.stem.removesuffix(" model").removesuffix(" truth")
+    return {name: path.with_name(f"{stem} {name}.wav") for name in VOICES}
 
 
 @dataclass(frozen=True)

@@ -143,10 +143,20 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
         WriteError: the folder or the file cannot be written.
     """
     path = replace or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
-    if (SHIPPED / path.name).exists():
-        raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
     if replace is None and path.exists():
         raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
+    return write_patch(patch, path)
+
+
+def write_patch(patch: Patch, path: Path) -> PatchEntry:
+    """Write the patch to a file anywhere, in a folder that is made if need be; whole or not at all.
+
+    Raises:
+        PatchError: it would replace or hide a shipped one.
+        WriteError: the folder or the file cannot be written.
+    """
+    if path.parent in (SHIPPED, own_patches()) and (SHIPPED / path.name).exists():
+        raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
     make_folder(path.parent)
     with result_file(path) as file:
         file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))

@@ -59,6 +59,11 @@ class FilePlaces:
         if (text := _stored(folder)) is not None:
             self.choices = self.choices.model_copy(update={"folders": {**self.choices.folders, kind: text}})
 
+    @property
+    def recent(self) -> list[Path]:
+        """The files that were opened last, the latest first; some may be gone."""
+        return [Path(file) for file in self.choices.recent]
+
     def opened(self, file: Path) -> None:
         """Put a file first among the recent ones."""
         self.forget(file)

@@ -40,6 +40,7 @@ from app.views.stage import StageView
 from app.window.about import about_text
 from app.window.audio_control import AudioControl, MakeSound
 from app.window.browsing import PresetDesk
+from app.window.drag_out import DragOut
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.instruments import Instruments
@@ -135,6 +136,7 @@ class Controller(QObject):
             self.patches.recordings,
             (settings.export, settings.sampled),
         )
+        self.drag_out = DragOut(window, self.exports, self.patches.recordings)
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect()
@@ -209,6 +211,8 @@ class Controller(QObject):
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
+            "copy": lambda: self.drag_out.copy("note"),
+            "save_as": self.patches.save_as,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
@@ -317,11 +321,14 @@ class Controller(QObject):
         Patches, scales and MIDI files go to `patches`.
         """
         if file.suffix.lower() in TAKEN_FILES:
-            self.patches.take_file(file)
+            if self.patches.take_file(file):
+                self.window.places.opened(file)
             return
         dropped = receive(file, self.library)
         if dropped.sound:
             self._ask_what_it_is(file)
+        if dropped.sound or dropped.choices or dropped.body:
+            self.window.places.opened(file)
         self._take(file, dropped)
 
     def _take(self, file: Path, dropped: Dropped) -> None:
@@ -359,7 +366,7 @@ class Controller(QObject):
         self.library.refresh()
         self.patches.reload()
         self.patches.take_file(kept.patch)
-        self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}")
+        self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}", file=kept.patch)
 
     def close(self) -> None:
         """Save the settings and end every thread."""
@@ -370,6 +377,7 @@ class Controller(QObject):
         self._timer.stop()
         self.keeper.close()
         self.exports.close()
+        self.drag_out.close()
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:

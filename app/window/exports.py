@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
+from app.export.job import ExportJob
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.patches.patch import Patch
@@ -58,14 +59,14 @@ class Exports(QObject):
 
     def open(self, kind: Kind) -> None:
         """Open the dialog at a page, or bring it to the front."""
-        subjects = self._subjects()
+        subjects = self.subjects
         if subjects[kind] is None:
             self._window.notices.report(PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(self._choices, self._window.places, self._window)
             self.dialog.finished.connect(self._end_dialog)
-            self.dialog.exported.connect(self._forget_saved)
+            self.dialog.exported.connect(self._exported)
             self.dialog.ended.connect(self.ended)
         self.dialog.show_subjects(subjects)
         self.dialog.open_at(kind)
@@ -77,7 +78,7 @@ class Exports(QObject):
     def refresh(self) -> None:
         """Renew the subjects, as what can be exported may have changed."""
         if self.dialog is not None:
-            self.dialog.show_subjects(self._subjects())
+            self.dialog.show_subjects(self.subjects)
 
     @property
     def busy(self) -> bool:
@@ -102,7 +103,8 @@ class Exports(QObject):
             return True
         return False
 
-    def _subjects(self) -> dict[Kind, Any]:
+    @property
+    def subjects(self) -> dict[Kind, Any]:
         """The subjects that can be exported now, by kind; None: nothing."""
         choices, played = self._session.choices, self._recordings.latest
         patch = choices.patch
@@ -116,7 +118,8 @@ class Exports(QObject):
             "plugin": instrument,
         }
 
-    def _forget_saved(self, job: object) -> None:
+    def _exported(self, job: ExportJob) -> None:
+        self._window.notices.inform(f"Saved {job.file}.", file=job.file)
         if isinstance(job, PlayedExport):
             self._recordings.forget(job.played)
 

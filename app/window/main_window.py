@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
-from PySide6.QtCore import QByteArray, QEvent, QMargins, QObject, QPoint, QRect, Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import QByteArray, QEvent, QFileInfo, QMargins, QObject, QPoint, QRect, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -147,6 +147,8 @@ class MainWindow(QMainWindow):
         self._lay_out()
         self.setAcceptDrops(True)
         self.menu.look_asked.connect(self._change_look)
+        self.menu.recent_asked.connect(self._open_recent)
+        self.menu.aboutToShow.connect(lambda: self.menu.show_recent(self.places.recent))
         QApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         enter = QShortcut(QKeySequence("Return"), self)
         enter.setAutoRepeat(False)
@@ -154,6 +156,7 @@ class MainWindow(QMainWindow):
         for name, do in (
             ("pluck", self.pluck_asked.emit),
             ("notices", self.notices.show_all),
+            ("reveal", self.notices.reveal),
             ("menu", self._menu_button.showMenu),
             ("keys", self._keys_button.toggle),
             ("face", lambda: self.face_asked.emit("lab" if self.face == "play" else "play")),
@@ -471,6 +474,13 @@ class MainWindow(QMainWindow):
     def _ask_for_files(self) -> None:
         for file in self.places.ask(self, "open", "Open", "open", FILE_FILTER):
             self.file_dropped.emit(file)
+
+    def _open_recent(self, file: Path) -> None:
+        if QFileInfo(str(file)).isFile():
+            self.file_dropped.emit(file)
+        else:
+            self.places.forget(file)
+            self.notices.report(f"{file} is not there any more, and was removed from the recent files.")
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         ours = event.source() is not None  # dragged out of this window

@@ -31,6 +31,7 @@ from app.patches.library import (
     read_patch,
     rename_patch,
     save_patch,
+    write_patch,
 )
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
@@ -54,7 +55,7 @@ from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import SongPlayer
 from engine.kernels.midi import HARMONICS, LEGATO, PORTAMENTO, SLIDE_TIME, STRUM, TREMOLO
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.schema import explained
 from engine.whole_file import WriteError
 
@@ -228,6 +229,32 @@ class PatchDesk(BrowserDesk):
                 lambda name: self._save(Patch.model_validate({**dict(patch), "name": name})),
             )
 
+    def save_as(self) -> None:
+        """Save the patch as a file anywhere, whose name it has there."""
+        patch = self.patch
+        if patch is None:
+            self._notices.report("There is no instrument to save: choose one first.")
+            return
+        suggested = Path(f"{patch.name}{SUFFIX}")
+        places, title = self._window.places, "Save instrument as"
+        for file in places.ask(self._panel, "instrument", title, "save", f"Instrument (*{SUFFIX})", suggested):
+            try:
+                self._write(partial(self._save_at, patch, file))
+            except ValueError as error:
+                self._notices.report(f"{file}: {one_line(explained(error))}; choose another name.")
+
+    def _save_at(self, patch: Patch, file: Path) -> None:
+        """Save a patch as a file, by the name of that; in the user's own folder it is played from now on."""
+        patch = Patch.model_validate({**dict(patch), "name": name_text(file.stem)})
+        write_patch(patch, file)
+        self.reload()
+        if file.parent == own_patches():
+            self._session.update(patch=patch)
+        self._inform_saved(patch, file)
+
+    def _inform_saved(self, patch: Patch, file: Path) -> None:
+        self._notices.inform(f"{patch.name} was saved as {file}.", file=file)
+
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
         """Ask for a name and do what it is for; again, with the reason, where the name is impossible or taken."""
         reason = ""
@@ -254,6 +281,7 @@ class PatchDesk(BrowserDesk):
         self._session.update(patch=patch)
         self._show_patch()
         self.browser.reveal(saved.name)
+        self._inform_saved(patch, saved.path)
 
     def rename(self, name: str = "") -> None:
         """Ask for a new name of one of the user's own patches, by default the present one."""
@@ -296,8 +324,11 @@ class PatchDesk(BrowserDesk):
         self._performance.hear_patch(None if entry is None else entry.patch)
         self._panel.bar.show_comparing(entry is not None)
 
-    def take_file(self, file: Path) -> None:
-        """Take a dropped file of TAKEN_FILES: add and choose a patch, play a MIDI file, tune by a scale."""
+    def take_file(self, file: Path) -> bool:
+        """Take a dropped file of TAKEN_FILES: add and choose a patch, play a MIDI file, tune by a scale.
+
+        Returns True if it could be used.
+        """
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._play_file(file)
@@ -307,6 +338,8 @@ class PatchDesk(BrowserDesk):
                 self._add(file)
         except (MidiFileError, PatchError, OSError, ValueError) as error:
             self._notices.report(one_line(str(error)))
+            return False
+        return True
 
     def _add(self, file: Path) -> None:
         """Add a patch's file to the library, and choose it; where it cannot be added, it is only chosen."""

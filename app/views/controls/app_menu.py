@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import plain_tip
 from app.views.look import Look
 from engine.plain_text import one_line
 
@@ -36,12 +39,15 @@ class MenuEntry:
 MENUS: dict[str, tuple[MenuEntry, ...]] = {
     "&File": (
         MenuEntry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
+        MenuEntry("recent", "Recent files"),
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
         MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
         MenuEntry(
             "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"
         ),
         MenuEntry("plugin", "Export plug-in …"),
+        MenuEntry("copy", "Copy the last note as a file", "Ctrl+Shift+C", "copy the last note as a WAV file"),
+        MenuEntry("reveal", "Show the saved file in its folder"),
         MenuEntry("quit", "Quit", "Ctrl+Q", "quit"),
     ),
     "&Edit": (
@@ -50,6 +56,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         ),
         MenuEntry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
         MenuEntry("save", "Save instrument", "Ctrl+S", "save the instrument"),
+        MenuEntry("save_as", "Save instrument as …", "Ctrl+Shift+S", "save the instrument as a file anywhere"),
         MenuEntry("revert", "Revert instrument"),
         MenuEntry("compare", "Hear saved instrument"),
     ),
@@ -84,12 +91,14 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
 }
 ENTRIES = {entry.name: entry for entries in MENUS.values() for entry in entries}
 LOOK_MENU = "&View"  # has the theme and the text size too
+LONGEST_FILE = 60  # characters of a recent file, and of its folder
 
 
 class AppMenu(QMenu):
     """The menu of the app: emits `look_asked`, shows `show_look`. `action`: each QAction by the name of its entry."""
 
     look_asked = Signal(str, object)  # a field of `Look` and its new value
+    recent_asked = Signal(object)  # the Path of a recent file
 
     def __init__(self, window: QWidget | None = None) -> None:
         super().__init__(window)
@@ -108,12 +117,26 @@ class AppMenu(QMenu):
                 menu.addSeparator()
                 self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
                 self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
+        self._recent = QMenu(self)
+        self._recent.setToolTipsVisible(True)
+        self.action["recent"].setMenu(self._recent)
+        self.show_recent([])
         if window is not None:
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
 
     def show_look(self, look: Look) -> None:
         for (field, value), action in self._looks.items():
             action.setChecked(getattr(look, field) == value)
+
+    def show_recent(self, files: Sequence[Path]) -> None:
+        """List the recent files, the latest first."""
+        self._recent.clear()
+        self.action["recent"].setEnabled(bool(files))
+        for number, file in enumerate(files, 1):
+            name, folder = (one_line(text, LONGEST_FILE).replace("&", "&&") for text in (file.name, file.parent.name))
+            action = self._recent.addAction(f"&{number % 10}  {name}\t{folder}")
+            action.setToolTip(plain_tip(str(file)))
+            action.triggered.connect(lambda _=False, file=file: self.recent_asked.emit(file))
 
     def show_steps(self, undo: str, redo: str) -> None:
         """Show the steps that undo and redo would change; "" where there is nothing to."""

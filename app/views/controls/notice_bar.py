@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from pathlib import Path
 
 from PySide6.QtCore import QEvent, QMargins, QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import QDialog, QFrame, QHBoxLayout, QListWidget, QToolBu
 from app.shared.log import log_file
 from app.views.controls.parts import filled, label, push_button, read_only_text, show_kind, tool_button
 from app.views.controls.plain import Label
+from app.views.file_manager import reveal
 from engine.plain_text import one_line
 
 MOST_KEPT = 50
@@ -26,6 +28,7 @@ class Notice:
     message: str
     details: str = ""
     error: bool = True  # False: information
+    file: Path | None = None  # that was saved
     times: int = 1
     last_reported: str = ""  # hours:minutes:seconds
 
@@ -60,7 +63,10 @@ class NoticeBar(QFrame):
         self._details = tool_button("Details", "Notice details", tip, "small", self.show_all)
         tip = "Dismiss (kept in the list)"
         dismiss = tool_button("Dismiss", "Dismiss the notice", tip, "small", self._dismiss)
-        row = filled(QHBoxLayout(self), self._label, self._details, dismiss, margins=QMargins(10, 3, 4, 3))
+        tip = "Show the saved file in the file manager"
+        self._reveal = tool_button("Show in folder", tip=tip, kind="small", pressed=self.reveal, visible=False)
+        buttons = self._reveal, self._details, dismiss
+        row = filled(QHBoxLayout(self), self._label, *buttons, margins=QMargins(10, 3, 4, 3))
         row.setStretch(0, 1)
         self.hide()
 
@@ -82,9 +88,17 @@ class NoticeBar(QFrame):
         *_, error = text.strip().splitlines()
         self.report(f"{sentence} {one_line(error)}", f"{text}\nPlease report it. It is also in {log_file()}.")
 
-    def inform(self, message: str, details: str = "") -> None:
-        """Show a message that is no error."""
-        self._take(Notice(message, details, error=False))
+    def inform(self, message: str, details: str = "", file: Path | None = None) -> None:
+        """Show a message that is no error. `file`: that was saved, which a button shows in its folder."""
+        self._take(Notice(message, details, error=False, file=file))
+
+    def reveal(self) -> None:
+        """Show the file that was saved last in its folder."""
+        file = next((notice.file for notice in reversed(self._notices) if notice.file is not None), None)
+        if file is None:
+            self.inform("Nothing was saved since the start.")
+        else:
+            reveal(file, self.report)
 
     def withdraw(self, message: str) -> None:
         """Hide a notice that is no longer true; it stays in the list."""
@@ -128,6 +142,7 @@ class NoticeBar(QFrame):
         show_kind(self._label, "warning" if notice.error else "")
         self._label.setText(self._notices[-1].line)
         self._details.setVisible(notice.details not in notice.message)
+        self._reveal.setVisible(notice.file is not None)
         self._fit()
         self.show()
         self.raise_()

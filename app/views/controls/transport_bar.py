@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLayout, QSizePolicy, QSpacer
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
 from app.views import theme
+from app.views.controls.drag_handle import DragHandle
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import NO_MARGINS, filled, push_button, tool_button, vertical_rule
@@ -64,7 +65,9 @@ class TransportBar(QFrame):
         row.addItem(self._space)
         tip = "Save what you hear as a WAV file (Ctrl+E)"
         self.export = push_button("Export …", tip, "Export", pressed=self.export_asked)
-        filled(row, vertical_rule(), knobs["volume_db"], filled(QVBoxLayout(), self.meter, self.export))
+        self.handle = DragHandle()
+        column = filled(QVBoxLayout(), self.meter, self.export, self.handle, spacing=3)
+        filled(row, vertical_rule(), knobs["volume_db"], column)
 
     def add_group(self, group: QWidget) -> None:
         """Put controls of others behind its own, before the volume."""
@@ -85,6 +88,7 @@ class TransportBar(QFrame):
         for knob in self.knobs.values():
             knob.set_narrow(compact)
         self.slots.set_narrow(compact, tight)
+        self.handle.set_compact(compact)
         for button in (self._play, self._loop, self._stereo, self.export):
             button.setProperty("compact", compact)
             button.setProperty("tight", tight)

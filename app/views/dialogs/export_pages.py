@@ -11,7 +11,7 @@ from PySide6.QtCore import QSignalBlocker
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
-from app.export.note import HeardNote, NoteExport
+from app.export.note import HeardNote, NoteExport, paths_of
 from app.export.played import Played, PlayedExport, recorded_files
 from app.export.plugin.formats import PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
@@ -64,6 +64,16 @@ class HeardPerformance:
 
     played: Played
     preset: Path | None
+
+    @property
+    def file_name(self) -> str:
+        return f"{self.played.patch.name}.wav"
+
+    def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
+        """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
+        if self.preset is None:
+            raise ValueError(f"The preset {self.played.patch.preset}, which plays the instrument, was not found.")
+        return PlayedExport(self.played, self.preset, folder / (name or self.file_name), choices.wav)
 
 
 @dataclass(frozen=True)
@@ -179,11 +189,7 @@ class NotePage(ExportPage):
 
     def paths(self) -> dict[Source, Path]:
         """The files that will be written, by source. Raises ValueError: no name is given."""
-        path, source = self.file.path, self["source"].currentData()
-        if source != "files":
-            return {source: path}
-        stem = path.stem.removesuffix(" model").removesuffix(" truth")
-        return {name: path.with_name(f"{stem} {name}.wav") for name in ("model", "truth")}
+        return paths_of(self.file.path, self["source"].currentData())
 
     def job(self) -> NoteExport:
         if self._subject is None:
@@ -213,7 +219,7 @@ class NotePage(ExportPage):
         beyond = f"adds no bandwidth: the model ends at {subject.preset_rate_hz / 2000:g} kHz"
         model_rate = "" if rate_hz else f"{subject.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > subject.preset_rate_hz else model_rate)
-        self.file.suggest(subject.file_name("model" if source == "files" else source))
+        self.file.suggest(subject.file_name(source))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
         self.rows.setRowVisible(self._names_row, two)
@@ -242,16 +248,13 @@ class PerformancePage(ExportPage):
             self.what.setText(
                 f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
-            self.file.suggest(f"{played.patch.name}.wav")
+            self.file.suggest(subject.file_name)
 
     def job(self) -> PlayedExport:
         if self._subject is None:
             raise ValueError(self.missing)
-        played, preset = self._subject.played, self._subject.preset
-        if preset is None:
-            raise ValueError(f"The preset {played.patch.preset}, which plays the instrument, was not found.")
-        choices = ExportChoices.model_validate(self._wav.values())
-        return PlayedExport(played, preset, self.file.path, choices.wav)
+        path = self.file.path
+        return self._subject.export(ExportChoices.model_validate(self._wav.values()), path.parent, path.name)
 
     def offer(self) -> tuple[str, str]:
         there = [path.name for path in recorded_files(self.job().path) if path.exists()]
