@@ -8,8 +8,7 @@ from pathlib import Path
 
 from engine.whole_file import WriteError, explain, lasting_folder
 
-LARGEST_BYTES = 2**30  # of all files together; the latest ones are there however large they are
-MOST_FOLDERS = 100
+LARGEST_BYTES = 2**30  # of all files together; the latest are there however large they are
 
 
 class HandedFiles:
@@ -17,7 +16,7 @@ class HandedFiles:
 
     def __init__(self) -> None:
         self._root: Path | None = None
-        self._folders: list[Path] = []  # in the order in which they were made
+        self._folders: list[Path] = []  # the oldest first
 
     def new_folder(self) -> Path:
         """A new folder, for which the oldest make room. What killed processes have left is removed with the first.
@@ -29,15 +28,12 @@ class HandedFiles:
         try:
             if self._root is None or not self._root.is_dir():  # the system may have cleaned up
                 self._root, self._folders = lasting_folder(parent, "learned-strings-files"), []
-            while self._folders and (len(self._folders) >= MOST_FOLDERS or self._bytes() > LARGEST_BYTES):
+            while sum(file.stat().st_size for file in self._root.glob("*/*")) > LARGEST_BYTES:
                 shutil.rmtree(self._folders.pop(0), ignore_errors=True)
             self._folders.append(Path(tempfile.mkdtemp(dir=self._root)))
         except OSError as error:
             raise WriteError(explain(parent, error)) from error
         return self._folders[-1]
-
-    def _bytes(self) -> int:
-        return sum(file.stat().st_size for folder in self._folders for file in folder.iterdir())
 
     def close(self) -> None:
         """Remove all of them; may be called again."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,13 +24,15 @@ MODES = {
 }
 
 
-def _full_path(text: str) -> str:
-    if "\0" in text or not Path(text).is_absolute():
+def _full_path(path: Path) -> Path:
+    """The path, where settings can hold it: bytes of a name may be no characters."""
+    text = str(path)
+    if not path.is_absolute() or len(text) > LONGEST_PATH or "\0" in text or name_text(text) != text:
         raise ValueError("give a full path")
-    return text
+    return path
 
 
-FullPath = Annotated[str, Field(max_length=LONGEST_PATH), AfterValidator(_full_path)]
+FullPath = Annotated[Path, AfterValidator(_full_path)]
 
 
 class FileChoices(Value):
@@ -47,34 +50,30 @@ class FilePlaces:
 
     def folder(self, kind: FileKind, first: Path | None = None) -> Path:
         """The folder that was used last for a kind of file; where that is gone `first`, else music or documents."""
-        last = self.choices.folders.get(kind, "")
-        if last and QFileInfo(last).isDir():
-            return Path(last)
+        last = self.choices.folders.get(kind)
+        if last is not None and QFileInfo(str(last)).isDir():
+            return last
         locations = QStandardPaths.StandardLocation
         standard = locations.MusicLocation if kind in SOUNDS else locations.DocumentsLocation
         own = QStandardPaths.writableLocation(standard)
         return first or (Path(own) if own and QFileInfo(own).isDir() else Path.home())
 
     def remember(self, kind: FileKind, folder: Path) -> None:
-        if (text := _stored(folder)) is not None:
-            self.choices = self.choices.model_copy(update={"folders": {**self.choices.folders, kind: text}})
-
-    @property
-    def recent(self) -> list[Path]:
-        """The files that were opened last, the latest first; some may be gone."""
-        return [Path(file) for file in self.choices.recent]
+        self._change(self.choices.recent, {**self.choices.folders, kind: folder.absolute()})
 
     def opened(self, file: Path) -> None:
         """Put a file first among the recent ones."""
         self.forget(file)
-        if (text := _stored(file)) is not None:
-            recent = (text, *self.choices.recent)[:MOST_RECENT]
-            self.choices = self.choices.model_copy(update={"recent": recent})
+        self._change((file.absolute(), *self.choices.recent)[:MOST_RECENT], self.choices.folders)
 
     def forget(self, file: Path) -> None:
         """Remove a file from the recent ones."""
-        recent = tuple(path for path in self.choices.recent if path != _stored(file))
-        self.choices = self.choices.model_copy(update={"recent": recent})
+        recent = tuple(path for path in self.choices.recent if path != file.absolute())
+        self._change(recent, self.choices.folders)
+
+    def _change(self, recent: tuple[Path, ...], folders: dict[FileKind, Path]) -> None:
+        with suppress(ValueError):  # of a path that cannot be remembered
+            self.choices = FileChoices(recent=recent, folders=folders)
 
     def ask(
         self, parent: QWidget, kind: FileKind, title: str, mode: str, filters: str = "", path: Path | None = None
@@ -103,9 +102,3 @@ class FilePlaces:
             named = chosen[0].with_name(chosen[0].name + path.suffix)
             return self.ask(parent, kind, title, mode, filters, named) if named.exists() else [named]
         return chosen
-
-
-def _stored(path: Path) -> str | None:
-    """The text of a path in the settings; None: it has none, as bytes of a name may be no characters."""
-    text = str(path.absolute())
-    return text if text == name_text(text) and len(text) <= LONGEST_PATH else None

@@ -1,4 +1,4 @@
-"""What was played, handed to other programs as files: dragged from the window, or copied to the clipboard."""
+"""Notes and recordings, handed to other programs as files: dragged from the window, or copied to the clipboard."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from app.window.main_window import MainWindow
 from app.window.recordings import Recordings
 
 Take = Callable[[list[Path]], None]
-READY = "Rendered: drag it now"
 
 
 class DragOut(QObject):
@@ -39,8 +38,7 @@ class DragOut(QObject):
         self._background.progressed.connect(lambda share, *_: handle.show_share(share))
         self._background.finished.connect(self._give)
         self._background.failed.connect(self._fail)
-        handle.held.connect(lambda: self._prepare(handle.subject, self._offer))
-        handle.clicked.connect(self._abandon)
+        handle.wanted.connect(lambda: self._prepare(handle.subject, self._offer))
         handle.copy_asked.connect(lambda: self.copy(handle.subject))
         recordings.unsaved_changed.connect(lambda: handle.show_recorded(recordings.latest is not None))
 
@@ -86,17 +84,10 @@ class DragOut(QObject):
         self._handle.show_share(None)
         self._window.notices.report(message, details)
 
-    def _abandon(self) -> None:
-        """Render nothing for a click, which opens the menu."""
-        if self._background.busy and self._take == self._offer:
-            self._background.cancel()
-            self._asked = None
-            self._handle.show_share(None)
-
     def _offer(self, files: list[Path]) -> None:
-        if self._handle.missed:
-            self._window.say_briefly(READY)
         self._handle.offer(files)
+        if self._handle.pulled:  # and released since
+            self._window.say_briefly("Rendered: drag it now")
 
     def _copy(self, files: list[Path]) -> None:
         QGuiApplication.clipboard().setMimeData(file_data(files))

@@ -148,7 +148,7 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self.menu.look_asked.connect(self._change_look)
         self.menu.recent_asked.connect(self._open_recent)
-        self.menu.aboutToShow.connect(lambda: self.menu.show_recent(self.places.recent))
+        self.menu.aboutToShow.connect(lambda: self.menu.show_recent(self.places.choices.recent))
         QApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         enter = QShortcut(QKeySequence("Return"), self)
         enter.setAutoRepeat(False)

@@ -13,7 +13,7 @@ from app.views.file_places import FileChoices, FileKind, FilePlaces
 
 def files_in(folder: Path) -> FileChoices:
     """The choices of a user who kept files of every kind there."""
-    return FileChoices(folders=dict.fromkeys(get_args(FileKind), str(folder)))
+    return FileChoices(folders=dict.fromkeys(get_args(FileKind), folder))
 
 
 def places_in(folder: Path) -> FilePlaces:

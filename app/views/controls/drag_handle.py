@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QMimeData, QPoint, Qt, QUrl, Signal
-from PySide6.QtGui import QActionGroup, QDrag, QMouseEvent
+from PySide6.QtGui import QActionGroup, QDrag, QEnterEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication, QMenu, QSizePolicy, QToolButton
 
 Handed = Literal["note", "difference", "recording"]
@@ -28,24 +28,23 @@ def file_data(files: Sequence[Path]) -> QMimeData:
 
 
 class DragHandle(QToolButton):
-    """Pressing it asks for files, which `offer` gives; moving the mouse drags them as soon as they are there.
+    """Pointing at it asks for files, which `offer` gives; pulling it drags them as soon as they are there.
 
     Attributes:
         subject: what is dragged.
-        missed: the mouse was moved and released before the files were there.
+        pulled: the mouse was pressed and moved away, and nothing is dragged yet.
     """
 
-    held = Signal()
-    copy_asked = Signal()
+    wanted = Signal()
+    copy_asked = Signal()  # to the clipboard
 
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("chip")
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.OpenHandCursor)
-        self.missed = self._compact = False
+        self.pulled = self._compact = False
         self._pressed: QPoint | None = None  # None: the mouse is up, or drags already
-        self._moved = False
         self._files: Sequence[Path] = ()
         self._menu = QMenu(self)
         group = QActionGroup(self._menu)
@@ -65,12 +64,9 @@ class DragHandle(QToolButton):
         """Show what is dragged from now on."""
         self.subject = subject
         self._actions[subject].setChecked(True)
-        words = WORDS[subject]
-        self.setAccessibleName(f"Drag {words} as WAV")
-        self.setToolTip(
-            f"Drag {words} into a DAW or a file manager, as WAV like the last export.\n"
-            "Click to drag something else, or to copy it as a file (the note: Ctrl+Shift+C)"
-        )
+        self.setAccessibleName(f"Drag {WORDS[subject]}")
+        tip = "as the WAV file that Export would write.\nClick for something else, or to copy it as a file"
+        self.setToolTip(f"Drag {WORDS[subject]} into a DAW or a file manager, {tip} (the note: Ctrl+Shift+C)")
         self.show_share(None)
 
     def show_recorded(self, recorded: bool) -> None:
@@ -95,29 +91,33 @@ class DragHandle(QToolButton):
         self._files = files
         self._drag()
 
+    def enterEvent(self, event: QEnterEvent) -> None:
+        super().enterEvent(event)
+        if self.subject != "recording":  # which may be long
+            self.wanted.emit()
+
     def mousePressEvent(self, event: QMouseEvent) -> None:
         super().mousePressEvent(event)
         if event.button() == LEFT:
-            self._pressed, self._moved, self.missed, self._files = event.position().toPoint(), False, False, ()
-            self.held.emit()
+            self._pressed, self.pulled, self._files = event.position().toPoint(), False, ()
+            self.wanted.emit()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)
         if self._pressed is not None:
             way = event.position().toPoint() - self._pressed
-            self._moved = self._moved or way.manhattanLength() >= QApplication.startDragDistance()
+            self.pulled = self.pulled or way.manhattanLength() >= QApplication.startDragDistance()
             self._drag()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self.missed, self._pressed = self._pressed is not None and self._moved, None
-        self.setDown(self.isDown() and not self.missed)  # or it would be clicked
+        self._pressed = None
+        self.setDown(self.isDown() and not self.pulled)  # or it would be clicked
         super().mouseReleaseEvent(event)
 
     def _drag(self) -> None:
-        if self._pressed is None or not self._moved or not self._files:
-            return
-        self._pressed = None
-        self.setDown(False)  # its release goes to the other program
-        drag = QDrag(self)
-        drag.setMimeData(file_data(self._files))
-        drag.exec(Qt.DropAction.CopyAction)
+        if self._pressed is not None and self.pulled and self._files:
+            self._pressed, self.pulled = None, False
+            self.setDown(False)  # its release goes to the other program
+            drag = QDrag(self)
+            drag.setMimeData(file_data(self._files))
+            drag.exec(Qt.DropAction.CopyAction)

@@ -170,10 +170,6 @@ class FilePicker(QWidget):
         elif Path(typed).suffix.lower() in FILTERS:
             self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
 
-    def remember(self, file: Path) -> None:
-        """Suggest names in the folder of a file that was saved from now on."""
-        self.places.remember(self.kind, file.parent)
-
     def browse(self) -> None:
         named = Path(self.edit.text().strip()).name
         suggested = self.path if named else Path(f"untitled{self.suffix}")

@@ -52,6 +52,7 @@ class ExportDialog(WorkDialog):
         super().__init__("Export", 680, "export", EXPECTED, parent)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
+        self._places = places
         self.wav = WavForm(export)
         self.note, self.performance = NotePage(export, self.wav, places), PerformancePage(self.wav, places)
         self.sampler, self.plugin = SamplerPage(sampled, places), PluginPage(places)
@@ -74,7 +75,8 @@ class ExportDialog(WorkDialog):
         self.state.setMinimumHeight(52)
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         tip = "Show what was saved in the file manager"
-        self.show_folder = push_button("Show in folder", tip, pressed=self._reveal)
+        shown = lambda: self._job and reveal(self._job.file, self._show_text)  # noqa: E731
+        self.show_folder = push_button("Show in folder", tip, pressed=shown)
         tip = "Render and save"
         self.save = push_button("Export", tip, kind="primary", pressed=self._start, autoDefault=True)
         self.close_button = push_button("Close", "Close (Escape)", pressed=self._close_or_cancel)
@@ -164,7 +166,7 @@ class ExportDialog(WorkDialog):
 
     def _show_finished(self, words: str) -> None:
         assert self._job is not None
-        self.page.file.remember(self._job.file)
+        self._places.remember(self.page.file.kind, self._job.file.parent)
         self.exported.emit(self._job)
         self._end(words)
         self.show_folder.show()
@@ -191,10 +193,6 @@ class ExportDialog(WorkDialog):
     def _show_text(self, text: str, failed: bool = False) -> None:
         show_kind(self.state, "warning" if failed else "faint")
         self.state.setText(text)
-
-    def _reveal(self) -> None:
-        assert self._job is not None
-        reveal(self._job.file, self._show_text)
 
     def done(self, result: int) -> None:
         """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""

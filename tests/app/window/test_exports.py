@@ -388,7 +388,7 @@ def test_the_patch_is_exported_for_samplers_while_the_window_plays_and_choices_a
     short.close()
     remembered = load_settings(tmp_path / "settings.json")[0]
     assert (remembered.sampled.layers, remembered.sampled.keys) == (7, (60, 61))
-    assert remembered.files.folders["sampler"] == str(tmp_path)
+    assert remembered.files.folders["sampler"] == tmp_path
 
 
 def test_keys_and_shortcuts_work_while_an_export_runs_and_it_is_cancelled_by_a_question(

@@ -240,7 +240,7 @@ def test_recent_files_are_listed_opened_again_and_forgotten_when_they_are_gone(
     assert made.said[-1] == f"{song} is not there any more, and was removed from the recent files."
     assert len(fill()) == 2
     made.close()
-    assert load_settings(tmp_path / "settings.json")[0].files.recent == (str(instrument), str(scale))
+    assert load_settings(tmp_path / "settings.json")[0].files.recent == (instrument, scale)
 
 
 @pytest.fixture
@@ -273,7 +273,7 @@ def test_folders_are_remembered_by_kind_and_only_full_paths_are_read(
     for number in range(MOST_RECENT + 5):
         places.opened(tmp_path / f"{number}.mid")
     places.opened(tmp_path / "no text \udcff.mid")
-    assert [file.stem for file in places.recent] == [str(number) for number in range(MOST_RECENT + 4, 4, -1)]
+    assert [file.stem for file in places.choices.recent] == [str(number) for number in range(MOST_RECENT + 4, 4, -1)]
     assert FileChoices.model_validate_json(places.choices.model_dump_json()) == places.choices
     for wrong in ({"recent": ["../song.mid"]}, {"folders": {"note": "music"}}, {"recent": ["/a"] * 11}):
         with pytest.raises(ValueError):

@@ -46,7 +46,7 @@ def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
         sound=SoundChoice(rate_hz=44_100, buffer=512),
         look=Look(theme="light", size_percent=125),
         midi=MidiChoices(port="Keys", notes="preset", controllers={"width": 74}),
-        files=FileChoices(folders={"note": str(tmp_path)}, recent=(str(tmp_path / "song.mid"),)),
+        files=FileChoices(folders={"note": tmp_path}, recent=(tmp_path / "song.mid",)),
         window_geometry="AdnQyw==",
     )
     save_settings(path, settings)
