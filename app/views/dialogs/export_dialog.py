@@ -75,8 +75,7 @@ class ExportDialog(WorkDialog):
         self.state.setMinimumHeight(52)
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         tip = "Show what was saved in the file manager"
-        shown = lambda: self._job and reveal(self._job.file, self._show_text)  # noqa: E731
-        self.show_folder = push_button("Show in folder", tip, pressed=shown)
+        self.show_folder = push_button("Show in folder", tip, pressed=self._reveal)
         tip = "Render and save"
         self.save = push_button("Export", tip, kind="primary", pressed=self._start, autoDefault=True)
         self.close_button = push_button("Close", "Close (Escape)", pressed=self._close_or_cancel)
@@ -193,6 +192,10 @@ class ExportDialog(WorkDialog):
     def _show_text(self, text: str, failed: bool = False) -> None:
         show_kind(self.state, "warning" if failed else "faint")
         self.state.setText(text)
+
+    def _reveal(self) -> None:
+        assert self._job is not None
+        reveal(self._job.file, self._show_text)
 
     def done(self, result: int) -> None:
         """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""

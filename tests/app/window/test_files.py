@@ -12,7 +12,7 @@ import pytest
 import soundfile
 from PySide6.QtCore import QPoint, QProcess, Qt
 from PySide6.QtGui import QDesktopServices, QDrag, QGuiApplication
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QToolTip
 
 from app.export.choices import ExportChoices
 from app.export.handed_files import HandedFiles
@@ -105,6 +105,11 @@ def test_a_note_its_difference_and_a_recording_are_dragged_as_they_would_be_expo
     (difference,) = dropped[2]
     assert difference.read_bytes() == exported(made, difference.name).read_bytes()
     assert difference.name == "Classical guitar E3 hard difference.wav"
+    handle.show_subject("note")
+    pull(made, handle)
+    made.qtbot.mouseRelease(handle, LEFT, pos=AWAY)
+    made.wait(lambda: QToolTip.text() == "Rendered: drag it now")
+    assert len(dropped) == 3 and handle.text() == "⋮⋮ Drag note"
     made.window.instrument.bar.record.click()
     made.play(60)
     made.window.instrument.bar.record.click()
