@@ -77,7 +77,7 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     initial_m, ear = project(sound.pluck.displacement(101), info.modes), Ear((0.37,))
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
-        ahead = AheadSamples(voice, ModelMotion(ModelSource(loaded), initial_m, 0.4))
+        ahead = AheadSamples(voice, ModelMotion(ModelSource(loaded), initial_m, 0.4), "pluck")
         while not ahead.finished:
             ahead.render()
     mixer = Mixer(48_000)
