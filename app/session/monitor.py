@@ -21,19 +21,27 @@ class Monitor(Value):
 
     Attributes:
         a, b: their sources: "model", "truth", "difference" (model minus truth) or "preset:NAME".
+        difference: whether the difference is heard in place of the slot, until the key for it is pressed again.
         level_match: whether each source is brought to the level of the truth, once its gain is known.
     """
 
     a: str = Field("model", pattern=SLOT_PATTERN)
     b: str = Field("truth", pattern=SLOT_PATTERN)
     heard: Slot = "a"
+    difference: bool = False
     level_match: bool = True
     difference_gain_db: float = parameter("difference_gain_db")
 
     @property
     def source_heard(self) -> str:
         """The source that is heard."""
-        return self.a if self.heard == "a" else self.b
+        return self.source_of(self.heard)
+
+    def source_of(self, slot: str) -> str:
+        """The source with which slot "a" or "b" is heard."""
+        if self.difference and slot == self.heard:
+            return DIFFERENCE
+        return self.a if slot == "a" else self.b
 
     @property
     def voices(self) -> tuple[str, ...]:
@@ -58,7 +66,7 @@ class Monitor(Value):
 
     def gain_db(self, slot: str, match: Mapping[str, float] | None) -> float | None:
         """The gain of the source of slot "a" or "b" as heard, in dB; None while it is not known."""
-        source = self.a if slot == "a" else self.b
+        source = self.source_of(slot)
         if source == DIFFERENCE:
             return self.difference_gain_db
         if not self.level_match:

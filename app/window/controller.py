@@ -211,7 +211,7 @@ class Controller(QObject):
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
-            **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
+            **{field: partial(self._toggle, field) for field in ("loop", "difference", "motion", "envelope")},
             "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
