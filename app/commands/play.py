@@ -1,4 +1,4 @@
-"""Command `play`: a MIDI file, played by an instrument, to a WAV file."""
+"""Command `play`: a MIDI file, played by an instrument, to a sound file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from app.commands import options
 from app.commands.render import SILENT_DB, BitsOption
+from app.shared.vocabulary import WRITTEN_ENDINGS
 from engine.plain_text import one_line
 from training.cli import arguments
 from training.cli.console import progress, say
@@ -22,7 +23,7 @@ def play(
     instrument: Annotated[
         str, typer.Option(metavar="INSTRUMENT", help="An instrument's name, or the path of its file.")
     ],
-    out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
+    out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write, or OUT.flac.")],
     source: options.ModelOrTruth = "model",
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = DEFAULT_RATE_HZ,
     bits: BitsOption = "24",
@@ -31,14 +32,14 @@ def play(
     ] = None,
     normalise: Annotated[bool, typer.Option("--normalise", help="Normalise to -1 dBFS.")] = False,
 ) -> None:
-    """Render a MIDI file, played by an instrument, to WAV.
+    """Render a MIDI file, played by an instrument, to WAV or FLAC.
 
     The same files give the same samples. Strings leave out channel 10, except in MPE; a kit of drums plays it alone.
     """
     from app.export.sound import LONGEST_S
     from app.export.wav import RATE_RANGE_HZ
 
-    arguments.check_suffix("--out", out, ".wav")
+    arguments.check_suffix("--out", out, WRITTEN_ENDINGS)
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     if seconds is not None:
         arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")

@@ -1,4 +1,4 @@
-"""The files of what is played through a patch: a WAV file rendered from the events, and their MIDI file."""
+"""The files of what is played through a patch: a sound file rendered from the events, and their MIDI file."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 
 from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
-from app.export.wav import WavSettings, WrittenSound, write_wav
+from app.export.wav import WavSettings, WrittenSound, form_of, write_wav
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.shared.vocabulary import DIFFERENCE, WRITTEN_ENDINGS, PlayedSource
 from app.shared.worker import Progress
 from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
@@ -54,7 +54,7 @@ def write_played(
     seconds: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> WrittenSound:
-    """Write a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
+    """Write a sound file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
         preset: plays the patch.
@@ -63,12 +63,13 @@ def write_played(
         progress: is called with the share that is done, at most 0.99; may raise, to end it.
 
     Raises:
-        ValueError: a key has no possible string, or the source is unknown.
+        ValueError: a key has no possible string, or the source is unknown; or see `form_of`.
         PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
     patch, source, recorded, events = played.patch, played.source, played.recorded, played.events
     rate_hz = settings.rate_hz or RATE_HZ
+    form = form_of(path, settings.bits, rate_hz)
     origin = InstrumentSound(
         program=PROGRAM,
         version=program_version(),
@@ -95,12 +96,12 @@ def write_played(
             "software": f"{PROGRAM} {program_version()}",
             "comment": origin.model_dump_json(),
         }
-        return write_wav(file, sound, rate_hz, settings, tags)
+        return write_wav(file, sound, rate_hz, settings, tags, form=form)
 
 
 def recorded_files(path: Path) -> tuple[Path, Path]:
-    """The WAV and the MIDI file that a recording of what is played is written to, from the chosen path."""
-    sound = path if path.suffix.lower() == ".wav" else path.with_name(f"{path.name}.wav")
+    """The sound and the MIDI file that a recording of what is played is written to, from the chosen path."""
+    sound = path if path.suffix.lower() in WRITTEN_ENDINGS else path.with_name(f"{path.name}.wav")
     return sound, sound.with_suffix(".mid")
 
 

@@ -311,7 +311,7 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """Take a dropped file: install and choose a preset, restore a WAV's recipe; ask what other sounds are.
+        """Take a dropped file: install and choose a preset, restore an export's recipe; ask what other sounds are.
 
         Patches, scales and MIDI files go to `patches`.
         """

@@ -37,7 +37,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
     "&File": (
         MenuEntry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
-        MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
+        MenuEntry("export", "Export …", "Ctrl+E", "export WAV or FLAC"),
         MenuEntry(
             "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"
         ),

@@ -87,6 +87,10 @@ def test_without_a_name_it_lies_in_this_folder_and_replaces_nothing(
     assert run("render", "--recipe", "first.wav").status == 0
     assert (folder / "good_x0.41_a3.3_4000_model.wav").read_bytes() == first.read_bytes()
     assert "is there already" in run("render", "--recipe", "first.wav").failure
+    assert run("render", "--recipe", "first.wav", "first.flac").status == 0
+    assert run("render", "--recipe", "first.flac").status == 0
+    flac = folder / "good_x0.41_a3.3_4000_model.flac"
+    assert (soundfile.read(flac)[0] == soundfile.read(first)[0]).all() and flac.stat().st_size < first.stat().st_size
 
 
 def test_a_preset_is_found_by_its_content_and_a_changed_or_lost_one_is_reported(
@@ -133,7 +137,7 @@ def test_a_preset_name_of_a_recipe_is_never_a_path(
     assert run("render", "--recipe", bad).status == 0  # its digest is known
     (made,) = set(tmp_path.rglob("*.wav")) - before
     assert made.parent == inside
-    plain = default_file_name(name, Pluck(), 48_000, "model")
+    plain = default_file_name(name, Pluck(), 48_000, "model", ".wav")
     assert Path(plain).name == plain and plain.isprintable() and not plain.startswith(".") and "\\" not in plain
 
 
