@@ -152,7 +152,7 @@ def render(
 ) -> None:
     """Render a blow on a drum to a WAV or FLAC file."""
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
-    arguments.check_suffix("OUT.wav", out, WRITTEN_ENDINGS)
+    arguments.check_suffix("OUT.wav", out, *WRITTEN_ENDINGS)
     blow = _blow_of(drum, key, velocity, place, preset)
     from app.export.played import Played, write_played
     from app.export.wav import WavSettings
@@ -161,7 +161,7 @@ def render(
     events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
     loaded, played = arguments.open_preset(blow.patch.preset), Played(blow.patch, events, source)
     with progress(blow.patch.name) as report:
-        written = write_played(out, played, loaded, "", WavSettings(bits, rate), seconds, report)
+        written = write_played(out, [(played, loaded)], "", WavSettings(bits, rate), seconds, report)
     print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.peak_db:.1f} dBFS")
 
 

@@ -155,7 +155,7 @@ def render(
         _render_again(recipe, Path(preset) if preset else None)
         return
     if out is not None:
-        arguments.check_suffix("OUT.wav", out, WRITTEN_ENDINGS)
+        arguments.check_suffix("OUT.wav", out, *WRITTEN_ENDINGS)
     preset, out = _require("PRESET", preset), _require("OUT.wav", out)
     if as_recorded:
         _render_as_recorded(preset, out, file.bits)

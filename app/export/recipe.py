@@ -54,7 +54,8 @@ class InstrumentSound(Value):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
-        instrument: the name of the patch, of a recording the one with which it began.
+        instrument: the name of the patch, of a recording the one with which it began; of several, all.
+        preset: that plays it, of several the first one's.
         source: that is heard.
         difference_gain_db: the gain of the difference.
         midi: the name of the MIDI file with the notes.

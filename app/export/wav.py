@@ -154,6 +154,11 @@ def write_wav(
     return WrittenSound(len(sound), rate_hz, _decibel(peak * gain), clipped, _decibel(gain))
 
 
+def is_within_full_scale(sound: SoundSamples) -> bool:
+    """Return True if no sample of a sound exceeds full scale."""
+    return all(_peak(block) <= 1 for _, block in blocks(sound))
+
+
 class _Noting:
     """A file for libsndfile, which cannot pass on an OSError: the first one is kept and raised by `check`.
 

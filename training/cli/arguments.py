@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -63,7 +62,7 @@ def check_range(option: str, value: float, low: float, high: float, unit: str = 
         raise typer.BadParameter(f"must lie in {low:.10g} … {high:.10g}{text}, not {value:.10g}", param_hint=option)
 
 
-def check_suffix(option: str, path: Path, suffixes: Sequence[str]) -> None:
+def check_suffix(option: str, path: Path, *suffixes: str) -> None:
     """Raise typer.BadParameter: the name of a file that is written ends with none of `suffixes`."""
     if path.suffix.lower() not in suffixes:
         words = " or ".join(suffixes)
