@@ -133,7 +133,7 @@ def _ignored_messages(messages: MidiMessages, follows_programs: bool = False) ->
         left_out.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
     kinds = {message[0] & 0xF0 for _, message in messages.timed}
     if PROGRAM in kinds and not follows_programs:
-        left_out.append("its program changes, which “learned-strings play FILE.mid --out OUT.wav” follows")
+        left_out.append("its program changes")
     if kinds & {KEY_PRESSURE, PRESSURE}:
         left_out.append("its pressure")
     sent = {message[1] for _, message in messages.timed if message[0] & 0xF0 == CONTROLLER}
@@ -158,7 +158,11 @@ def read_song(path: Path, patch: Patch | None) -> SongPart:
         MidiFileError: as `read_midi`; or it holds only drums.
     """
     messages = _messages_in(path)
-    return _part(path, patch, _events_of(path, messages), _ignored_messages(messages))
+    part = _part(path, patch, _events_of(path, messages), _ignored_messages(messages))
+    if not any(message[0] & 0xF0 == PROGRAM for _, message in messages.timed):
+        return part
+    by_programs = f'each channel by the instrument of its program: learned-strings play "{path.name}" --out OUT.wav'
+    return replace(part, left_out=f"{part.left_out}; {by_programs}")
 
 
 def read_parts(path: Path) -> tuple[list[tuple[Patch, SongPart]], str]:
