@@ -54,13 +54,15 @@ class Monitor(Value):
         """The factor of a source's voice; 0: it is not heard.
 
         Args:
-            sources: those of the note; where the one that is heard is missing, the model is heard.
+            sources: those of the note; where the heard one is missing, or a part of the difference, that of the slot
+                is heard, else the model.
             match: by source, the factor that brings it to the level of the truth; None: not known yet.
         """
-        if self.source_heard == DIFFERENCE:
+        if self.source_heard == DIFFERENCE and {"model", "truth"} <= set(sources):
             gain = float(10 ** (self.difference_gain_db / 20))
             return {"model": gain, "truth": -gain}.get(source, 0.0)
-        if source != (self.source_heard if self.source_heard in sources else "model"):
+        own = self.a if self.heard == "a" else self.b
+        if source != next((each for each in (self.source_heard, own) if each in sources), "model"):
             return 0.0
         return match.get(source, 1.0) if self.level_match and match else 1.0
 

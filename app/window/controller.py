@@ -211,12 +211,13 @@ class Controller(QObject):
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
-            **{field: partial(self._toggle, field) for field in ("loop", "difference", "motion", "envelope")},
+            **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
             "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
             "next": lambda: self.presets.step(1),
             "switch": session.switch_source,
+            "difference": self._hear_difference,
             "all_modes": lambda: session.update(solo=0),
             "abx": self.listening_test,
             "audio": self.audio.show_dialog,
@@ -247,6 +248,13 @@ class Controller(QObject):
 
     def _toggle(self, field: str) -> None:
         self.session.update(**{field: not getattr(self.session.choices, field)})
+
+    def _hear_difference(self) -> None:
+        """Hear the difference, or again what was before it. Keys struck in Play have no voice of the truth."""
+        if self.session.choices.face == "lab" or self.session.choices.difference:
+            self._toggle("difference")
+        else:
+            self.window.say_briefly("The difference is heard in the Lab (F9)")
 
     def _step(self, take: Callable[[], None], words: str, done: str, nothing: str) -> None:
         """Take a step of undo or redo, and say which; `words`: those of the step."""

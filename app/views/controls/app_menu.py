@@ -62,7 +62,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("previous", "Previous preset", "PgUp", "previous preset"),
         MenuEntry("next", "Next preset", "PgDown", "next preset"),
         MenuEntry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
-        MenuEntry("difference", "Hear the difference", "Shift+B", "hear model − truth; again: what was heard before"),
+        MenuEntry("difference", "Hear the difference", "Shift+B", "hear model − truth in the Lab, and back"),
         MenuEntry("all_modes", "Play all modes", "Esc", "play all modes again"),
         MenuEntry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
     ),

@@ -234,6 +234,9 @@ def test_one_key_hears_the_difference_and_again_what_was_heard_before(lab: Windo
             lab.key(*back)
         lab.wait(lambda heard=heard: [source for source, gain in gains(note).items() if gain] == [heard])
         assert f"{heard} · heard" in waveform.legend.text and "difference" not in waveform.legend.text
+    lab.change(face="play")  # where keys have no voice of the truth, and the model alone would be amplified
+    lab.key(KEY.Key_B, SHIFT)
+    assert lab.choices.source_heard == "truth" and not lab.choices.difference
 
 
 def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, Any]) -> None:
