@@ -161,8 +161,8 @@ def read_song(path: Path, patch: Patch | None) -> SongPart:
     part = _part(path, patch, _events_of(path, messages), _ignored_messages(messages))
     if not any(message[0] & 0xF0 == PROGRAM for _, message in messages.timed):
         return part
-    by_programs = f'each channel by the instrument of its program: learned-strings play "{path.name}" --out OUT.wav'
-    return replace(part, left_out=f"{part.left_out}; {by_programs}")
+    by_programs = f'Each channel with its own instrument: learned-strings play "{path.name}" --out OUT.wav'
+    return replace(part, left_out=f"{part.left_out}. {by_programs}")
 
 
 def read_parts(path: Path) -> tuple[list[tuple[Patch, SongPart]], str]:

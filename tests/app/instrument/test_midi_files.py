@@ -375,8 +375,8 @@ LEFT_OUT = (*[b"\0\xc0\x05"] * 3, *[b"\0\xb0\x0a\x40"] * 2, b"\0\xb0\x40\x00", b
         (
             one_track(*LEFT_OUT, b"\0\xb0\xff\x40", header=b"\0\1\0\2\0\x60"),
             "1 track that its header counts; 1 message of a key or a controller above 127; "
-            "what exceeds 127 in 1 message; its program changes and its controllers 10, 91; "
-            'each channel by the instrument of its program: learned-strings play "song.mid" --out OUT.wav',
+            "what exceeds 127 in 1 message; its program changes and its controllers 10, 91. "
+            'Each channel with its own instrument: learned-strings play "song.mid" --out OUT.wav',
         ),
         (one_track(b"\0\xd0\x40", ON), "its pressure"),
         (one_track(b"\0\xa0\x3c\x40", ON), "its pressure"),
