@@ -39,7 +39,7 @@ cli = typer.Typer(
 def start(
     context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
 ) -> None:
-    """Play learned strings, compare them with the physics, and export them as WAV.
+    """Play learned strings, compare them with the physics, and export them as WAV or FLAC.
 
     Without a command, the app opens; files that are named instead open in it, as learned-strings song.mid take.wav.
     Every command has its own --help.

@@ -13,7 +13,7 @@ import typer
 
 from app.commands.motion import SolverOption
 from app.commands.render import BitsOption
-from app.shared.vocabulary import PlayedSource
+from app.shared.vocabulary import WRITTEN_ENDINGS, PlayedSource
 from engine.bounds import MOST_FRAMES
 from training.cli import arguments
 from training.cli.arguments import Json
@@ -138,7 +138,7 @@ def predict(
 @drums.command()
 def render(
     drum: DrumName,
-    out: Annotated[Path, typer.Argument(metavar="OUT.wav", help="The file to write.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.wav", help="The file to write, or OUT.flac.")],
     key: KeyOption = None,
     velocity: Velocity = 100,
     place: Place = None,
@@ -150,9 +150,9 @@ def render(
     bits: BitsOption = "24",
     preset: PresetOption = None,
 ) -> None:
-    """Render a blow on a drum to a WAV file."""
+    """Render a blow on a drum to a WAV or FLAC file."""
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
-    arguments.check_suffix("OUT.wav", out, ".wav")
+    arguments.check_suffix("OUT.wav", out, *WRITTEN_ENDINGS)
     blow = _blow_of(drum, key, velocity, place, preset)
     from app.export.played import Played, write_played
     from app.export.wav import WavSettings
@@ -161,7 +161,7 @@ def render(
     events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
     loaded, played = arguments.open_preset(blow.patch.preset), Played(blow.patch, events, source)
     with progress(blow.patch.name) as report:
-        written = write_played(out, played, loaded, "", WavSettings(bits, rate), seconds, report)
+        written = write_played(out, [(played, loaded)], "", WavSettings(bits, rate), seconds, report)
     print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.peak_db:.1f} dBFS")
 
 

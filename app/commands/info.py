@@ -1,4 +1,4 @@
-"""Command `info`: the kind of a WAV file."""
+"""Command `info`: the origin of a sound file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def info(
     file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render, batch or the app wrote.")],
     json: Json = False,
 ) -> None:
-    """Show what a WAV file is: the recipe of a pluck, or what was played on an instrument.
+    """Show what a WAV or FLAC file is: the recipe of a pluck, or what was played on an instrument.
 
     `render --recipe FILE.wav` renders a pluck again, `play FILE.mid` what was played.
     """

@@ -1,4 +1,4 @@
-"""Command `render`: a pluck to a WAV file, or the recipe of a WAV file once more."""
+"""Command `render`: a pluck to a sound file, or the recipe of one once more."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from app.commands import options
-from app.shared.vocabulary import Bits, Source
+from app.shared.vocabulary import WRITTEN_ENDINGS, Bits, Source
 from engine.values.ear import Pickup
 from training.cli import arguments
 from training.cli.console import Failure, progress, say
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 Value = TypeVar("Value")
 SILENT_DB = -120.0  # peak below which a note says that the file is silent
 
-BitsOption = Annotated[Bits, typer.Option(help="16 (dithered) or 24 bits, or 32f: floating point, never clips.")]
+BitsOption = Annotated[
+    Bits, typer.Option(help="16 (dithered) or 24 bits; of WAV also 32f: floating point, never clips.")
+]
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def render(
     preset: Annotated[
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
-    out: Annotated[Path | None, typer.Argument(metavar="OUT.wav", help="The file to write.")] = None,
+    out: Annotated[Path | None, typer.Argument(metavar="OUT.wav", help="The file to write, or OUT.flac.")] = None,
     as_recorded: Annotated[
         bool,
         typer.Option(
@@ -139,12 +141,12 @@ def render(
         Path | None,
         typer.Option(
             metavar="FILE.wav",
-            help="Render the recipe in this WAV file again. Give only OUT.wav with it; by default its name follows "
-            "from the recipe, in the current folder.",
+            help="Render the recipe in this WAV or FLAC file again. Give only OUT.wav with it; by default its name "
+            "follows from the recipe, in the current folder.",
         ),
     ] = None,
 ) -> None:
-    """Render a pluck to a WAV file. 10 mm of displacement at the listening point are full scale.
+    """Render a pluck to a WAV or FLAC file. 10 mm of displacement at the listening point are full scale.
 
     PRESET, OUT.wav, --position, --amplitude-mm and --seconds are needed, except with --recipe.
     """
@@ -153,7 +155,7 @@ def render(
         _render_again(recipe, Path(preset) if preset else None)
         return
     if out is not None:
-        arguments.check_suffix("OUT.wav", out, ".wav")
+        arguments.check_suffix("OUT.wav", out, *WRITTEN_ENDINGS)
     preset, out = _require("PRESET", preset), _require("OUT.wav", out)
     if as_recorded:
         _render_as_recorded(preset, out, file.bits)
@@ -184,7 +186,7 @@ def _require(name: str, value: Value | None) -> Value:
 
 
 def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
-    from app.export.wav import WavSettings, write_wav
+    from app.export.wav import WavSettings, form_of, write_wav
     from engine.folders import usable_files
     from engine.presets import find_preset, read_info
     from engine.whole_file import result_file
@@ -193,9 +195,10 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
     if info.recorded is None:
         raise Failure(f"{preset}: was not learned from a recording; leave out --as-recorded, or choose one that was")
     note = info.recorded.note
+    form = form_of(out, bits, note.rate_hz)
     tags = {"title": info.title, "comment": f"as recorded in {info.recorded.file}, SHA-256 {info.recorded.digest}"}
     with result_file(out) as file:
-        level = write_wav(file, note.sound(), note.rate_hz, WavSettings(bits, fade_out_s=0.0), tags)
+        level = write_wav(file, note.sound(), note.rate_hz, WavSettings(bits, fade_out_s=0.0), tags, form=form)
     print(f"{out}: {note.frames} frames at {note.rate_hz} Hz, peak {level.peak_db:.1f} dBFS")
 
 
@@ -208,7 +211,8 @@ def _render_again(file: Path, out: Path | None) -> None:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, usable_files())
     if out is None:
-        out = Path(default_file_name(path.stem, recipe.pluck, recipe.rate_hz, recipe.source))
+        ending = ending if (ending := file.suffix.lower()) in WRITTEN_ENDINGS else ".wav"
+        out = Path(default_file_name(path.stem, recipe.pluck, recipe.rate_hz, recipe.source, ending))
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
     sound = recipe.sound(path, file)

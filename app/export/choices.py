@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.export.wav import WavSettings
-from app.shared.vocabulary import Bits
+from app.shared.vocabulary import FORMATS, Bits, Format
 
 Chosen = Literal["model", "truth", "difference", "files"]
 
@@ -25,7 +25,7 @@ class ExportChoices(BaseModel):
 
     source: Chosen = "model"
     rate_hz: int = 48_000
-    bits: Bits = "24"
+    format: Format = "wav 24"
     until_decayed: bool = True
     decay_db: float = 60.0
     longest_s: float = 30.0
@@ -34,10 +34,23 @@ class ExportChoices(BaseModel):
     difference_gain_db: float = 20.0
     alone: bool = Field(False, exclude=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _take_old(cls, data: Any) -> Any:
+        """Versions without FLAC had `bits` alone."""
+        if isinstance(data, dict) and (old := f"wav {data.get('bits')}") in FORMATS:
+            return {"format": old, **data}
+        return data
+
+    @property
+    def ending(self) -> str:
+        """The ending of a file's name."""
+        return f".{self.format.split()[0]}"
+
     @property
     def wav(self) -> WavSettings:
         return WavSettings(
-            bits=self.bits,
+            bits=cast(Bits, self.format.split()[1]),
             rate_hz=self.rate_hz or None,
             normalise=self.normalise,
             decay_db=self.decay_db if self.until_decayed else None,

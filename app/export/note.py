@@ -1,4 +1,4 @@
-"""A note as WAV files with their recipes: a string plucked by itself, or a key as its instrument plays it.
+"""A note as sound files with their recipes: a string plucked by itself, or a key as its instrument plays it.
 
 The window and the command line both write through this module; each file is written whole or not at all.
 """
@@ -18,7 +18,7 @@ from app.export.choices import Chosen, ExportChoices
 from app.export.recipe import SoundRecipe
 from app.export.recording import SoundSamples
 from app.export.sound import VOICES, Mixed, check_sources, render_voices
-from app.export.wav import WavSettings, WrittenSound, write_wav
+from app.export.wav import WavSettings, WrittenSound, form_of, write_wav
 from app.rendering.note_sound import NoteSound, Struck
 from app.shared.key_names import note_name
 from app.shared.version import PROGRAM, program_version
@@ -37,7 +37,7 @@ DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
 @dataclass(frozen=True)
 class WavReport(WrittenSound):
-    """The report of a WAV file that was written.
+    """The report of a sound file that was written.
 
     Attributes:
         past_training_s: how much of the sound lies past the model's training horizon; 0 for the truth.
@@ -67,7 +67,7 @@ def export_sounds(
         The reports in the order of `paths`.
 
     Raises:
-        ValueError: see `check_sources`.
+        ValueError: see `check_sources` and `form_of`.
         WriteError: a file cannot be written; none is left.
         PresetError: the preset's file cannot be read any more.
         Cancelled: `progress` raised it; no file is left.
@@ -76,12 +76,13 @@ def export_sounds(
     if settings.decay_db is not None:  # it ends by its decay, behind a longer fade-out
         settings = replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
     info = preset.info
+    rate_hz = settings.rate_hz or info.rate_hz
     check_sources(sound, paths, info.rate_hz)
+    forms = {source: form_of(path, settings.bits, rate_hz) for source, path in paths.items()}
     with ExitStack() as files:
         recipes = {source: SoundRecipe.of(sound, preset, source, settings) for source in paths}
         # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
-        rate_hz = settings.rate_hz or info.rate_hz
         try:
             voices = render_voices(sound, preset, paths, settings, progress)
         except OSError as error:  # the recordings lie in temporary files
@@ -93,17 +94,17 @@ def export_sounds(
             path, samples = paths[source], Mixed(voices, source, settings.difference_gain_db)
             with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
-                written = write_wav(file, samples, rate_hz, settings, tags, beside)
+                written = write_wav(file, samples, rate_hz, settings, tags, beside, forms[source])
             past_s = 0.0 if source == "truth" else max(0.0, written.seconds - info.horizon_s)
             reports.append(WavReport(**asdict(written), path=path, past_training_s=past_s, decayed=voices.ended))
     return reports
 
 
-def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """The name `{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`; never a path, whatever `preset` is."""
+def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source, ending: str) -> str:
+    """The name `{preset}_x{position}_a{amplitude in mm}_{rate}_{source}{ending}`; never a path for any `preset`."""
     preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_PRESET]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
-    return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
+    return f"{preset}_x{place}_a{height}_{rate_hz}_{source}{ending}"
 
 
 def _digits(value: float, least: int) -> str:
@@ -189,16 +190,16 @@ class HeardNote:
         both = last == "files" and self.source != "difference" and not self.another
         return "files" if both else self.source
 
-    def file_name(self, source: Chosen) -> str:
+    def file_name(self, source: Chosen, ending: str) -> str:
         """The name of its file, with the source where that is neither the model nor both."""
         kind = "" if source in ("model", "files") else f" {source}"
-        return f"{self.name}{kind}.wav"
+        return f"{self.name}{kind}{ending}"
 
     def export(self, choices: ExportChoices, folder: Path) -> NoteExport:
         """Its export with these choices; the difference has the gain with which it is heard."""
         if choices.source == self.source == "difference":
             choices = choices.model_copy(update={"difference_gain_db": self.difference_gain_db})
-        path = folder / self.file_name(choices.source)
+        path = folder / self.file_name(choices.source, choices.ending)
         return NoteExport(self.sound, paths_of(path, choices.source), choices)
 
 
@@ -207,7 +208,7 @@ def paths_of(path: Path, source: Chosen) -> dict[Source, Path]:
     if source != "files":
         return {source: path}
     stem = path.stem.removesuffix(" model").removesuffix(" truth")
-    return {name: path.with_name(f"{stem} {name}.wav") for name in VOICES}
+    return {name: path.with_name(f"{stem} {name}{path.suffix}") for name in VOICES}
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,21 @@
-"""The files of what is played through a patch: a WAV file rendered from the events, and their MIDI file."""
+"""The files of what is played through a patch: a sound file rendered from the events, and their MIDI file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
-from app.export.wav import WavSettings, WrittenSound, write_wav
+from app.export.wav import WavSettings, WrittenSound, form_of, is_within_full_scale, write_wav
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.shared.vocabulary import DIFFERENCE, WRITTEN_ENDINGS, PlayedSource
 from app.shared.worker import Progress
 from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
@@ -47,60 +47,70 @@ class Played:
 
 def write_played(
     path: Path,
-    played: Played,
-    preset: Preset,
+    parts: Sequence[tuple[Played, Preset]],
     midi: str,
     settings: WavSettings = DEFAULT,
     seconds: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> WrittenSound:
-    """Write a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
+    """Write a sound file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
-        preset: plays the patch.
+        parts: what sounds together, of one source, and the presets that play it. Where it exceeds full scale that
+            one alone does not, all is made softer.
         midi: the name of the MIDI file with the events.
         seconds: its length; None: until all has decayed.
         progress: is called with the share that is done, at most 0.99; may raise, to end it.
 
     Raises:
-        ValueError: a key has no possible string, or the source is unknown.
+        ValueError: a key has no possible string, or the source is unknown; or see `form_of`.
         PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
-    patch, source, recorded, events = played.patch, played.source, played.recorded, played.events
+    first, preset = parts[0]
+    source, gain_db, recorded = first.source, first.difference_gain_db, first.recorded
     rate_hz = settings.rate_hz or RATE_HZ
+    form = form_of(path, settings.bits, rate_hz)
+    names = " + ".join(dict.fromkeys(played.patch.name for played, _ in parts))
     origin = InstrumentSound(
         program=PROGRAM,
         version=program_version(),
-        instrument=patch.name,
+        instrument=names,
         preset=preset.name,
         preset_sha256=preset_digest(preset.path),
         source=source,
-        difference_gain_db=played.difference_gain_db if source == DIFFERENCE else 0.0,
+        difference_gain_db=gain_db if source == DIFFERENCE else 0.0,
         rate_hz=rate_hz,
         bits=settings.bits,
         midi=name_text(midi),
         recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
     )
+    events = [entry for played, _ in parts for entry in played.events]
     notes_s = (entry.time_s for entry in events if isinstance(entry.event, NoteOn | NoteOff))
     whole_s = max(notes_s, default=0.0) + TAIL_S if seconds is None else seconds
     with result_file(path) as file:
-        sound = Recording(channels_played(patch, events))
-        gain_db = played.difference_gain_db
-        for block in render_events(patch, preset, events, rate_hz, source, seconds, difference_gain_db=gain_db):
-            sound.append(block)
-            progress(min(0.99, len(sound) / rate_hz / whole_s))
+        sound = Recording(max(channels_played(played.patch, played.events) for played, _ in parts))
+        for place, (played, player) in enumerate(parts):
+            patch, done = played.patch, 0
+            for block in render_events(
+                patch, player, played.events, rate_hz, source, seconds, difference_gain_db=gain_db
+            ):
+                sound.add(done, block)
+                done += len(block)
+                progress((place + min(0.99, done / rate_hz / whole_s)) / len(parts))
+        if len(parts) > 1 and not is_within_full_scale(sound):
+            settings = replace(settings, normalise=True)
         tags = {
-            "title": name_text(f"{path.stem}: {patch.name}"),
+            "title": name_text(f"{path.stem}: {names}"),
             "software": f"{PROGRAM} {program_version()}",
             "comment": origin.model_dump_json(),
         }
-        return write_wav(file, sound, rate_hz, settings, tags)
+        return write_wav(file, sound, rate_hz, settings, tags, form=form)
 
 
 def recorded_files(path: Path) -> tuple[Path, Path]:
-    """The WAV and the MIDI file that a recording of what is played is written to, from the chosen path."""
-    sound = path if path.suffix.lower() == ".wav" else path.with_name(f"{path.name}.wav")
+    """The sound and the MIDI file that a recording of what is played is written to, from the chosen path."""
+    sound = path if path.suffix.lower() in WRITTEN_ENDINGS else path.with_name(f"{path.name}.wav")
     return sound, sound.with_suffix(".mid")
 
 
@@ -128,7 +138,7 @@ class PlayedExport:
         with result_file(midi_file) as file:
             file.write(midi_bytes(played.events, played.patch))
         preset = load_preset(self.preset)
-        written = write_played(sound_file, played, preset, midi_file.name, self.settings, progress=progress)
+        written = write_played(sound_file, [(played, preset)], midi_file.name, self.settings, progress=progress)
         sound = source_words(played.source, played.difference_gain_db)
         level = f"peak {written.peak_db:.1f} dBFS"
         return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {sound}, {level}."

@@ -1,4 +1,4 @@
-"""The origin of a WAV file, as JSON in its comment tag.
+"""The origin of a WAV or FLAC file, as JSON in its comment tag.
 
 A pluck has all choices that its sound follows from (its recipe). A performance on an instrument has its notes in a
 MIDI file.
@@ -54,7 +54,8 @@ class InstrumentSound(Value):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
-        instrument: the name of the patch, of a recording the one with which it began.
+        instrument: the name of the patch, of a recording the one with which it began; of several, all.
+        preset: that plays it, of several the first one's.
         source: that is heard.
         difference_gain_db: the gain of the difference.
         midi: the name of the MIDI file with the notes.
@@ -229,7 +230,7 @@ class SoundRecipe(Value):
 
 
 def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
-    """Read the origin that a WAV file carries.
+    """Read the origin that a sound file carries.
 
     Raises:
         NoRecipe: it is a sound file without that.
@@ -240,7 +241,7 @@ def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
             text = file.comment
     except UnreadableSound as error:
         raise RecipeError(
-            f"{path}: no sound file that can be read ({error}); give a WAV that was exported"
+            f"{path}: no sound file that can be read ({error}); give a WAV or FLAC that was exported"
         ) from error
     if not text.lstrip().startswith("{"):
         raise NoRecipe(
@@ -257,7 +258,7 @@ def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
 
 
 def read_recipe(path: Path) -> SoundRecipe:
-    """The recipe that a WAV file carries.
+    """The recipe that a sound file carries.
 
     Raises:
         NotesElsewhere: it was played on an instrument.
@@ -279,7 +280,7 @@ def _unusable_error(path: Path, why: str) -> RecipeError:
 
 
 def preset_of(recipe: SoundRecipe | InstrumentSound, presets: Iterable[Path]) -> tuple[Path, bool]:
-    """The preset file of a WAV, found by content, else by name, and whether its content is the same.
+    """The preset file of a sound, found by content, else by name, and whether its content is the same.
 
     Raises:
         RecipeError: there is none.

@@ -35,11 +35,18 @@ class Recording:
 
     def append(self, block: NDArray[np.float32]) -> None:
         """Append frames (n, points)."""
-        data = memoryview(np.ascontiguousarray(block, np.float32).tobytes())
-        self._file.seek(self._frames * self._frame_bytes)
+        self.add(len(self), block)
+
+    def add(self, first: int, block: NDArray[np.float32]) -> None:
+        """Add frames (n, points or 1) to those from `first` on, which is the end at most."""
+        there = self[first : first + len(block)]
+        total = np.array(np.broadcast_to(block, (len(block), self.points)), np.float32)
+        total[: len(there)] += there
+        data = memoryview(total.tobytes())
+        self._file.seek(first * self._frame_bytes)
         while data:
             data = data[self._file.write(data) :]
-        self._frames += len(block)
+        self._frames = max(self._frames, first + len(block))
 
     def cut(self, frames: int) -> None:
         """Drop all but the first `frames`."""

@@ -1,4 +1,4 @@
-"""WAV from samples: level, fade, dither, rounding, tags, written to an open file.
+"""WAV and FLAC from samples: level, fade, dither, rounding, tags, written to an open file.
 
 libsndfile only stores: all that changes a number is done here, in NumPy, where it can be tested.
 """
@@ -10,6 +10,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 import numpy as np
@@ -17,7 +18,7 @@ import soundfile
 from numpy.typing import NDArray
 
 from app.export.recording import SoundSamples, blocks
-from app.shared.vocabulary import BITS, DIFFERENCE_GAIN_RANGE_DB, Bits
+from app.shared.vocabulary import BITS, DIFFERENCE_GAIN_RANGE_DB, FORMATS, WRITTEN_ENDINGS, Bits
 from engine import bounds
 
 T = TypeVar("T")
@@ -25,6 +26,7 @@ RATE_RANGE_HZ = (1_000, 384_000)
 DECAY_RANGE_DB = (10.0, 120.0)
 RANGES = {"rate_hz": RATE_RANGE_HZ, "decay_db": DECAY_RANGE_DB, "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB}
 LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
+HIGHEST_ODD_RATE_HZ = 65_535  # FLAC states higher ones in tens of Hz
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
 
 _SUBTYPES: dict[Bits, str] = {"16": "PCM_16", "24": "PCM_24", "32f": "FLOAT"}
@@ -34,10 +36,10 @@ _DITHER_SEED = 0  # the same sound makes the same file
 
 @dataclass(frozen=True)
 class WavSettings:
-    """The settings of a WAV file.
+    """The settings of a sound file.
 
     Attributes:
-        bits: integers of 16 (with TPDF dither) or 24 bits, or 32-bit floating point, which never clips.
+        bits: integers of 16 (with TPDF dither) or 24 bits, or in WAV 32-bit floating point, which never clips.
         rate_hz: at which the sound is rendered; None: the preset's own rate.
         normalise: to -1 dBFS, by one gain for all channels and for the sounds that belong together.
         fade_out_s: the length of the fade at the end, so that a decay that is cut off does not click.
@@ -84,6 +86,22 @@ class WrittenSound:
         return self.frames / self.rate_hz
 
 
+def form_of(path: Path, bits: Bits, rate_hz: int) -> str:
+    """The form of a file by the ending of its name, "WAV" or "FLAC".
+
+    Raises:
+        ValueError: it has no such ending, or its form neither these bits nor this rate.
+    """
+    ending = path.suffix.lower()
+    if ending not in WRITTEN_ENDINGS:
+        raise ValueError(f"{path}: must end with {' or '.join(WRITTEN_ENDINGS)}")
+    if f"{ending[1:]} {bits}" not in FORMATS:
+        raise ValueError(f"{path}: FLAC has no floating point; choose 24 bits, or WAV")
+    if ending == ".flac" and rate_hz > HIGHEST_ODD_RATE_HZ and rate_hz % 10:
+        raise ValueError(f"{path}: FLAC has no sample rate of {rate_hz} Hz; choose a multiple of 10 Hz, or WAV")
+    return ending[1:].upper()
+
+
 def write_wav(
     file: BinaryIO,
     sound: SoundSamples,
@@ -91,16 +109,18 @@ def write_wav(
     settings: WavSettings,
     tags: Mapping[str, str],
     beside: Sequence[SoundSamples] = (),
+    form: str = "WAV",
 ) -> WrittenSound:
-    """Write a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
+    """Write a WAV or FLAC file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
 
     It is written block by block, so that memory does not grow with its length.
 
     Args:
         file: open for reading and writing, empty.
         rate_hz: of the sound; `settings.rate_hz` is ignored.
-        tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
+        tags: INFO texts or Vorbis comments by soundfile's names (title, comment …), of at most 2000 bytes each.
         beside: other sounds that share the gain when normalising.
+        form: see `form_of`.
 
     Raises:
         ValueError: a sample is not finite, there are none, or a tag is too long.
@@ -119,7 +139,7 @@ def write_wav(
         gain = NORMALISED_PEAK / loudest if loudest > 0 else 1.0
     channels = 1 if sound[:1].ndim == 1 else sound[:1].shape[1]
     noting = _Noting(file)
-    with soundfile.SoundFile(noting, "w", rate_hz, channels, _SUBTYPES[settings.bits], format="WAV") as out:
+    with soundfile.SoundFile(noting, "w", rate_hz, channels, _SUBTYPES[settings.bits], format=form) as out:
         for name, text in tags.items():
             setattr(out, name, text)
         for first, block in blocks(sound):
@@ -132,6 +152,11 @@ def write_wav(
     noting.check()
     _zero_time(file, channels)
     return WrittenSound(len(sound), rate_hz, _decibel(peak * gain), clipped, _decibel(gain))
+
+
+def is_within_full_scale(sound: SoundSamples) -> bool:
+    """Return True if no sample of a sound exceeds full scale."""
+    return all(_peak(block) <= 1 for _, block in blocks(sound))
 
 
 class _Noting:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +26,11 @@ from app.instrument.events import (
     channels_in,
     is_obeyed,
 )
+from app.instrument.general_midi import DRUMS, KIT, instrument_of, program_words
 from app.instrument.midi_messages import MidiMessages, NotMidi, read_messages
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
+from app.patches.library import FIRST, SHIPPED, SUFFIX, read_patch
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.kernels.constants import USUAL_VOLUME
@@ -43,7 +46,6 @@ TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
 NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PROGRAM, PRESSURE, BEND = range(0x80, 0xF0, 0x10)  # kinds of messages
 MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
-DRUMS = 9  # General MIDI's channel 10
 
 
 class MidiFileError(LineError, ValueError):
@@ -56,10 +58,12 @@ class SongPart:
 
     Attributes:
         left_out: what it does not play, in one line; "" for nothing.
+        words: its channel and its programs, where it is one of several.
     """
 
     events: list[TimedEvent]
     left_out: str
+    words: str = ""
 
 
 def event_of(message: Sequence[int]) -> Event | None:
@@ -118,7 +122,7 @@ def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
     return timed_events
 
 
-def _ignored_messages(messages: MidiMessages) -> list[str]:
+def _ignored_messages(messages: MidiMessages, follows_programs: bool = False) -> list[str]:
     """The messages that change nothing here, in words."""
     left_out = []
     if messages.missing_tracks:
@@ -128,7 +132,7 @@ def _ignored_messages(messages: MidiMessages) -> list[str]:
     if messages.clipped:
         left_out.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
     kinds = {message[0] & 0xF0 for _, message in messages.timed}
-    if PROGRAM in kinds:
+    if PROGRAM in kinds and not follows_programs:
         left_out.append("its program changes")
     if kinds & {KEY_PRESSURE, PRESSURE}:
         left_out.append("its pressure")
@@ -154,15 +158,65 @@ def read_song(path: Path, patch: Patch | None) -> SongPart:
         MidiFileError: as `read_midi`; or it holds only drums.
     """
     messages = _messages_in(path)
-    timed, mode = _events_of(path, messages), patch.mode if patch is not None else "poly"
-    ignored = _ignored_messages(messages)
+    part = _part(path, patch, _events_of(path, messages), _ignored_messages(messages))
+    if not any(message[0] & 0xF0 == PROGRAM for _, message in messages.timed):
+        return part
+    by_programs = f'Each channel with its own instrument: learned-strings play "{path.name}" --out OUT.wav'
+    return replace(part, left_out=f"{part.left_out}. {by_programs}")
+
+
+def read_parts(path: Path) -> tuple[list[tuple[Patch, SongPart]], str]:
+    """Read the parts of a MIDI file, one for each channel and each factory instrument that its programs choose.
+
+    A program that no instrument is like leaves the channel's, which before the first is the app's first one. Channel
+    10 plays drums.
+
+    Returns:
+        The patches with their parts, and what none of them plays, in one line; "" for nothing.
+
+    Raises:
+        MidiFileError: as `read_midi`.
+    """
+    messages = _messages_in(path)
+    timed = _events_of(path, messages)
+    changes = deque((time_s, message) for time_s, message in messages.timed if message[0] & 0xF0 == PROGRAM)
+    playing = dict.fromkeys(range(16), (FIRST.stem, "")) | {DRUMS: (KIT, "drums")}
+    channels: dict[int, list[TimedEvent]] = defaultdict(list)
+    notes: dict[tuple[int, str], dict[int, str]] = defaultdict(dict)  # by channel and instrument: place and program
+    for entry in timed:
+        while changes and changes[0][0] <= entry.time_s:
+            status, program, _ = changes.popleft()[1]
+            channel = status & 0x0F
+            if channel != DRUMS:
+                playing[channel] = instrument_of(program) or playing[channel][0], program_words(program)
+        (channel,) = channels_in([entry.event])
+        if isinstance(entry.event, NoteOn):
+            instrument, words = playing[channel]
+            notes[channel, instrument][len(channels[channel])] = words
+        channels[channel].append(entry)
+    parts = []
+    for (channel, instrument), places in sorted(notes.items()):
+        own = [
+            entry
+            for place, entry in enumerate(channels[channel])
+            if place in places or not isinstance(entry.event, NoteOn)
+        ]
+        words = ", ".join(filter(None, (f"channel {channel + 1}", *dict.fromkeys(places.values()))))
+        patch = read_patch(SHIPPED / f"{instrument}{SUFFIX}")
+        parts.append((patch, replace(_part(path, patch, own, [], f", {words},"), words=words)))
+    return parts, _left_out_words(path.name, _ignored_messages(messages, follows_programs=True))
+
+
+def _part(path: Path, patch: Patch | None, timed: list[TimedEvent], ignored: list[str], words: str = "") -> SongPart:
+    """The part of these events that a patch plays; see `read_song`."""
+    mode = patch.mode if patch is not None else "poly"
     notes_on = {entry.event.channel for entry in timed if isinstance(entry.event, NoteOn)}
     pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
     if pads and drums:
         timed = [entry for entry in timed if channels_in([entry.event]) in (drums, set())]
         others = [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else []
-        return _song(path, patch, timed, others + ignored)
+        return _song(path.name + words, patch, timed, others + ignored)
     if pads:
         drums = set()
     channels = notes_on - drums
@@ -176,10 +230,10 @@ def read_song(path: Path, patch: Patch | None) -> SongPart:
             for entry in timed
             if channels_in([entry.event]) == channels
         ]
-    return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
+    return _song(path.name + words, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
 
-def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> SongPart:
+def _song(name: str, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> SongPart:
     """The song; `left_out` with the notes for which the patch has no sound."""
     keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
     if patch is not None and (silent := _count_silent(patch, keys)):
@@ -188,7 +242,11 @@ def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: li
         left_out.append(
             f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
         )
-    return SongPart(timed, f"{path.name} is played without {_join_words(left_out)}" if left_out else "")
+    return SongPart(timed, _left_out_words(name, left_out))
+
+
+def _left_out_words(name: str, left_out: list[str]) -> str:
+    return f"{name} is played without {_join_words(left_out)}" if left_out else ""
 
 
 def _join_words(words: Sequence[str]) -> str:

@@ -22,6 +22,7 @@ from engine.whole_file import WriteError, explain, read_bounded, result_file
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
 SUFFIX = ".json"
+FIRST = SHIPPED / f"classical_guitar{SUFFIX}"  # which is played where none is chosen
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # on Windows
 
 

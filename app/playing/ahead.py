@@ -37,7 +37,7 @@ class AheadSamples:
 
     Args:
         motion: of which they are; released with the last of them.
-        key: the values that the samples depend on, by which they are kept.
+        key: the values that the samples depend on; they are kept under it.
         from_s: where in its motion the note will begin.
 
     Attributes:

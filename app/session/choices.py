@@ -91,7 +91,7 @@ class Choices(Monitor, Listener, ShownString):
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """Copy these choices with other values: the one way to change them.
 
-        Another preset resets `string`, unless given.
+        Another preset resets `string`, and another slot or its source `difference`, unless given.
 
         Args:
             changes: fields. Also `preset`, the name of one whose single string is played from now on, and
@@ -105,6 +105,8 @@ class Choices(Monitor, Listener, ShownString):
             changes |= {"patch": changes.pop("instrument"), "single": None}
         if "preset" in changes:
             changes["single"] = changes.pop("preset")
+        if {"a", "b", "heard"} & changes.keys():
+            changes.setdefault("difference", False)
         try:  # `a`, `b` and `single` tell them from old choices
             checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:

@@ -21,19 +21,27 @@ class Monitor(Value):
 
     Attributes:
         a, b: their sources: "model", "truth", "difference" (model minus truth) or "preset:NAME".
+        difference: whether the difference is heard in place of the slot, until the key for it is pressed again.
         level_match: whether each source is brought to the level of the truth, once its gain is known.
     """
 
     a: str = Field("model", pattern=SLOT_PATTERN)
     b: str = Field("truth", pattern=SLOT_PATTERN)
     heard: Slot = "a"
+    difference: bool = False
     level_match: bool = True
     difference_gain_db: float = parameter("difference_gain_db")
 
     @property
     def source_heard(self) -> str:
         """The source that is heard."""
-        return self.a if self.heard == "a" else self.b
+        return self.source_of(self.heard)
+
+    def source_of(self, slot: str) -> str:
+        """The source with which slot "a" or "b" is heard."""
+        if self.difference and slot == self.heard:
+            return DIFFERENCE
+        return self.a if slot == "a" else self.b
 
     @property
     def voices(self) -> tuple[str, ...]:
@@ -46,19 +54,21 @@ class Monitor(Value):
         """The factor of a source's voice; 0: it is not heard.
 
         Args:
-            sources: those of the note; where the one that is heard is missing, the model is heard.
+            sources: those of the note; where the heard one is missing, or a part of the difference, that of the slot
+                is heard, else the model.
             match: by source, the factor that brings it to the level of the truth; None: not known yet.
         """
-        if self.source_heard == DIFFERENCE:
+        if self.source_heard == DIFFERENCE and {"model", "truth"} <= set(sources):
             gain = float(10 ** (self.difference_gain_db / 20))
             return {"model": gain, "truth": -gain}.get(source, 0.0)
-        if source != (self.source_heard if self.source_heard in sources else "model"):
+        own = self.a if self.heard == "a" else self.b
+        if source != next((each for each in (self.source_heard, own) if each in sources), "model"):
             return 0.0
         return match.get(source, 1.0) if self.level_match and match else 1.0
 
     def gain_db(self, slot: str, match: Mapping[str, float] | None) -> float | None:
         """The gain of the source of slot "a" or "b" as heard, in dB; None while it is not known."""
-        source = self.a if slot == "a" else self.b
+        source = self.source_of(slot)
         if source == DIFFERENCE:
             return self.difference_gain_db
         if not self.level_match:

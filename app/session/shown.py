@@ -51,7 +51,8 @@ DEFAULT_SOURCES = (ShownSource("model", "A", "model", heard=True), ShownSource("
 
 def shown_sources(choices: Choices, library: Library) -> tuple[ShownSource, ...]:
     """The source in slot A and the one in slot B; one alone where both hold the same."""
-    slots = {choices.a: "A B"} if choices.a == choices.b else {choices.a: "A", choices.b: "B"}
+    a, b = choices.source_of("a"), choices.source_of("b")
+    slots = {a: "A B"} if a == b else {a: "A", b: "B"}
     gains_db = {DIFFERENCE: choices.difference_gain_db}
     return tuple(
         ShownSource(

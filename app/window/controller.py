@@ -222,6 +222,7 @@ class Controller(QObject):
             "previous": lambda: self.presets.step(-1),
             "next": lambda: self.presets.step(1),
             "switch": session.switch_source,
+            "difference": self._hear_difference,
             "all_modes": lambda: session.update(solo=0),
             "abx": self.listening_test,
             "audio": self.audio.show_dialog,
@@ -252,6 +253,13 @@ class Controller(QObject):
 
     def _toggle(self, field: str) -> None:
         self.session.update(**{field: not getattr(self.session.choices, field)})
+
+    def _hear_difference(self) -> None:
+        """Hear the difference, or again what was before it. Keys struck in Play have no voice of the truth."""
+        if self.session.choices.face == "lab" or self.session.choices.difference:
+            self._toggle("difference")
+        else:
+            self.window.say_briefly("The difference is heard in the Lab (F9)")
 
     def _step(self, take: Callable[[], None], words: str, done: str, nothing: str) -> None:
         """Take a step of undo or redo, and say which; `words`: those of the step."""
@@ -316,7 +324,7 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """Take a dropped file: install and choose a preset, restore a WAV's recipe; ask what other sounds are.
+        """Take a dropped file: install and choose a preset, restore an export's recipe; ask what other sounds are.
 
         Patches, scales and MIDI files go to `patches`.
         """

@@ -1,4 +1,4 @@
-"""The meaning of a dropped file: a preset is installed, a WAV's recipe restored.
+"""The meaning of a dropped file: a preset is installed, the recipe of an exported sound restored.
 
 Another sound is a string or a body.
 """
@@ -17,6 +17,7 @@ from app.instrument.bodies import ENDINGS, install_body
 from app.presets.install import SUFFIX, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
+from app.shared.vocabulary import WRITTEN_ENDINGS
 from engine.folders import user_folder
 from engine.plain_text import name_text
 from engine.presets import PresetError
@@ -47,7 +48,7 @@ def receive(file: Path, library: Library) -> Dropped:
     try:
         if ending == SUFFIX:
             return _preset(file, library)
-        if ending == ".wav":
+        if ending in WRITTEN_ENDINGS:
             return _drop_recipe(file, library)
         if ending in SOUNDS:
             return _other_sound(file)
@@ -55,7 +56,7 @@ def receive(file: Path, library: Library) -> Dropped:
         return _other_sound(file)
     except (PresetError, RecipeError, WriteError) as error:
         return Dropped(notice=str(error))
-    kinds = f"a preset ({SUFFIX}), an instrument, a string, a scale, a MIDI file, an exported WAV, a note, a body"
+    kinds = f"a preset ({SUFFIX}), an instrument, a string, a scale, a MIDI file, an exported sound, a note, a body"
     return Dropped(notice=f"{file}: not a file that is used here; drop one of these: {kinds}")
 
 

@@ -16,6 +16,7 @@ from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
 from app.rendering.note_sound import Struck
 from app.session.choices import Choices
+from app.session.monitor import Monitor
 from app.session.slots import other_preset, sound_of
 from app.stage.session import Session
 from app.views.dialogs.export_dialog import ExportDialog
@@ -25,7 +26,7 @@ from app.window.recordings import Recordings, played_source
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
 ESCAPE = Qt.Key.Key_Escape
-HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "difference_gain_db"}
+HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", *Monitor.model_fields} - {"level_match"}
 
 
 class Exports(QObject):

@@ -18,7 +18,7 @@ if sys.platform == "win32":
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
-from app.patches.library import SHIPPED, PatchError, read_patch
+from app.patches.library import FIRST, PatchError, read_patch
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.shared.thread_priority import leave_a_core
@@ -38,15 +38,13 @@ UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do no
 PATIENCE_S = 5.0  # for the sound device and the patch's preset, before a file is taken
 LOOK_MS = 20
 
-FIRST_PATCH = SHIPPED / "classical_guitar.json"
-
 
 def with_patch(settings: Settings) -> Settings:
-    """The settings, with FIRST_PATCH where no patch was ever chosen: keys play from the first start on."""
+    """The settings, with the patch FIRST where no patch was ever chosen: keys play from the first start on."""
     if settings.choices.patch is not None:
         return settings
     with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
-        patch = read_patch(FIRST_PATCH)
+        patch = read_patch(FIRST)
         update = {"patch" if settings.choices.preset else "instrument": patch}
         return settings.model_copy(update={"choices": settings.choices.changed(update)})
     return settings

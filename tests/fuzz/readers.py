@@ -17,7 +17,15 @@ from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import InstrumentSound, RecipeError, SoundRecipe, read_recipe
 from app.export.wav import WavSettings
 from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi, read_song
+from app.instrument.midi_file import (
+    LONGEST_S,
+    MOST_EVENTS,
+    MidiFileError,
+    midi_bytes,
+    read_midi,
+    read_parts,
+    read_song,
+)
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
 from app.patches.tuning import Tuning, TuningChoice, read_scala
@@ -214,6 +222,9 @@ def song(path: Path) -> None:
     """Read a MIDI file, and write what it says."""
     events = read_midi(path)
     assert read_song(path, MPE).events == events
+    notes = sum(isinstance(each.event, NoteOn) for each in events)
+    parts = [each.event for _, part in read_parts(path)[0] for each in part.events]
+    assert sum(isinstance(event, NoteOn) for event in parts) == notes, "each has one instrument"
     assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
     for each in events:
         if isinstance(each.event, Bend):

@@ -62,10 +62,11 @@ def check_range(option: str, value: float, low: float, high: float, unit: str = 
         raise typer.BadParameter(f"must lie in {low:.10g} … {high:.10g}{text}, not {value:.10g}", param_hint=option)
 
 
-def check_suffix(option: str, path: Path, suffix: str) -> None:
-    """Raise typer.BadParameter: the name of a file that is written does not end with `suffix`."""
-    if path.suffix.lower() != suffix:
-        raise typer.BadParameter(f"must end with {suffix}, not {path.suffix or 'nothing'}", param_hint=option)
+def check_suffix(option: str, path: Path, *suffixes: str) -> None:
+    """Raise typer.BadParameter: the name of a file that is written ends with none of `suffixes`."""
+    if path.suffix.lower() not in suffixes:
+        words = " or ".join(suffixes)
+        raise typer.BadParameter(f"must end with {words}, not {path.suffix or 'nothing'}", param_hint=option)
 
 
 def open_preset(name_or_path: str) -> Preset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from statistics import mean, stdev
@@ -11,7 +12,7 @@ import typer
 
 from engine.bounds import LARGEST_SEED, MOST_EPOCHS, MOST_SEEDS, MOST_WORKERS
 from engine.plain_text import duration, name_text
-from training.cli.arguments import Cache, Device, Runs
+from training.cli.arguments import Cache, Device, Runs, check_range, check_suffix
 from training.cli.console import Failure, number, progress, say
 
 if TYPE_CHECKING:
@@ -80,6 +81,8 @@ def train(
         raise typer.BadParameter(
             "is of one preset; several --seeds write into their runs' folders", param_hint="--output"
         )
+    if output is not None:
+        check_suffix("--output", output, ".safetensors")
     folder = runs or default_runs()
     begun: list[FitProgress] = []  # empty where all was finished already
     chosen = [_run_of(config, seed, number, epochs) for number in range(seeds)]
@@ -125,6 +128,11 @@ def _run_of(config: str, seed: int | None, number: int, epochs: int | None) -> R
     from training.cell import Cell, load
     from training.configuration import Run
 
+    if (shortened := re.fullmatch(r"(.+)_epochs([1-9]\d{0,8})", config)) is not None:
+        if epochs is not None:
+            raise typer.BadParameter(f"{config} has epochs already; leave one out", param_hint="--epochs")
+        config, epochs = shortened[1], int(shortened[2])
+        check_range("CONFIG's epochs", epochs, 1, MOST_EPOCHS)
     configuration, name, cell = load(config), name_text(Path(config).stem), Cell.parse(config)
     wanted = (configuration.recipe.seed if seed is None else seed) + number
     if wanted != configuration.recipe.seed:

@@ -41,7 +41,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
         MenuEntry("recent", "Recent files"),
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
-        MenuEntry("export", "Export …", "Ctrl+E", "export WAV"),
+        MenuEntry("export", "Export …", "Ctrl+E", "export WAV or FLAC"),
         MenuEntry(
             "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"
         ),
@@ -69,6 +69,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("previous", "Previous preset", "PgUp", "previous preset"),
         MenuEntry("next", "Next preset", "PgDown", "next preset"),
         MenuEntry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
+        MenuEntry("difference", "Hear the difference", "Shift+B", "hear model − truth in the Lab, and back"),
         MenuEntry("all_modes", "Play all modes", "Esc", "play all modes again"),
         MenuEntry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
     ),

@@ -65,7 +65,7 @@ class DragHandle(QToolButton):
         self.subject = subject
         self._actions[subject].setChecked(True)
         self.setAccessibleName(f"Drag {WORDS[subject]}")
-        tip = "as the WAV file that Export would write.\nClick for something else, or to copy it as a file"
+        tip = "as the file that Export would write.\nClick for something else, or to copy it as a file"
         self.setToolTip(f"Drag {WORDS[subject]} into a DAW or a file manager, {tip} (the note: Ctrl+Shift+C)")
         self.show_share(None)
 

@@ -28,6 +28,7 @@ Part = TypeVar("Part", bound=QWidget)
 LABEL_WIDTH = 104
 FILTERS = {
     ".wav": "WAV (*.wav)",
+    ".flac": "FLAC (*.flac)",
     ".sfz": "SFZ (*.sfz)",
     ".sf2": "SoundFont 2 (*.sf2)",
     ".clap": "CLAP (*.clap)",

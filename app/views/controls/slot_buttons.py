@@ -82,7 +82,7 @@ class SlotButtons(QWidget):
 
     def _show(self) -> None:
         for slot, button in self._buttons.items():
-            source = getattr(self._choices, slot)
+            source = self._choices.source_of(slot)
             title, short = self._title(source)
             gain = self._gain_text(slot)
             button.setText(self._fit_text(slot.upper(), short, gain))
@@ -90,7 +90,8 @@ class SlotButtons(QWidget):
             gain_line = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
             )
-            tip = f"Hear {slot.upper()}: {title} (key B: switch between A and B)" + (gain_line if gain else "")
+            keys = "B: switch between A and B; Shift+B: hear model − truth"
+            tip = f"Hear {slot.upper()}: {title} ({keys})" + (gain_line if gain else "")
             button.setToolTip(plain_tip(tip))
             show_kind(button, theme.source_kind(source))
             button.setChecked(self._choices.heard == slot)
@@ -118,7 +119,7 @@ class SlotButtons(QWidget):
         gain_db = self._gains_db.get(slot)
         if gain_db is None or abs(gain_db) < 0.05:
             return ""
-        return f"{gain_db:+.0f} dB" if getattr(self._choices, slot) == "difference" else f"{gain_db:+.1f} dB"
+        return f"{gain_db:+.0f} dB" if self._choices.source_of(slot) == "difference" else f"{gain_db:+.1f} dB"
 
     def _menu_button(self, slot: str) -> QToolButton:
         letter = slot.upper()

@@ -63,7 +63,7 @@ class TransportBar(QFrame):
         filled(row, filled(QVBoxLayout(), self._play, self._loop), *areas)
         self._space = QSpacerItem(0, 0, QSizePolicy.Policy.Expanding)
         row.addItem(self._space)
-        tip = "Save what you hear as a WAV file (Ctrl+E)"
+        tip = "Save what you hear as a WAV or FLAC file (Ctrl+E)"
         self.export = push_button("Export …", tip, "Export", pressed=self.export_asked)
         self.handle = DragHandle()
         column = filled(QVBoxLayout(), self.meter, self.export, self.handle, spacing=3)

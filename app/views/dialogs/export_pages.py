@@ -27,7 +27,7 @@ from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.rendering.note_sound import NoteSound
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, FORMATS, WRITTEN_ENDINGS, Format, Source
 from app.views.controls.form import FilePicker, Form, check_box
 from app.views.controls.number_box import NoteBox
 from app.views.controls.parts import faint, label
@@ -42,7 +42,13 @@ SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Both, in two files", "files"),
 )
 RATES_HZ = (44_100, 48_000, 96_000)
-BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
+FORMAT_NAMES: dict[Format, str] = {
+    "wav 16": "WAV, 16-bit PCM, dithered",
+    "wav 24": "WAV, 24-bit PCM",
+    "wav 32f": "WAV, 32-bit floating point",
+    "flac 16": "FLAC, 16 bits, dithered",
+    "flac 24": "FLAC, 24 bits",
+}
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
 Remembered = tuple[ExportChoices, SampledChoices]  # choices from one dialog to the next
 PLUGIN_NAMES = {"clap": "CLAP", "vst3": "VST3", "lv2": "LV2"}
@@ -65,15 +71,12 @@ class HeardPerformance:
     played: Played
     preset: Path | None
 
-    @property
-    def file_name(self) -> str:
-        return f"{self.played.patch.name}.wav"
-
     def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
         """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
         if self.preset is None:
             raise ValueError(f"The preset {self.played.patch.preset}, which plays the instrument, was not found.")
-        return PlayedExport(self.played, self.preset, folder / (name or self.file_name), choices.wav)
+        name = name or f"{self.played.patch.name}{choices.ending}"
+        return PlayedExport(self.played, self.preset, folder / name, choices.wav)
 
 
 @dataclass(frozen=True)
@@ -85,11 +88,11 @@ class HeardInstrument:
 
 
 class WavForm(Form):
-    """Sample rate, format and level of WAV files; notes and performances share it."""
+    """Sample rate, format and level of sound files; notes and performances share it."""
 
     TIPS: ClassVar = {
         "rate_hz": "A rate above the model's own adds no bandwidth",
-        "bits": "16 bits are dithered; floating point never clips",
+        "format": "16 bits are dithered; floating point, of WAV alone, never clips; FLAC is lossless and smaller",
         "normalise": "One gain for model and truth. Off: as loud as at a volume of 0 dB; of a string alone, 10 mm "
         "are full scale",
     }
@@ -99,8 +102,21 @@ class WavForm(Form):
         self.note = faint()
         rates = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ)]
         self.row("Sample rate", self.combo("rate_hz", "Sample rate", rates), self.note)
-        self.row("Format", self.combo("bits", "Format", [(name, bits) for bits, name in BITS_NAMES.items()]))
+        self.row("Format", self.combo("format", "Format", [(words, form) for form, words in FORMAT_NAMES.items()]))
         self.row("Level", self.check("normalise", "Normalise to −1 dBFS"))
+
+    @property
+    def ending(self) -> str:
+        return f".{self['format'].currentData().split()[0]}"
+
+    def follow(self, file: FilePicker) -> None:
+        """Choose the format of an ending that the user has typed, and give the file the ending of the chosen one."""
+        typed, box = Path(file.edit.text().strip()).suffix.lower(), self["format"]
+        if typed in WRITTEN_ENDINGS and typed != file.suffix:
+            file.suffix = typed
+            same_bits = f"{typed[1:]} {box.currentData().split()[1]}"
+            box.setCurrentIndex(box.findData(same_bits if same_bits in FORMATS else f"{typed[1:]} 24"))
+        file.suffix = self.ending
 
 
 class ExportPage(Form):
@@ -109,7 +125,7 @@ class ExportPage(Form):
     Attributes:
         title, window_title: of its tab, and of the dialog while it is shown.
         missing: why there is nothing to export.
-        writes_wav: whether the form for WAV files belongs to it.
+        writes_wav: whether the form for sound files belongs to it.
         file: where it is written.
     """
 
@@ -219,14 +235,15 @@ class NotePage(ExportPage):
         beyond = f"adds no bandwidth: the model ends at {subject.preset_rate_hz / 2000:g} kHz"
         model_rate = "" if rate_hz else f"{subject.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > subject.preset_rate_hz else model_rate)
-        self.file.suggest(subject.file_name(source))
+        self._wav.follow(self.file)
+        self.file.suggest(subject.file_name(source, self.file.suffix))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
         self.rows.setRowVisible(self._names_row, two)
 
 
 class PerformancePage(ExportPage):
-    """The export of what was played, to a WAV and a MIDI file of one name."""
+    """The export of what was played, to a sound and a MIDI file of one name."""
 
     title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
     window_title = "Save the recording"
@@ -238,6 +255,8 @@ class PerformancePage(ExportPage):
         self.what, self.file = label("faint"), self.file_picker(places, "recording")
         self.row("Sound", self.what)
         self.row("File", self.file)
+        for changed in (self.changed, wav.changed):
+            changed.connect(lambda: self.show_subject(self._subject))
 
     def show_subject(self, subject: HeardPerformance | None) -> None:
         self._subject = subject
@@ -248,7 +267,8 @@ class PerformancePage(ExportPage):
             self.what.setText(
                 f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
-            self.file.suggest(subject.file_name)
+            self._wav.follow(self.file)
+            self.file.suggest(played.patch.name + self.file.suffix)
 
     def job(self) -> PlayedExport:
         if self._subject is None:

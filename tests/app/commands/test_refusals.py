@@ -113,6 +113,7 @@ SAMPLED = ("--keys", "60-60", "--layers", 1, "--seconds", 1)
     [
         ("render", "{preset}", "{out}.wav", "--position", 0.4, "--amplitude-mm", 3, "--seconds", 5),
         ("play", "{made:song.mid}", "--instrument", "mandolin", "--out", "{out}.wav", "--seconds", 0.5),
+        ("play", "{made:song.mid}", "--out", "{out}.flac", "--seconds", 0.5),
         ("drums", "render", "thin_bars", "{out}.wav", "--key", 72, "--seconds", 0.5),
         ("sampled", "mandolin", "{out}.sfz", *SAMPLED, "--format", "wav"),
         ("sampled", "mandolin", "{out}.sf2", *SAMPLED),

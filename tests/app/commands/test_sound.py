@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mido
 import numpy as np
 import pytest
 import soundfile
@@ -87,6 +88,10 @@ def test_without_a_name_it_lies_in_this_folder_and_replaces_nothing(
     assert run("render", "--recipe", "first.wav").status == 0
     assert (folder / "good_x0.41_a3.3_4000_model.wav").read_bytes() == first.read_bytes()
     assert "is there already" in run("render", "--recipe", "first.wav").failure
+    assert run("render", "--recipe", "first.wav", "first.flac").status == 0
+    assert run("render", "--recipe", "first.flac").status == 0
+    flac = folder / "good_x0.41_a3.3_4000_model.flac"
+    assert (soundfile.read(flac)[0] == soundfile.read(first)[0]).all() and flac.stat().st_size < first.stat().st_size
 
 
 def test_a_preset_is_found_by_its_content_and_a_changed_or_lost_one_is_reported(
@@ -133,7 +138,7 @@ def test_a_preset_name_of_a_recipe_is_never_a_path(
     assert run("render", "--recipe", bad).status == 0  # its digest is known
     (made,) = set(tmp_path.rglob("*.wav")) - before
     assert made.parent == inside
-    plain = default_file_name(name, Pluck(), 48_000, "model")
+    plain = default_file_name(name, Pluck(), 48_000, "model", ".wav")
     assert Path(plain).name == plain and plain.isprintable() and not plain.startswith(".") and "\\" not in plain
 
 
@@ -245,6 +250,35 @@ def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time_without_dru
     assert np.abs(model - truth).max() < 1e-4 * np.abs(truth).max()
     assert "one.mid is played without its drums (channel 10)" in with_drums.err
     assert "drums" not in plain.err
+
+
+def test_parts_of_a_song_sound_together_as_each_alone_and_softer_where_they_would_clip(
+    run: Run, tmp_path: Path
+) -> None:
+    out = tmp_path / "song.wav"
+
+    def played(notes: dict[int, int], velocity: int, *more: str) -> tuple[NDArray[np.float64], Outcome]:
+        """Notes by channel, of which the first two are a guitar's and a bass's."""
+        song = [mido.Message("program_change", channel=channel, program=24 + 9 * channel) for channel in (0, 1)]
+        song += [mido.Message("note_on", channel=n, note=key, velocity=velocity) for n, key in notes.items()]
+        mido.MidiFile(tracks=[mido.MidiTrack(song)]).save(tmp_path / "song.mid")
+        done = run("play", tmp_path / "song.mid", "--out", out, "--seconds", "0.3", "--bits", "32f", *more)
+        assert done.status == 0, done.err
+        return soundfile.read(out, always_2d=True)[0], done
+
+    parts = {0: ("classical_guitar", 52), 1: ("electric_bass", 33), 9: ("concert_toms", 40)}
+    alone = [played({n: key}, 60, "--instrument", name)[0] for n, (name, key) in parts.items()]
+    together, done = played({n: key for n, (_, key) in parts.items()}, 60)
+    assert np.abs(together - sum(alone)).max() < 1e-6 and all(np.abs(sound).max() > 1e-3 for sound in alone)
+    assert done.out.splitlines()[:3] == [
+        "channel 1, program 25 (guitar): Classical guitar",
+        "channel 2, program 34 (bass): Electric bass",
+        "channel 10, drums: Concert toms",
+    ]
+    assert "a rendering of Classical guitar + Electric bass + Concert toms" in run("info", out).err
+    assert "softer" not in done.err
+    loud, done = played(dict.fromkeys((0, *range(2, 9), *range(10, 16)), 52), 127)
+    assert np.abs(loud).max() == pytest.approx(10 ** (-1 / 20), abs=1e-4) and "made softer by " in done.err
 
 
 def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(play: Play, tmp_path: Path) -> None:

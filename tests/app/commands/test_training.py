@@ -128,9 +128,12 @@ def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.
     monkeypatch.setattr("training.cli.training.load_data", lambda *_: None)
     monkeypatch.setattr("training.run.run_rows", begin)
     cell = "nylon_linear_noise_4k_lru_400_paper"
-    for words in ([], ["--epochs", 9, "--seeds", 2]):
-        run("train", cell, *words)
-    assert chosen == [(cell, "paper"), (f"{cell}_epochs9", ""), (f"{cell}_seed1_epochs9", "")]
+    for words in ([cell], [cell, "--epochs", 9, "--seeds", 2], [f"{cell}_seed1_epochs9"]):  # and by its own name
+        run("train", *words)
+    assert chosen == [(cell, "paper"), (f"{cell}_epochs9", ""), *[(f"{cell}_seed1_epochs9", "")] * 2]
+    assert "epochs already" in run("train", f"{cell}_epochs9", "--epochs", 3).usage
+    assert "1 … 10" in run("train", f"{cell}_epochs999999999").usage
+    assert ".safetensors" in run("train", cell, "--output", "preset.txt").usage
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])

@@ -16,13 +16,13 @@ from app.export.note import (
     default_file_name,
     export_sounds,
 )
-from app.export.recipe import SoundRecipe
+from app.export.recipe import SoundRecipe, read_recipe
 from app.export.sound import VOICES, Voices, check_sources
 from app.export.wav import WavSettings
 from app.playing.ahead import AheadSamples
 from app.rendering.motion import ModelMotion
 from app.rendering.note_sound import NoteSound
-from app.shared.vocabulary import BITS, Bits, Source
+from app.shared.vocabulary import FORMATS, Bits, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
@@ -77,7 +77,7 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     initial_m, ear = project(sound.pluck.displacement(101), info.modes), Ear((0.37,))
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
-        ahead = AheadSamples(voice, ModelMotion(ModelSource(loaded), initial_m, 0.4))
+        ahead = AheadSamples(voice, ModelMotion(ModelSource(loaded), initial_m, 0.4), "pluck")
         while not ahead.finished:
             ahead.render()
     mixer = Mixer(48_000)
@@ -87,16 +87,16 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     assert not played[:AHEAD].any()
 
 
-@pytest.mark.parametrize("bits", BITS)
-def test_a_file_holds_the_sound_and_its_recipe(plucked: NoteSound, bits: Bits, tmp_path: Path) -> None:
-    path = tmp_path / "a.wav"
+@pytest.mark.parametrize(("ending", "bits"), [name.split() for name in FORMATS])
+def test_a_file_holds_the_sound_and_its_recipe(plucked: NoteSound, ending: str, bits: Bits, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{ending}"
     settings = WavSettings(bits, fade_out_s=0)
     report = export_sound(plucked, path, settings=settings)
     expected = render_sound(plucked)
     with soundfile.SoundFile(path) as file:
         found = file.read(dtype="float64")
         recipe = json.loads(file.comment)
-        assert (file.title, file.samplerate) == ("A small string", 4000)
+        assert (file.title, file.samplerate, file.format) == ("A small string", 4000, ending.upper())
         assert file.software.startswith("Learned Strings ")
     assert np.abs(found - expected).max() < {"16": 5e-5, "24": 1e-7, "32f": 1e-7}[bits]
     assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
@@ -104,6 +104,25 @@ def test_a_file_holds_the_sound_and_its_recipe(plucked: NoteSound, bits: Bits, t
     assert recipe == json.loads(SoundRecipe.of(plucked, plucked.load(), "model", settings).model_dump_json())
     assert recipe["preset_sha256"] == hashlib.sha256(plucked.load().path.read_bytes()).hexdigest()
     assert Pluck(**recipe["pluck"]) == plucked.pluck
+
+
+def test_flac_holds_the_very_samples_of_wav_and_refuses_what_it_cannot_hold(
+    plucked: NoteSound, tmp_path: Path
+) -> None:
+    formats: tuple[tuple[Bits, bool], ...] = (("16", True), ("24", False))
+    for bits, normalise in formats:
+        for ending in ("wav", "flac"):
+            export_sound(plucked, tmp_path / f"a.{ending}", settings=WavSettings(bits, normalise=normalise))
+        wav, flac = (soundfile.read(tmp_path / f"a.{ending}", dtype="int32")[0] for ending in ("wav", "flac"))
+        np.testing.assert_array_equal(flac, wav)
+    assert read_recipe(tmp_path / "a.flac") == read_recipe(tmp_path / "a.wav")
+    for settings, words in (
+        (WavSettings("32f"), "no floating point"),
+        (WavSettings("24", 96_001), "rate of 96001 Hz"),
+    ):
+        with pytest.raises(ValueError, match=rf"b\.flac: FLAC has .*{words}"):
+            export_sound(plucked, tmp_path / "b.flac", settings=settings)
+    assert not (tmp_path / "b.flac").exists()
 
 
 def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(plucked: NoteSound, tmp_path: Path) -> None:
@@ -182,8 +201,8 @@ def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, messa
 
 
 def test_the_file_name_reports_what_is_in_it() -> None:
-    assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth") == "nylon_x0.35_a4.0_48000_truth.wav"
-    assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both") == "b_x0.1234_a0.25_4000_both.wav"
+    assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth", ".wav") == "nylon_x0.35_a4.0_48000_truth.wav"
+    assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both", ".wav") == "b_x0.1234_a0.25_4000_both.wav"
 
 
 def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(plucked: NoteSound, tmp_path: Path) -> None:

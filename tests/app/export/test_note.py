@@ -29,7 +29,7 @@ from tests.app.sounds import export_sound
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")
-FIXED = ExportChoices(until_decayed=False, seconds=0.3, bits="32f", normalise=False)
+FIXED = ExportChoices(until_decayed=False, seconds=0.3, format="wav 32f", normalise=False)
 
 
 PLUCKED = NoteSound(PRESET, Pluck(0.35, 4.0), 0.2, Ear((0.37,)))
@@ -120,8 +120,8 @@ def heard(source: str = "model", another: bool = False, name: str = "") -> Heard
 )
 def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitude_mm: float, name: str) -> None:
     assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
-    assert heard(name=name).file_name("model") == f"{name}.wav"
-    assert heard(name=name).file_name("truth") == f"{name} truth.wav"
+    assert heard(name=name).file_name("model", ".wav") == f"{name}.wav"
+    assert heard(name=name).file_name("truth", ".wav") == f"{name} truth.wav"
 
 
 def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) -> None:

@@ -27,7 +27,16 @@ from app.instrument.events import (
     channels_in,
     release_all,
 )
-from app.instrument.midi_file import MidiFileError, SongPart, event_of, midi_bytes, read_midi, read_song
+from app.instrument.general_midi import FAMILIES
+from app.instrument.midi_file import (
+    MidiFileError,
+    SongPart,
+    event_of,
+    midi_bytes,
+    read_midi,
+    read_parts,
+    read_song,
+)
 from app.instrument.midi_messages import NotMidi, read_messages
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
@@ -366,7 +375,8 @@ LEFT_OUT = (*[b"\0\xc0\x05"] * 3, *[b"\0\xb0\x0a\x40"] * 2, b"\0\xb0\x40\x00", b
         (
             one_track(*LEFT_OUT, b"\0\xb0\xff\x40", header=b"\0\1\0\2\0\x60"),
             "1 track that its header counts; 1 message of a key or a controller above 127; "
-            "what exceeds 127 in 1 message; its program changes and its controllers 10, 91",
+            "what exceeds 127 in 1 message; its program changes and its controllers 10, 91. "
+            'Each channel with its own instrument: learned-strings play "song.mid" --out OUT.wav',
         ),
         (one_track(b"\0\xd0\x40", ON), "its pressure"),
         (one_track(b"\0\xa0\x3c\x40", ON), "its pressure"),
@@ -375,6 +385,39 @@ LEFT_OUT = (*[b"\0\xc0\x05"] * 3, *[b"\0\xb0\x0a\x40"] * 2, b"\0\xb0\x40\x00", b
 def test_what_a_song_is_played_without_is_reported_once(file: Path, raw: bytes, left_out: str) -> None:
     file.write_bytes(raw)
     assert read_song(file, None).left_out == f"song.mid is played without {left_out}"
+
+
+def program(number: int, channel: int = 0, ticks: int = 0) -> bytes:
+    return bytes((ticks, 0xC0 + channel, number - 1))
+
+
+def on(key: int, channel: int = 0, ticks: int = 0) -> bytes:
+    return bytes((ticks, 0x90 + channel, key, 64))
+
+
+def test_programs_choose_the_factory_instrument_of_each_channel(file: Path) -> None:
+    """A note goes to the instrument of its time; all else of a channel goes to each of its instruments."""
+    assert {len(files) for files in FAMILIES.values()} == {8} and len(FAMILIES) == 16
+    assert {name for files in FAMILIES.values() for name in files} <= {"", *(path.stem for path in SHIPPED.iterdir())}
+    first = (program(25), program(33, 1), on(60), on(48, 1), on(64, 3), on(38, 9), on(80, 9), b"\0\xb0\x5b\x40")
+    later = (program(47, ticks=48), on(62), program(49, ticks=48), on(64), b"\x60\x80\x3c\x40", b"\0\xb0\x40\x7f")
+    file.write_bytes(one_track(*first, *later))
+    parts, left_out = read_parts(file)
+    assert left_out == "song.mid is played without its controller 91"
+    assert [(part.words, patch.name, [key for key, _ in notes_of(part)]) for patch, part in parts] == [
+        ("channel 1, program 25 (guitar)", "Classical guitar", [60]),
+        ("channel 1, program 47 (strings), program 49 (ensemble; no such instrument)", "Concert harp", [62, 64]),
+        ("channel 2, program 33 (bass)", "Upright bass", [48]),
+        ("channel 4", "Classical guitar", [64]),
+        ("channel 10, drums", "Concert toms", [38, 80]),
+    ]
+    for _, part in parts[:2]:
+        assert [each.event for each in part.events][-2:] == [NoteOff(60), ControlChange(64, 127)]
+    missing = "1 of its 2 notes, for which Concert toms has no drum (C2 to D♯3)"
+    line = f"song.mid, channel 10, drums, is played without {missing}"
+    assert [part.left_out for _, part in parts] == ["", "", "", "", line]
+    file.write_bytes(one_track(on(60), program(47)))
+    assert [patch.name for patch, _ in read_parts(file)[0]] == ["Concert harp"], "of one time, in whichever order"
 
 
 def test_controllers_long_after_the_last_note_are_no_music(file: Path) -> None:

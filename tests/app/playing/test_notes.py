@@ -407,7 +407,7 @@ def test_a_model_that_fails_is_reported(lab: Lab, monkeypatch: Any) -> None:
 def test_notes_ring_on_where_the_device_changes_its_rate(lab: Lab, which: str, request: Any) -> None:
     path = request.getfixturevalue(which)
     struck = [lab.strike(path, position=0.3 + 0.05 * number) for number in range(6)]
-    lab.wait(lambda: not any(note.pending for note in struck))
+    lab.wait(lambda: not any(note.pending or note.unfinished for note in struck))
     waiting = lab.strike(path, begin_frame=10 * RATE_HZ)
     lab.hear(0.2)
     lab.mixer = Mixer(44_100)

@@ -110,14 +110,17 @@ def test_a_dropped_preset_that_is_there_is_chosen_and_reported(
     assert files(own) == ["New.safetensors"]
 
 
-def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["WAV", "FLAC"])
+def test_a_dropped_export_restores_its_choices(
+    library: Library, preset_folder: Path, tmp_path: Path, ending: str
+) -> None:
     preset = preset_folder / "second.safetensors"
     other_preset(preset, preset)
     pluck = Pluck(0.61, 2.5, "raised_cosine", 0.2)
     sound = NoteSound(preset, pluck, 0.7, Ear((0.22,)))
-    export_sound(sound, tmp_path / "A.WAV", "truth")
-    (tmp_path / "A.WAV").rename(tmp_path / "b.WAV")
-    dropped = receive(tmp_path / "b.WAV", library)
+    export_sound(sound, tmp_path / f"A.{ending}", "truth")
+    (tmp_path / f"A.{ending}").rename(tmp_path / f"b.{ending}")
+    dropped = receive(tmp_path / f"b.{ending}", library)
     assert dropped.notice == ""
     assert dropped.choices == {
         "single": "second",
@@ -137,7 +140,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     }
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))
-    assert "is not the one that made this file" in receive(tmp_path / "b.WAV", library).notice
+    assert "is not the one that made this file" in receive(tmp_path / f"b.{ending}", library).notice
     export_sound(replace(sound, seconds=0.1), tmp_path / "c.wav", "difference")
     dropped = receive(tmp_path / "c.wav", library)
     assert "its duration of 0.1 s" in dropped.notice

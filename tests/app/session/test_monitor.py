@@ -26,6 +26,9 @@ MATCH = {"model": 2.0, "truth": 1.0}
             MATCH,
             {"model": 10.0, "truth": -10.0, "preset:b": 0.0},
         ),
+        # a note that began without a part of the difference
+        (Monitor(a="preset:b", difference=True), None, {"preset:b": 1.0, "truth": 0.0}),
+        (hears("difference"), None, {"model": 1.0, "preset:b": 0.0}),
     ],
 )
 def test_one_source_is_heard_or_the_difference(

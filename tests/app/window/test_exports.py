@@ -120,9 +120,14 @@ def test_playing_is_recorded_as_it_is_heard_and_a_dropped_recording_changes_noth
     assert "its notes are in the MIDI file model.mid" in guitar.window.notices.text
     assert guitar.choices == before and not own_bodies().exists(), "it is neither a recipe nor a body"
     record(guitar)
+    save(guitar, tmp_path / "small.flac")
+    assert (tmp_path / "small.mid").is_file() and soundfile.info(tmp_path / "small.flac").subtype == "PCM_24"
+    guitar.drop(tmp_path / "small.flac")
+    assert "small.flac: is a recording of Steel-string acoustic" in guitar.window.notices.text
+    record(guitar)
     wav = dialog_of(guitar).wav
     choose(wav["rate_hz"], 44_100)
-    choose(wav["bits"], "16")
+    choose(wav["format"], "wav 16")
     wav["normalise"].setChecked(True)
     save(guitar, tmp_path / "cd.wav")
     info = soundfile.info(tmp_path / "cd.wav")

@@ -88,7 +88,7 @@ def lab(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     window = MainWindow()
     qtbot.addWidget(window)
     choices = Choices(seconds=SECONDS, face="lab", volume_db=0.0, level_match=False, amplitude_mm=2.0)
-    exported = ExportChoices(until_decayed=False, seconds=SECONDS, normalise=False, bits="32f")
+    exported = ExportChoices(until_decayed=False, seconds=SECONDS, normalise=False, format="wav 32f")
     settings = Settings(choices=choices, export=exported, files=files_in(tmp_path))
     device = HeldOutput.device
     make_sound = lambda report: Sound(report, look_up=lambda *_: device, open_output=HeldOutput)  # noqa: E731

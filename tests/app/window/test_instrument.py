@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mido
 import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
@@ -340,6 +341,11 @@ def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
     assert guitar.said == ["song.mid is played without its drums (channel 10)."]
     guitar.key(KEY.Key_Space)
     assert not guitar.controller.patches.playing
+    mido.MidiFile(tracks=[[mido.Message("program_change", program=46), mido.Message("note_on", note=52)]]).save(song)
+    guitar.drop(song)
+    assert "without its program changes. Each channel with its own" in guitar.window.notices.text
+    assert 'learned-strings play "song.mid" --out OUT.wav' in guitar.window.notices.text
+    guitar.key(KEY.Key_Space)
     song.write_bytes(b"no")
     guitar.drop(song)
     assert "song.mid" in guitar.said[-1]

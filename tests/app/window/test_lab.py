@@ -213,6 +213,32 @@ def test_knobs_ask_and_show_and_stereo_and_pick_up_are_of_the_next_note(lab: Win
     assert not stereo.isChecked() and pickup.currentData() == "displacement"
 
 
+def test_one_key_hears_the_difference_and_again_what_was_heard_before(lab: Window) -> None:
+    lab.wait_for_take()
+    note, waveform = lab.pluck(), lab.panel("waveform")
+    lab.wait(lambda: note.seconds > 0)
+    slots = {slot: lab.find(QAbstractButton, f"Hear {slot.upper()}") for slot in ("a", "b")}
+    for slot, other, back, heard in (
+        ("a", "b", (KEY.Key_B, SHIFT), "model"),
+        ("a", "b", (KEY.Key_B,), "truth"),
+        ("b", "a", (KEY.Key_B, SHIFT), "truth"),
+        ("b", "a", None, "truth"),
+    ):
+        lab.key(KEY.Key_B, SHIFT)
+        assert gains(note) == pytest.approx({"model": 10.0, "truth": -10.0})
+        assert slots[slot].isChecked() and "DIFF." in slots[slot].text() and "DIFF." not in slots[other].text()
+        assert "difference +20 dB · heard" in waveform.legend.text
+        if back is None:
+            lab.qtbot.mouseClick(slots[slot], LEFT)
+        else:
+            lab.key(*back)
+        lab.wait(lambda heard=heard: [source for source, gain in gains(note).items() if gain] == [heard])
+        assert f"{heard} · heard" in waveform.legend.text and "difference" not in waveform.legend.text
+    lab.change(face="play")  # where keys have no voice of the truth, and the model alone would be amplified
+    lab.key(KEY.Key_B, SHIFT)
+    assert lab.choices.source_heard == "truth" and not lab.choices.difference
+
+
 def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, Any]) -> None:
     slots, views = lab.window.transport.slots, (lab.panel("waveform"), lab.panel("spectrum"))
     lab.wait_for_take()

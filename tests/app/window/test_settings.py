@@ -40,7 +40,7 @@ def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
     assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
     settings = Settings(
         choices=Choices(position=0.7, heard="b", b="difference", loop=True),
-        export=ExportChoices(bits="32f", rate_hz=0),
+        export=ExportChoices(format="flac 16", rate_hz=0),
         sampled=SampledChoices(form="sf2", keys=(40, 76), layers=8, dry=True),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
@@ -111,7 +111,7 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
         '{"choices": {"position": 9, "listen": 0.2}, "sound": {"buffer": 3, "rate_hz": 96000}, "look": 7,'
         ' "colour": 1, "device": {"name": "Loud"}, "export": {"bits": "32f"}}',
     )
-    sound, export = SoundChoice(rate_hz=96_000), ExportChoices(bits="32f")
+    sound, export = SoundChoice(rate_hz=96_000), ExportChoices(format="wav 32f")
     assert settings == Settings(choices=Choices(listen=0.2), sound=sound, export=export)
     assert "choices.position" in notice and "settings.broken.json" in notice
     patch = json.loads((PATCHES / "classical_guitar.json").read_text())

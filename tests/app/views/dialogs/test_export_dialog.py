@@ -102,6 +102,23 @@ def test_it_writes_the_file_that_it_named(
     assert opened == [str(tmp_path)]
 
 
+def test_flac_is_chosen_in_the_list_or_by_the_ending_and_is_remembered(qtbot: QtBot, made, tmp_path: Path) -> None:
+    dialog = made({"format": "wav 32f"})
+    edit, form = dialog.note.file.edit, dialog.wav["format"]
+    form.setCurrentIndex(form.findData("flac 16"))
+    assert Path(edit.text()).name == "A small string B3 medium.flac"
+    form.setCurrentIndex(form.findData("wav 32f"))
+    edit.selectAll()
+    qtbot.keyClicks(edit, str(tmp_path / "mine.flac"))
+    assert (form.currentData(), edit.text()) == ("flac 24", str(tmp_path / "mine.flac")), "it has no floating point"
+    run(qtbot, dialog, "Saved")
+    assert soundfile.info(tmp_path / "mine.flac").subtype == "PCM_24"
+    assert read_recipe(tmp_path / "mine.flac").bits == "24"
+    assert made(dialog.choices()[0].model_dump()).note.file.edit.text().endswith("medium.flac")
+    form.setCurrentIndex(form.findData("wav 16"))
+    assert edit.text() == str(tmp_path / "mine.wav"), "a name that was given keeps its stem"
+
+
 def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made({"source": "files"}, {"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
     names = ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
