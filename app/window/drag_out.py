@@ -61,6 +61,8 @@ class DragOut(QObject):
         if kind == "note":
             source = "difference" if handed == "difference" else subject.chosen(choices.source)
             choices = choices.model_copy(update={"source": source})
+        bits = choices.format.split()[1]
+        choices = choices.model_copy(update={"format": f"wav {bits}"})  # which every program reads
         self._take, asked = take, (subject, choices)
         if asked != self._asked or not (self._background.busy or all(file.is_file() for file in self._ready)):
             self._asked = asked
