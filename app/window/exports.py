@@ -56,6 +56,16 @@ class Exports(QObject):
         """The dialog's choices, to be saved."""
         return self._choices if self.dialog is None else self.dialog.choices()
 
+    @property
+    def folder(self) -> str:
+        """The folder in which a file was saved last; "": none was."""
+        return self.choices[0].folder
+
+    def remember_folder(self, folder: str) -> None:
+        """Propose the folder from now on; a dialog that is open has one of its own."""
+        export, sampled = self.choices
+        self._choices = export.model_copy(update={"folder": folder}), sampled
+
     def open(self, kind: Kind) -> None:
         """Open the dialog at a page, or bring it to the front."""
         subjects = self._subjects()

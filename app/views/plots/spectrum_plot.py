@@ -11,6 +11,11 @@ from PySide6.QtGui import QKeyEvent
 from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
 from app.views.plots.zoom_plot import ZoomPlot
 
+TIP = (
+    "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
+    "The wheel zooms, a drag pans, double-click shows all. Arrow keys read partial after partial, with Shift point\n"
+    "after point; + and − zoom"
+)
 _SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
@@ -21,8 +26,8 @@ class SpectrumPlot(ZoomPlot):
     PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton
     stepped = Signal(int, bool)  # the cursor, to the next partial on this side, or to the next point of the curve
 
-    def __init__(self, tip: str) -> None:
-        super().__init__("Spectrum", tip, "frequency (Hz)")
+    def __init__(self) -> None:
+        super().__init__("Spectrum", TIP, "frequency (Hz)")
         item = self.getPlotItem()
         item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
         item.setLogMode(x=True)

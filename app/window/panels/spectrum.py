@@ -13,6 +13,7 @@ from PySide6.QtCore import Qt
 
 from app.analysis.heard import HeardSignal
 from app.analysis.spectrogram import FrequencyRows
+from app.export.columns import Columns, aligned
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.shown import ShownSource, level_words, shown_sources
@@ -31,11 +32,6 @@ WINDOW_S = 0.18
 COLUMNS = 480
 PADDING = 4  # length of the transform, in windows
 AREA_STEP = 3  # columns to a point of the filled area
-TIP = (
-    "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
-    "The wheel zooms, a drag pans, double-click shows all. Arrow keys read partial after partial, with Shift point\n"
-    "after point; + and − zoom"
-)
 
 
 @dataclass(frozen=True)
@@ -103,7 +99,7 @@ class SpectrumPanel(CurvesPanel):
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
         self._area_of: str | None = None
         self._levels: dict[str, tuple[Analyser, NDArray[np.float32]]] = {}  # by source, each of a rate of its own
-        super().__init__(session, library, SpectrumPlot(TIP))
+        super().__init__(session, library, SpectrumPlot())
         self.setMinimumHeight(LEAST_HEIGHT)
         tip = "How far below full scale the axis reaches, the same for every source"
         ranges = [(f"{db} dB", db) for db in RANGES_DB]
@@ -116,7 +112,7 @@ class SpectrumPanel(CurvesPanel):
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
         self._partials_hz = np.zeros(0)
-        self._described: tuple[object, ...] = ()  # the place of the cursor that a screen reader was told
+        self._described: tuple[object, ...] = ()  # the place of the cursor in the accessible words
         self._rate_hz = 16_000  # the highest of what is drawn
         self._fit()
         self.plot.hovered.connect(lambda height, _: self.point_at(10**height))
@@ -185,6 +181,15 @@ class SpectrumPanel(CurvesPanel):
         self._curves[source].setData([], [])
         if source == self._area_of:
             self._area.setData([], [])
+
+    def columns(self) -> Columns | None:
+        """The points of the curves in view."""
+        take, curves = self._growing, {}
+        for shown in shown_sources(self.session.choices, self.library):
+            if take is not None and shown.source in self._levels:
+                analyser, levels_db = self._levels[shown.source]
+                curves[shown.heading(level_words(take.pickup))] = analyser.column_hz, levels_db
+        return aligned("frequency (Hz)", curves) if curves else None
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources of which it is not drawn."""

@@ -78,7 +78,7 @@ from app.views.plots import plot as plot_module
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 
-BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog"}
+BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog", "ZoomPlot"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
