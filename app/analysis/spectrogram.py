@@ -89,25 +89,28 @@ class Spectrogram:
 
 
 class FrequencyRows:
-    """The levels of bins as levels of an image's rows, from `lowest_hz` up to half the rate.
+    """The levels of bins as levels of an image's rows, from `lowest_hz` up to `highest_hz`, or half the rate.
 
     A row wider than a bin is the loudest of its bins, so that no partial is lost between two rows. A narrower row is
     interpolated.
     """
 
-    def __init__(self, bins: int, bin_hz: float, rows: int, lowest_hz: float, logarithmic: bool) -> None:
-        highest_hz = (bins - 1) * bin_hz
+    def __init__(
+        self, bins: int, bin_hz: float, rows: int, lowest_hz: float, logarithmic: bool, highest_hz: float = math.inf
+    ) -> None:
+        half_rate_hz = (bins - 1) * bin_hz
         space = np.geomspace if logarithmic else np.linspace
-        edges = space(lowest_hz, highest_hz, rows + 1) / bin_hz
+        edges = space(lowest_hz, min(highest_hz, half_rate_hz), rows + 1) / bin_hz
         middle = np.sqrt(edges[1:] * edges[:-1]) if logarithmic else (edges[1:] + edges[:-1]) / 2
         self._below = np.minimum(middle.astype(int), bins - 2)
         self._share = (middle - self._below).astype(np.float32)
         starts = np.ceil(edges[:-1] - 0.5).astype(int).clip(0, bins - 1)
         self._starts = starts
-        self._wide = np.diff(starts, append=bins) > 1
+        self._stop = bins if highest_hz >= half_rate_hz else max(math.ceil(edges[-1] - 0.5), int(starts[-1]) + 1)
+        self._wide = np.diff(starts, append=self._stop) > 1
 
     def of(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the levels by row, (columns, bins) → (columns, rows)."""
         between = levels_db[:, self._below] * (1 - self._share) + levels_db[:, self._below + 1] * self._share
-        loudest = np.maximum.reduceat(levels_db, self._starts, axis=1)
+        loudest = np.maximum.reduceat(levels_db[:, : self._stop], self._starts, axis=1)
         return np.where(self._wide, np.maximum(loudest, between), between)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.presets.library import Library
 from app.session.choices import Choices
@@ -12,6 +12,7 @@ from app.shared.vocabulary import DIFFERENCE
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, FULL_SCALE_PA
 
 LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
+_UNITS = {"displacement": "m", "velocity": "m/s", "bridge": "N", "pressure": "Pa"}  # of a pick-up's signal
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
 
 
@@ -39,6 +40,10 @@ class ShownSource:
         """The remark behind the title in a legend: the gain, and whether it is heard."""
         gain = f" {self.gain_db:+.0f} dB" if self.gain_db else ""
         return f"{gain}{' · heard' if self.heard else ''}"
+
+    def heading(self, unit: str) -> str:
+        """The heading of its values in a file."""
+        return f"{self.slots} {self.title}{replace(self, heard=False).remark} ({unit})"
 
     @property
     def gain(self) -> float:
@@ -84,7 +89,11 @@ def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
 
     A displacement has mm at most.
     """
-    unit = {"displacement": "m", "velocity": "m/s", "pressure": "Pa"}.get(pickup, "N")
     prefixes = _PREFIXES[1:] if pickup == "displacement" else _PREFIXES
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])
-    return factor, prefix + unit
+    return factor, prefix + unit_of(pickup)
+
+
+def unit_of(pickup: str) -> str:
+    """The unit of a pick-up's signal."""
+    return _UNITS[pickup]

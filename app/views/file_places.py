@@ -15,7 +15,7 @@ from engine.plain_text import name_text
 
 MOST_RECENT = 10
 LONGEST_PATH = 4_096  # characters
-FileKind = Literal["open", "note", "recording", "sampler", "plugin", "instrument", "test"]
+FileKind = Literal["open", "note", "recording", "sampler", "plugin", "instrument", "test", "figure"]
 SOUNDS: tuple[FileKind, ...] = ("note", "recording", "sampler")  # whose first folder is the user's music
 MODES = {
     "open": (QFileDialog.FileMode.ExistingFiles, QFileDialog.AcceptMode.AcceptOpen),

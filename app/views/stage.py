@@ -278,11 +278,24 @@ class StageView(QWidget):
             right -= 6
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        axes = self.axes
-        below = event.rect().bottom() > axes.bottom  # what lies there is painted again
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._backdrop())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._paint_front(painter, event.rect().bottom() > self.axes.bottom)  # what lies there is painted again
+
+    def figure_size(self) -> QSize:
+        return self.size()
+
+    def paint_figure(self, painter: QPainter) -> None:
+        """Paint all but the buttons."""
+        self._paint_scenery(painter)
+        self._paint_behind(painter)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._paint_front(painter, True)
+
+    def _paint_front(self, painter: QPainter, below: bool) -> None:
+        """Paint string or drum and all that lies above it; `below`: the marks beneath it too."""
+        axes = self.axes
         self._paint_picture(painter)
         labels = []
         for side, point in self._listening.items():
@@ -299,6 +312,9 @@ class StageView(QWidget):
     def _backdrop(self) -> QPixmap:
         """The picture behind all that moves."""
         return self._ground()
+
+    def _paint_behind(self, painter: QPainter) -> None:
+        """Paint what lies between the ground and string or drum."""
 
     def _paint_picture(self, painter: QPainter) -> None:
         """Paint string or drum."""
@@ -337,21 +353,25 @@ class StageView(QWidget):
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint_backdrop(painter, self.width(), self.height())
-            self._paint_ground(painter)
-            if not self._plain:
-                colour = theme.WARNING if self._grave else theme.FAINT
-                paint_legend(painter, self._sources, self._warning, colour, self._toggles[0].x() - 14)
-            else:
-                others = (source.title for source in self._sources if source.heard and source.source != "model")
-                heard = next((f"You hear: {title}" for title in others), "")  # there is no legend
-                paint_remark(painter, self.width(), self._warning or heard)
+            self._paint_scenery(painter)
             if self.hasFocus():
                 set_ink(painter, theme.translucent(theme.TEXT, 150), 1.5)
                 painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap
+
+    def _paint_scenery(self, painter: QPainter) -> None:
+        """Paint backdrop, ground and legend."""
+        paint_backdrop(painter, self.width(), self.height())
+        self._paint_ground(painter)
+        if not self._plain:
+            colour = theme.WARNING if self._grave else theme.FAINT
+            paint_legend(painter, self._sources, self._warning, colour, self._toggles[0].x() - 14)
+        else:
+            others = (source.title for source in self._sources if source.heard and source.source != "model")
+            heard = next((f"You hear: {title}" for title in others), "")  # there is no legend
+            paint_remark(painter, self.width(), self._warning or heard)
 
 
 def paint_backdrop(painter: QPainter, width: float, height: float) -> None:

@@ -43,6 +43,7 @@ from app.window.browsing import PresetDesk
 from app.window.drag_out import DragOut
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
+from app.window.figures import Figures
 from app.window.instruments import Instruments
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
@@ -137,6 +138,7 @@ class Controller(QObject):
             (settings.export, settings.sampled),
         )
         self.drag_out = DragOut(window, self.exports, self.patches.recordings)
+        self.figures = Figures(window, self.session, self.library)
         self.leaving = Leaving(window, self.patches.recordings, self.exports)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect()
@@ -178,6 +180,7 @@ class Controller(QObject):
         panel.pluck_asked.connect(self.pluck)
         panel.strike_asked.connect(self.instruments.strike)
         panel.reported.connect(self.window.notices.report)
+        self.figures.add(panel)
 
     def _fill_decks(self) -> None:
         """Make the views of the Lab when they are first needed. They and their plots take a fifth of a second."""

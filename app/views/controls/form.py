@@ -34,6 +34,9 @@ FILTERS = {
     ".clap": "CLAP (*.clap)",
     ".vst3": "VST3 (*.vst3)",
     ".lv2": "LV2 (*.lv2)",
+    ".png": "PNG (*.png)",
+    ".svg": "SVG (*.svg)",
+    ".csv": "CSV (*.csv)",
 }
 
 

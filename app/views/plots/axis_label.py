@@ -14,6 +14,7 @@ LETTER_PIXELS = 12
 AIR = 8  # of a label, at its ends together
 TICK_PIXELS = 14  # the least distance of numbers on a vertical axis
 LOWEST_HZ = 50.0  # of a logarithmic axis of frequencies
+MOST_STEPS = 6  # of an axis that shows less than two octaves
 RANGES_DB = (60, 90, 130)  # of levels, below full scale
 _LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 
@@ -78,6 +79,12 @@ def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float,
     return sorted(sparse_ticks)
 
 
-def frequency_ticks() -> list[tuple[float, str]]:
-    """The log₁₀ of frequencies in Hz, and their texts: (2.0, "100"), (3.0, "1k")."""
-    return [(math.log10(hz), f"{hz:g}" if hz < 1000 else f"{hz / 1000:g}k") for hz in _LABELLED_HZ]
+def frequency_ticks(lowest_hz: float = LOWEST_HZ, highest_hz: float = 24_000) -> list[tuple[float, str]]:
+    """The log₁₀ of frequencies in Hz, and their texts: (2.0, "100"), (3.0, "1k"). Within two octaves, even steps."""
+    labelled_hz: Iterable[float] = _LABELLED_HZ
+    if highest_hz < 4 * lowest_hz:
+        least_hz = (highest_hz - lowest_hz) / MOST_STEPS
+        decade_hz = 10.0 ** math.floor(math.log10(least_hz))
+        step_hz = next(step * decade_hz for step in (1, 2, 5, 10) if step * decade_hz >= least_hz)
+        labelled_hz = (n * step_hz for n in range(math.ceil(lowest_hz / step_hz), int(highest_hz / step_hz) + 1))
+    return [(math.log10(hz), f"{hz:.6g}" if hz < 1000 else f"{hz / 1000:.6g}k") for hz in labelled_hz]

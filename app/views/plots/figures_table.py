@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, Qt, Signal
-from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.export.columns import Columns, heading_of
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
@@ -141,6 +142,23 @@ class FiguresTable(QTableWidget):
         lines = [[column.title for column in self._columns]]
         lines += [["" if value is None else f"{value}" for value in row.values] for row in self.rows]
         return "\n".join("\t".join(line) for line in lines) + "\n"
+
+    def columns(self) -> Columns:
+        """The same values with the units of their fields in the headings."""
+        rows, fields = self.rows, enumerate(column.field for column in self._columns)
+        return Columns({heading_of(field): [row.values[place] for row in rows] for place, field in fields})
+
+    def figure_size(self) -> QSize:
+        """The size at which all rows and columns are seen."""
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        edges = 2 * self.frameWidth()
+        return QSize(across.length() + edges, across.height() + down.length() + edges)
+
+    def paint_figure(self, painter: QPainter) -> None:
+        size = self.size()
+        self.resize(self.figure_size())
+        self.render(painter, QPoint())
+        self.resize(size)
 
     def copy(self) -> None:
         QGuiApplication.clipboard().setText(self.text())

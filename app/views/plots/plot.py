@@ -6,11 +6,12 @@ import math
 from typing import ClassVar
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QResizeEvent
+from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPainterPath, QResizeEvent
 
 from app.views.controls.parts import keeps_keys
 from app.views.plots.axis_label import UprightLabel, UprightTicks
+from app.views.plots.legend import Legend
 
 LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
 TIP_MS = 3000  # the tooltip covers what is pointed at
@@ -47,6 +48,41 @@ class Plot(pg.PlotWidget):
         """Show the label beneath only where there is room; to be called when it is another one."""
         self.getPlotItem().getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
 
+    def figure_size(self) -> QSize:
+        return self.size()
+
+    def paint_figure(self, painter: QPainter) -> None:
+        """Paint the plot and its legend, without the line that moves.
+
+        Curves and lines are painted last, in pixels: a vector file would scale their pens and round their places.
+        """
+        item, no_contents = self.getPlotItem(), pg.QtWidgets.QGraphicsItem.GraphicsItemFlag.ItemHasNoContents
+        axes = [item.getAxis(side) for side in ("left", "bottom")]
+        things = self.scene().items(Qt.SortOrder.AscendingOrder)
+        points = [thing for thing in things if isinstance(thing, pg.ScatterPlotItem)]
+        lines = [thing for thing in things if isinstance(thing, pg.PlotCurveItem | pg.InfiniteLine)]
+        for axis in axes:
+            axis.setCacheMode(pg.GraphicsObject.CacheMode.NoCache)
+        for thing in points:
+            thing.setExportMode(True)  # or symbols would be pixels
+        for line in lines:
+            line.setFlag(no_contents, True)
+        self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
+        for axis in axes:
+            axis.setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+        for thing in points:
+            thing.setExportMode(False)
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setClipRect(item.vb.sceneBoundingRect())
+        for line in lines:
+            line.setFlag(no_contents, False)
+            if line.isVisible() and item.vb.isAncestorOf(line):
+                _paint_line(painter, line)
+        painter.restore()
+        for legend in self.findChildren(Legend):
+            legend.render(painter, legend.pos(), renderFlags=legend.RenderFlag(0))
+
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)
         self._hover(event.position())
@@ -67,3 +103,22 @@ class Plot(pg.PlotWidget):
 
     def event(self, event: QEvent) -> bool:
         return keeps_keys(event, *self.KEPT_KEYS) or bool(super().event(event))
+
+
+def _paint_line(painter: QPainter, line: pg.PlotCurveItem | pg.InfiniteLine) -> None:
+    """Paint a curve with the area below it, or a line from end to end, in pixels of the plot."""
+    in_pixels = line.sceneTransform()
+    if isinstance(line, pg.InfiniteLine):
+        ends = line.boundingRect()
+        painter.setPen(line.currentPen)
+        painter.drawLine(in_pixels.map(QLineF(ends.left(), 0.0, ends.right(), 0.0)))
+        return
+    path, level, brush = QPainterPath(line.getPath()), line.opts["fillLevel"], line.opts["brush"]
+    if path.isEmpty():
+        return
+    if level is not None and brush is not None:
+        area, first = QPainterPath(path), path.elementAt(0)
+        area.lineTo(path.currentPosition().x(), level)
+        area.lineTo(first.x, level)
+        painter.fillPath(in_pixels.map(area), pg.mkBrush(brush))
+    painter.strokePath(in_pixels.map(path), pg.mkPen(line.opts["pen"]))

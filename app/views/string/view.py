@@ -7,9 +7,11 @@ over the handle sets the width, with Shift the shape. A double-click on the hand
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
@@ -99,6 +101,11 @@ class StringView(StageView):
                 self.update()
         else:  # all that moves lies in one rectangle, between the legend above and the markers below
             self.update(0, WORDS_HEIGHT, self.width(), math.ceil(self.axes.bottom) - WORDS_HEIGHT)
+
+    @property
+    def shapes_mm(self) -> Mapping[str, NDArray[np.floating]]:
+        """The displacements that are drawn, by source; the pluck, under "", while it is."""
+        return {"": self._pluck.shape_mm} if self._shown_motion is None else self._shown_motion.shapes
 
     @property
     def _shown_motion(self) -> StringFrame | None:
@@ -237,8 +244,8 @@ class StringView(StageView):
 
     def _backdrop(self) -> QPixmap:
         """The ground, and the envelopes of a motion, painted again only when one of them changes."""
-        axes, frame = self.axes, self._shown_motion
-        ground = self._ground(axes, self._trained, self._pluck_end)
+        frame = self._shown_motion
+        ground = self._ground(self.axes, self._trained, self._pluck_end)
         if frame is None or not frame.envelopes:
             return ground
         made = self._swung
@@ -248,10 +255,14 @@ class StringView(StageView):
             picture.setDevicePixelRatio(ground.devicePixelRatio())
             painter = QPainter(picture)
             painter.drawPixmap(0, 0, ground)
-            paint_envelopes(painter, axes, frame.envelopes, self._heard)
+            self._paint_behind(painter)
             painter.end()
             self._swung = made = (ground, frame.envelopes, picture)
         return made[2]
+
+    def _paint_behind(self, painter: QPainter) -> None:
+        if (frame := self._shown_motion) is not None:
+            paint_envelopes(painter, self.axes, frame.envelopes, self._heard)
 
     @property
     def _pluck_end(self) -> int | None:

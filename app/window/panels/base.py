@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 from threadpoolctl import threadpool_limits
 
+from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.choices import Choices, ShownString
@@ -97,6 +98,7 @@ class Panel(QWidget):
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     location: Location = "stage"  # above the decks, or in one
     every: ClassVar[int] = 1  # of so many moments one is drawn
+    figure: Any  # the widget that is saved as a picture; a `Figure`
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -136,6 +138,10 @@ class Panel(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._cover.setGeometry(self.rect())
+
+    def columns(self) -> Columns | None:
+        """The numbers that are shown now; None: nothing is."""
+        raise NotImplementedError
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Take the fields of `Choices` that have new values; at the start all of them."""
@@ -271,7 +277,7 @@ class StagePanel(Panel):
 
     def __init__(self, session: Session, library: Library, view: StageView) -> None:
         super().__init__(session, library)
-        self.view = view
+        self.view = self.figure = view
         lay_out_alone(self, view)
         view.listening_point_moved.connect(self._move_listening_point)
         view.listening_point_reset.connect(self._reset_listening_point)

@@ -13,6 +13,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import ComparedRow, compare, same_string
+from app.export.columns import Columns
 from app.presets import words
 from app.presets.library import Library, PresetEntry
 from app.rendering.note_sound import NoteSound
@@ -85,7 +86,7 @@ class ComparePanel(ComputedPanel):
         presets.setMenu(self._menu)
         self._stop = tool_button("Stop")
         self._stop.clicked.connect(self._stop_or_go_on)
-        self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
+        self.table = self.figure = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
         self.table.row_double_clicked.connect(lambda name: session.update(preset=name))
         self.table.row_entered.connect(lambda name: session.update(preset=name))
@@ -98,6 +99,9 @@ class ComparePanel(ComputedPanel):
         self._fill_menu()
         self._set_computing(None)
         lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
+
+    def columns(self) -> Columns:
+        return self.table.columns()
 
     def _draw_moment(self, moment: Moment) -> None:
         super()._draw_moment(moment)

@@ -23,7 +23,8 @@ class CurvesPanel(Panel):
 
     def __init__(self, session: Session, library: Library, plot: Plot) -> None:
         super().__init__(session, library)
-        self.plot, self.legend = plot, Legend(plot)
+        self.plot = self.figure = plot
+        self.legend = Legend(plot)
         self._curves: dict[str, pg.PlotDataItem] = {}
         plot.getPlotItem().showGrid(x=True, y=True, alpha=0.18)
         self.set_sources(DEFAULT_SOURCES)

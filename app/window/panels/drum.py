@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from app.analysis.moment import caption_of
+from app.export.columns import Columns, Values
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
@@ -91,6 +94,18 @@ class DrumPanel(StagePanel):
         drum, view_drum = blow.modes.drum, shown_drum.drum
         alike = math.isclose(drum.width_m * view_drum.length_m, view_drum.width_m * drum.length_m, rel_tol=1e-6)
         return alike and drum.shape == view_drum.shape
+
+    def columns(self) -> Columns | None:
+        """The drum at the shown moment: places in half-lengths from its centre."""
+        frame, drum = self.view.frame, self._drum
+        if frame is None or drum is None or not frame.pictures_m:
+            return None
+        rows, columns = next(iter(frame.pictures_m.values())).shape
+        edge = drum.drum.width_m / drum.drum.length_m
+        y, x = np.meshgrid(np.linspace(edge, -edge, rows), np.linspace(-1, 1, columns), indexing="ij")
+        places: dict[str, Values] = {"x (half-lengths)": x.ravel(), "y (half-lengths)": y.ravel()}
+        shown = {s.source: s.heading("m") for s in self._sources}
+        return Columns({**places, **{shown[name]: values.ravel() for name, values in frame.pictures_m.items()}})
 
     # Gestures
 

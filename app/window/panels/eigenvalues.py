@@ -15,6 +15,7 @@ from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent
 
 from app.analysis.poles import PoleFigure, Poles, pole_figure
+from app.export.columns import Columns, Values, heading_of
 from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject
 from app.session.slots import subject_of
@@ -28,6 +29,7 @@ NEAR_PIXELS = 16  # within which a point is pointed at
 CLOSER_PIXELS = 3  # that a point of the string must be nearer than a learned one
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
+POLE_FIELDS = ("layer", "mode", "folded_hz", "mode_hz", "cents", "t60_s")  # of `Poles`, in files
 AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
 
 Array = NDArray[np.float64]
@@ -50,7 +52,7 @@ class EigenvaluesPanel(ComputedPanel):
         tip = "Which layer's eigenvalues are shown"
         self._layer = combo_box("Layer", [], tip=tip, picked=lambda _: self._draw())
         self._layer.hide()
-        self.plane = _Plane()
+        self.plane = self.figure = _Plane()
         self.plane.pointed.connect(self._show_values)
         self.plane.taken.connect(lambda point: self.solo(int(self._modes[point])))
         self.plane.escaped.connect(lambda: self.solo(0))
@@ -93,6 +95,18 @@ class EigenvaluesPanel(ComputedPanel):
 
     def _take_theme(self) -> None:
         self._draw(keep_view=True)  # points have pens and brushes of their own
+
+    def columns(self) -> Columns | None:
+        """The shown points, the learned ones first."""
+        figure = self._figure
+        if figure is None:
+            return None
+        parts = (figure.learned, self._shown), (figure.string, np.arange(len(figure.string)))
+        names = ("log", *POLE_FIELDS)
+        log, *fields = (np.concatenate([getattr(of, name)[shown] for of, shown in parts]) for name in names)
+        kinds = ["learned"] * len(self._shown) + ["string"] * len(figure.string)
+        values: dict[str, Values] = {"kind": kinds, **dict(zip(map(heading_of, POLE_FIELDS), fields, strict=True))}
+        return Columns({**values, "decay (1/sample)": -log.real, "angle (rad/sample)": log.imag})
 
     @property
     def _modes(self) -> NDArray[np.int64]:

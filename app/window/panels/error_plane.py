@@ -14,6 +14,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
+from app.export.columns import Columns, Values
 from app.presets.library import Library
 from app.presets.words import percent
 from app.rendering.subject import Subject, load_subject, string_of
@@ -55,7 +56,7 @@ class ErrorPlanePanel(ComputedPanel):
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library, "The error map of this preset could not be computed")
-        self.map = _Map()
+        self.map = self.figure = _Map()
         self.map.pointed.connect(self._show_values)
         self.map.taken.connect(self._audition)
         self._picture: PlanePicture | None = None
@@ -116,6 +117,13 @@ class ErrorPlanePanel(ComputedPanel):
         self._picture = picture
         self.map.show_picture(picture)
         self._show_values(*(self.map.cursor or (math.nan, math.nan)))
+
+    def columns(self) -> Columns | None:
+        if self._picture is None:
+            return None
+        positions, amplitudes_mm = np.meshgrid(POSITIONS, AMPLITUDES_MM, indexing="ij")
+        places: dict[str, Values] = {"position": positions.ravel(), "amplitude (mm)": amplitudes_mm.ravel()}
+        return Columns({**places, "MAE (of the truth)": self._picture.error.ravel()})
 
     def _show_values(self, position: float, amplitude_mm: float) -> None:
         if self._picture is None or math.isnan(position):

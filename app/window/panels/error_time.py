@@ -10,6 +10,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 
+from app.export.columns import Columns, heading_of
 from app.presets import words
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
@@ -110,6 +111,15 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         for name, values in levels.items():
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
         self._fit(list(levels.values()))
+
+    def columns(self) -> Columns | None:
+        figures, (low_s, high_s) = self._made, self.plot.times_s
+        if figures is None:
+            return None
+        middle_s = figures.middle_s[: figures.ready]
+        seen = np.flatnonzero((low_s <= middle_s) & (middle_s <= high_s))
+        curves = {heading_of(name): values[seen] for name, values in figures.curves.items()}
+        return Columns({"time (s)": middle_s[seen], **curves})
 
     def _words(self, figures: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
         window = int(time_s / figures.window_s)

@@ -13,15 +13,17 @@ from PySide6.QtCore import Qt
 
 from app.analysis.heard import HeardSignal
 from app.analysis.spectrogram import FrequencyRows
+from app.export.columns import Columns, aligned
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.shown import ShownSource, level_words, shown_sources
+from app.shared.key_names import note_name
 from app.stage.session import Session
 from app.views import theme
 from app.views.controls.elided_label import Readout
 from app.views.controls.parts import combo_box, faint, lay_out_view
-from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, frequency_ticks
-from app.views.plots.plot import Plot
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB
+from app.views.plots.spectrum_plot import SpectrumPlot
 from app.window.panels.base import LEAST_HEIGHT, Moment
 from app.window.panels.curves import CurvesPanel
 
@@ -34,9 +36,14 @@ AREA_STEP = 3  # columns to a point of the filled area
 
 @dataclass(frozen=True)
 class Analyser:
-    """A Hann-windowed magnitude spectrum on `COLUMNS` logarithmic columns, 0 dB for a full-scale sine."""
+    """A Hann-windowed magnitude spectrum on `COLUMNS` logarithmic columns, 0 dB for a full-scale sine.
+
+    The columns lie between two frequencies, as far as half the rate.
+    """
 
     rate_hz: int
+    lowest_hz: float = LOWEST_HZ
+    highest_hz: float = math.inf
 
     @property
     def window_frames(self) -> int:
@@ -45,8 +52,8 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """The middles (COLUMNS,) of the columns between LOWEST_HZ and half the rate."""
-        edges = np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS + 1)
+        """The middles (COLUMNS,) of the columns."""
+        edges = np.geomspace(self.lowest_hz, min(self.highest_hz, self.rate_hz / 2), COLUMNS + 1)
         return np.sqrt(edges[1:] * edges[:-1])
 
     @cached_property
@@ -56,8 +63,8 @@ class Analyser:
 
     @cached_property
     def _rows(self) -> FrequencyRows:
-        frames = PADDING * self.window_frames
-        return FrequencyRows(frames // 2 + 1, self.rate_hz / frames, COLUMNS, LOWEST_HZ, logarithmic=True)
+        bins, bin_hz = PADDING * self.window_frames // 2 + 1, self.rate_hz / (PADDING * self.window_frames)
+        return FrequencyRows(bins, bin_hz, COLUMNS, self.lowest_hz, True, self.highest_hz)
 
     def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
         """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
@@ -70,13 +77,13 @@ class Analyser:
 
 
 @lru_cache(maxsize=4)
-def analyser_at(rate_hz: int) -> Analyser:
-    """The analyser of a rate; it is kept, with its window and columns."""
-    return Analyser(rate_hz)
+def analyser_at(rate_hz: int, lowest_hz: float = LOWEST_HZ, highest_hz: float = math.inf) -> Analyser:
+    """The analyser of a rate and a range; it is kept, with its window and columns."""
+    return Analyser(rate_hz, lowest_hz, highest_hz)
 
 
 class SpectrumPanel(CurvesPanel):
-    """The mouse reads a frequency."""
+    """The pointer, or the arrow keys, read a frequency, its note, and the level of each curve."""
 
     faint_alpha = 150
     key = "spectrum"
@@ -92,27 +99,24 @@ class SpectrumPanel(CurvesPanel):
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
         self._area_of: str | None = None
         self._levels: dict[str, tuple[Analyser, NDArray[np.float32]]] = {}  # by source, each of a rate of its own
-        tip = "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
-        super().__init__(session, library, Plot("Spectrum", tip, "frequency (Hz)"))
+        super().__init__(session, library, SpectrumPlot())
         self.setMinimumHeight(LEAST_HEIGHT)
         tip = "How far below full scale the axis reaches, the same for every source"
         ranges = [(f"{db} dB", db) for db in RANGES_DB]
         self.ranges = combo_box("Dynamic range", ranges, RANGES_DB[-1], tip, lambda _: self._fit())
         self.readout = Readout()
         item = self.plot.getPlotItem()
-        item.setLogMode(x=True)
         self.plot.label.set("dB re 10 mm", "dB")
-        item.setMouseEnabled(False, False)
-        item.getAxis("bottom").setTicks([frequency_ticks()])
         item.addItem(self._area)
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
         self._partials_hz = np.zeros(0)
+        self._described: tuple[object, ...] = ()  # the place of the cursor in the accessible words
         self._rate_hz = 16_000  # the highest of what is drawn
-        self._hovered_hz = math.nan
         self._fit()
-        self.plot.hovered.connect(lambda height, _: self.hover(10**height))
+        self.plot.hovered.connect(lambda height, _: self.point_at(10**height))
+        self.plot.stepped.connect(self._step)
         lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -127,20 +131,21 @@ class SpectrumPanel(CurvesPanel):
 
     def _draw_moment(self, moment: Moment) -> None:
         take, choices = moment.sounding, self.session.choices
-        if take is None or not self._is_new(*moment.standing(choices)):
+        if take is None or not self._is_new(*moment.standing(choices), self.plot.view_range):
             return
         signals = [HeardSignal(take.listened.signals, s.source, s.gain) for s in shown_sources(choices, self.library)]
         rendered = [signal for signal in signals if signal.there]
         self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
+        lowest_hz = self.plot.view_hz[0]
         for signal in signals:
-            if signal in rendered:
+            if signal in rendered and lowest_hz < signal.rate_hz / 2:
                 self._draw(signal, moment.position_s, take.full_scale)
             else:
                 self._clear(signal.source)
         self._show_readout()
 
     def _draw(self, signal: HeardSignal, position_s: float, full_scale: float) -> None:
-        analyser = analyser_at(signal.rate_hz)
+        analyser = analyser_at(signal.rate_hz, *self.plot.view_hz)
         last_window = signal.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
         samples = signal.read(first, first + analyser.window_frames) / full_scale
@@ -177,45 +182,76 @@ class SpectrumPanel(CurvesPanel):
         if source == self._area_of:
             self._area.setData([], [])
 
+    def columns(self) -> Columns | None:
+        """The points of the curves in view."""
+        take, curves = self._growing, {}
+        for shown in shown_sources(self.session.choices, self.library):
+            if take is not None and shown.source in self._levels:
+                analyser, levels_db = self._levels[shown.source]
+                curves[shown.heading(level_words(take.pickup))] = analyser.column_hz, levels_db
+        return aligned("frequency (Hz)", curves) if curves else None
+
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
-        """The levels drawn at a frequency, by source, without sources whose rate does not reach it."""
+        """The levels drawn at a frequency, by source, without sources of which it is not drawn."""
         levels_db = {}
         for source, (analyser, levels) in self._levels.items():
-            if frequency_hz <= analyser.rate_hz / 2:
+            if analyser.lowest_hz <= frequency_hz <= min(analyser.highest_hz, analyser.rate_hz / 2):
                 column = int(np.abs(np.log(analyser.column_hz / frequency_hz)).argmin())
                 levels_db[source] = float(levels[column])
         return levels_db
 
-    def hover(self, frequency_hz: float) -> None:
-        """The mouse points at a frequency; NaN: at none."""
-        self._hovered_hz = frequency_hz
+    def point_at(self, frequency_hz: float) -> None:
+        """Move the cursor to a frequency; NaN: there is none."""
+        self.plot.move_line(math.log10(frequency_hz))
         self._show_readout()
 
+    def _step(self, side: int, by_point: bool) -> None:
+        """Move the cursor to the next partial on a side; `by_point`, or where there is none: to the next point."""
+        low_hz, high_hz = self.plot.view_hz
+        here_hz = 10**self.plot.line_at if low_hz <= 10**self.plot.line_at <= high_hz else low_hz
+        partials_hz = self._partials_hz[(self._partials_hz >= LOWEST_HZ) & (self._partials_hz < self._rate_hz / 2)]
+        ahead_hz = partials_hz[side * np.log2(partials_hz / here_hz) > 1e-6]
+        if by_point or not len(ahead_hz):
+            ahead_hz = np.clip([here_hz * (high_hz / low_hz) ** (side / COLUMNS)], LOWEST_HZ, self._rate_hz / 2)
+        self.point_at(float(ahead_hz[np.abs(np.log(ahead_hz / here_hz)).argmin()]))
+        low, high = self.plot.view_range
+        if not low <= (at := self.plot.line_at) <= high:
+            self.plot.show_range(at - (high - low) / 2, at + (high - low) / 2)
+
     def _show_readout(self) -> None:
-        """Write the frequency under the mouse, its levels, and the nearest partial of a quiet pluck."""
-        frequency_hz, text = self._hovered_hz, ""
+        """Write the frequency at the cursor, its note and levels, and the nearest partial of a quiet pluck."""
+        frequency_hz, wordings = 10**self.plot.line_at, [""]
         nearest = None
         if math.isfinite(frequency_hz):
             levels_db = self.levels_db(frequency_hz)
             seen = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]
-            levels = "   ".join(f"{source.slots} {levels_db[source.source]:.1f} dB" for source in seen)
-            text = f"{frequency_hz:.1f} Hz   {levels}"
+            pitch, note = f"{frequency_hz:.1f} Hz", note_words(frequency_hz)
+            levels = [f"{source.slots} {levels_db[source.source]:.1f} dB" for source in seen]
+            texts = [(pitch, note, *levels), (pitch, *levels), levels or (pitch,)]
             if len(self._partials_hz):
                 nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
                 partial_hz = float(self._partials_hz[nearest])
                 cents = 1200 * math.log2(frequency_hz / partial_hz)
-                text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
+                of_partial = f"partial {nearest + 1}: {partial_hz:.1f} Hz ({round(cents):+d} cents)"
+                texts.insert(0, (*texts[0], of_partial))
                 self._partial.setValue(math.log10(partial_hz))
-        self.readout.report(text)
+            wordings = ["   ".join(text) for text in texts]
+        self.readout.report(*wordings)
+        if self._described != (place := (self.plot.line_at, self.plot.view_range, *self._levels)):
+            self._described = place  # and not again and again while levels fall
+            self.plot.setAccessibleDescription(wordings[0])
         self._partial.setVisible(nearest is not None)
 
     def _fit(self) -> None:
-        self.plot.getPlotItem().setRange(
-            xRange=(math.log10(LOWEST_HZ), math.log10(self._rate_hz / 2)),
-            yRange=(CEILING_DB - self.range_db, CEILING_DB),
-            padding=0,
-        )
+        self.plot.set_highest(self._rate_hz / 2)
+        self.plot.getPlotItem().setYRange(CEILING_DB - self.range_db, CEILING_DB, padding=0)
 
     @property
     def range_db(self) -> int:
         return int(self.ranges.currentData())
+
+
+def note_words(frequency_hz: float) -> str:
+    """The nearest note of equal temperament, and the interval from it in cents."""
+    key = 69 + 12 * math.log2(frequency_hz / 440)
+    return f"{note_name(round(key))} {round(100 * (key - round(key))):+d} cents"

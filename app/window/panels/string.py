@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, StringFrame, frame_at
+from app.export.columns import Columns, aligned
 from app.instrument.facts import by_two_numbers, outside_of_string
 from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
@@ -112,6 +115,12 @@ class StringPanel(StagePanel):
             return silent, True
         error = math.nan if self._take is None else self._take.error
         return judged(outside_of_shown(choices, entry), error)  # as the head of the Lab reports it
+
+    def columns(self) -> Columns:
+        """The string at the shown moment; at rest, the pluck."""
+        headings = {"": "pluck (mm)", **{shown.source: shown.heading("mm") for shown in self._sources}}
+        shapes = {headings[source]: shape for source, shape in self.view.shapes_mm.items() if source in headings}
+        return aligned("position", {name: (np.linspace(0, 1, len(shape)), shape) for name, shape in shapes.items()})
 
     # Gestures
 

@@ -47,7 +47,8 @@ class TimePanel(Panel, Generic[G]):
 
     def __init__(self, session: Session, library: Library, plot: TimePlot) -> None:
         super().__init__(session, library)
-        self.plot, self.readout = plot, Readout()
+        self.plot = self.figure = plot
+        self.readout = Readout()
         self.plot.seek_asked.connect(self.seek_asked)
         self.plot.hovered.connect(self._hover)
         self._made: G | None = None

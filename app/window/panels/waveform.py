@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
+from app.export.columns import Columns, aligned
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.session.shown import readable_unit, shown_sources
+from app.session.shown import readable_unit, shown_sources, unit_of
 from app.stage.session import Session
 from app.views.controls.parts import lay_out_alone
 from app.views.plots.time_plot import TimePlot
@@ -120,6 +121,20 @@ class WaveformPanel(CurvesPanel):
                 self.show_signal(source, signal, drawn.origin.rate_hz)
             else:
                 curve.setData([], [])
+
+    def columns(self) -> Columns | None:
+        """The frames in view."""
+        if self._take is None:
+            return None
+        (low_s, high_s), curves = self.plot.times_s, {}
+        for shown in shown_sources(self.session.choices, self.library):
+            if (drawn := self._drawn.get(shown.source)) is not None:
+                origin, rate_hz = drawn.origin, drawn.origin.rate_hz
+                first, stop = math.ceil(low_s * rate_hz), math.floor(high_s * rate_hz) + 1
+                signal = origin.read(first, stop)
+                times_s = np.arange(first, first + len(signal)) / rate_hz
+                curves[shown.heading(unit_of(self._take.pickup))] = times_s, signal
+        return aligned("time (s)", curves) if curves else None
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
         """Set the vertical axis, from −full to full in `unit`."""

@@ -79,7 +79,7 @@ from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 from tests.app.places import choose_files
 
-BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog"}
+BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog", "ZoomPlot"}
 SCREEN = 1280, 720
 MATERIAL = AbxRecord(
     a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),

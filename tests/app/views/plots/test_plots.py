@@ -93,7 +93,7 @@ def test_the_keyboard_seeks_and_zooms(plot: TimePlot) -> None:
     assert low < 1.0 < high and high - low == pytest.approx(4.0 / 1.25**2)
     press_keys(plot, Key.Key_Minus)
     assert plot.times_s == pytest.approx((0, 4), abs=1e-6)
-    plot.show_times(1.0, 1.02)
+    plot.show_range(1.0, 1.02)
     press_keys(plot, Key.Key_Right)
     assert asked[-1] == pytest.approx(1.001)  # no more than a little of the view
     press_keys(plot, Key.Key_0)
@@ -107,7 +107,7 @@ def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(q
         low, high = plot.times_s
         assert high - low == pytest.approx(length_s)
         assert steps != 4 or (3.0 - low) / (high - low) == pytest.approx(0.75, abs=0.01)
-    plot.show_times(1.0, 2.0)
+    plot.show_range(1.0, 2.0)
     QApplication.processEvents()
     start, end = place_of(plot, 1.5, 0.5), place_of(plot, 1.25, 0.5)
     qtbot.mousePress(view, RIGHT, pos=start)
@@ -135,7 +135,7 @@ def test_the_view_stays_for_a_take_of_the_same_length_and_the_end_of_training_is
         pixels(plot)[place_of(plot, time_s, 0.9).y(), place_of(plot, time_s, 0.9).x()] for time_s in (0.12, 2.0)
     )
     assert shaded != unshaded
-    plot.show_times(0.5, 0.7)
+    plot.show_range(0.5, 0.7)
     plot.set_times(4.0, 0.5)
     assert plot.times_s == pytest.approx((0.5, 0.7))
     plot.set_times(0.2, 0.25)

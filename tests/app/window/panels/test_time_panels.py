@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 import pytest
+from PySide6.QtCore import QPoint
 from pytestqt.qtbot import QtBot
 
 from app.analysis import heard as heard_module
 from app.rendering import Take
 from app.rendering.take import Pictures
+from app.views.plots.axis_label import frequency_ticks
 from app.views.string.view import StringView
 from app.window.panels import Moment, Panel, StringPanel
 from app.window.panels.error_time import ErrorTimePanel
@@ -25,8 +27,9 @@ from app.window.panels.spectrum import SpectrumPanel, analyser_at
 from app.window.panels.waveform import WaveformPanel
 from engine.resonators.string import undamped_frequencies
 from engine.values.ear import Ear
+from tests.app.gestures import drag, turn_wheel
 from tests.app.takes import append_to
-from tests.app.window.driver import LEFT, SHIFT, press
+from tests.app.window.driver import KEY, LEFT, SHIFT, press
 from tests.app.window.driver import choose as choose_in
 from tests.app.window.panels.conftest import Hear, Make, at, bar_of, choose, curves, items, label_of
 
@@ -58,7 +61,7 @@ def test_the_map_shows_motion_and_error_in_mm_and_bar_and_readout_agree(make: Ma
     panel.plot.hovered.emit(0.3, 0.5)
     assert panel.readout.text().endswith(" mm") and " peak " in panel.readout.text()
     panel.plot.hovered.emit(math.nan, 0.5)
-    panel.plot.show_times(0.0, 0.02)
+    panel.plot.show_range(0.0, 0.02)
     watch(panel, lambda: panel.readout.text() == "every frame")
     assert image_of(panel).shape[0] == 101
     assert image_of(panel).max() == pytest.approx(1.01 * 4, rel=1e-3)
@@ -173,12 +176,12 @@ def test_the_spectrum_reports_level_and_nearest_partial_and_stays_at_the_end(
     panel = make(SpectrumPanel)
     watch(panel, lambda: len(drawn(panel, "truth")) > 0)
     second_hz = float(undamped_frequencies(take.info.string, 2)[1]) / (2 * np.pi)
-    panel.hover(second_hz * 2 ** (10 / 1200))
+    panel.point_at(second_hz * 2 ** (10 / 1200))
     assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.readout.text()
     assert "A −" in panel.readout.text().replace("-", "−")
     (partial,) = items(panel.plot, pg.InfiniteLine)
     assert 10 ** partial.value() == pytest.approx(second_hz)
-    panel.hover(math.nan)
+    panel.point_at(math.nan)
     assert panel.readout.text() == "" and not partial.isVisible()
     for position_s in (1.0, 0.9):  # both within the last window
         for _ in range(MOMENTS):
@@ -188,6 +191,39 @@ def test_the_spectrum_reports_level_and_nearest_partial_and_stays_at_the_end(
         choose(panel, a=source, b=source)
         choose_in(panel.ranges, 60)
         assert panel.plot.getPlotItem().vb.viewRange()[1] == pytest.approx([-60, 0])
+
+
+def test_the_spectrum_zooms_and_pans_and_its_cursor_reads_by_pointer_and_keys(
+    qtbot: QtBot, make: Make, take: Take, watch: Watch
+) -> None:
+    panel = make(SpectrumPanel)
+    plot, first_hz = panel.plot, take.fundamental_hz
+    watch(panel, lambda: len(drawn(panel, "truth")) > 0)
+    whole_hz, loudest_db = plot.view_hz, drawn(panel, "truth").max()
+    turn_wheel(plot.viewport(), at(plot, math.log10(first_hz), -50), QPoint(0, 120 * 12))
+    low_hz, high_hz = plot.view_hz
+    assert low_hz < first_hz < high_hz < whole_hz[1] / 4
+    watch(panel, lambda: curves(plot)["truth"][0].max() < math.log10(high_hz))
+    assert len(drawn(panel, "truth")) == 480, "as many points in view as before"
+    assert drawn(panel, "truth").max() == pytest.approx(loudest_db, abs=0.3)
+    numbers = [float(text) for _, text in frequency_ticks(low_hz, high_hz)]
+    assert 3 <= len(numbers) <= 7 and low_hz <= numbers[0] and numbers[-1] <= high_hz
+    drag(plot.viewport(), QPoint(300, 100), QPoint(200, 100))
+    assert plot.view_hz[0] > low_hz and plot.view_hz[1] / plot.view_hz[0] == pytest.approx(high_hz / low_hz)
+    qtbot.mouseDClick(plot.viewport(), LEFT, pos=QPoint(300, 100))
+    assert plot.view_hz == pytest.approx(whole_hz)
+    watch(panel, lambda: curves(plot)["truth"][0].max() > math.log10(whole_hz[1]) - 0.01)
+    for key, number in ((KEY.Key_Right, 1), (KEY.Key_Right, 2), (KEY.Key_Right, 3), (KEY.Key_Left, 2)):
+        qtbot.keyClick(plot, key)
+        partial_hz = float(take.partials_hz[number - 1])
+        assert f"{partial_hz:.1f} Hz" in plot.accessibleDescription()
+        assert f"partial {number}: {partial_hz:.1f} Hz (+0 cents)" in plot.accessibleDescription()
+        assert 10**plot.line_at == pytest.approx(partial_hz)
+    qtbot.keyClick(plot, KEY.Key_Right, SHIFT)
+    assert 1 < 10**plot.line_at / partial_hz < 1.02, "a point of the curve"
+    for hz, words in ((440 * 2 ** (30 / 1200), "A4 +30 cents"), (261.6256 * 2 ** (-0.1 / 12), "C4 -10 cents")):
+        plot.hovered.emit(math.log10(hz), -50.0)
+        assert words in panel.readout.text() and "A " in panel.readout.text() and "B " in panel.readout.text()
 
 
 def test_views_of_a_growing_take_show_what_is_there(make: Make, take: Take) -> None:

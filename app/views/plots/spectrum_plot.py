@@ -1,0 +1,56 @@
+"""Level over the logarithm of frequency: it zooms and pans, and the pointer or the arrow keys move its cursor."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+
+from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
+from app.views.plots.zoom_plot import ZoomPlot
+
+TIP = (
+    "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
+    "The wheel zooms, a drag pans, double-click shows all. Arrow keys read partial after partial, with Shift point\n"
+    "after point; + and − zoom"
+)
+_SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+
+
+class SpectrumPlot(ZoomPlot):
+    """The line of `KeptPlot` is the cursor, at the log₁₀ of a frequency in Hz; not a number: there is none."""
+
+    SHORTEST_VIEW = 0.005  # a third of a semitone
+    PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton
+    stepped = Signal(int, bool)  # the cursor, to the next partial on this side, or to the next point of the curve
+
+    def __init__(self) -> None:
+        super().__init__("Spectrum", TIP, "frequency (Hz)")
+        item = self.getPlotItem()
+        item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
+        item.setLogMode(x=True)
+        item.setMouseEnabled(True, False)
+        item.vb.sigXRangeChanged.connect(self._label_frequencies)
+        self.move_line(math.nan)
+
+    def set_highest(self, highest_hz: float) -> None:
+        self.set_ends(math.log10(LOWEST_HZ), math.log10(highest_hz))
+
+    @property
+    def view_hz(self) -> tuple[float, float]:
+        """The lowest and the highest frequency of the view."""
+        low, high = self.view_range
+        return 10**low, 10**high
+
+    def _label_frequencies(self) -> None:
+        low, high = self.getPlotItem().vb.viewRange()[0]
+        self.getPlotItem().getAxis("bottom").setTicks([frequency_ticks(10**low, 10**high)])
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        side = _SIDES.get(Qt.Key(event.key()))
+        if side is None:
+            super().keyPressEvent(event)
+        else:
+            self.stepped.emit(side, bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
