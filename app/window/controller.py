@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,8 +25,10 @@ from app.audio.sound import Sound
 from app.export.sound import compared_sounds
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
+from app.presets.words import why_no_middle
 from app.session.choices import OBSERVED
 from app.session.slots import missing_presets, sound_of, through_words
+from app.session.trained import brought_pluck
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.stage.session import Session
@@ -86,7 +88,12 @@ class Controller(QObject):
     ) -> None:
         super().__init__(window)
         self.window = window
-        self.session = Session(settings.choices, held=lambda: bool(QGuiApplication.mouseButtons()))
+        self.library = Library([])
+        self.session = Session(
+            settings.choices,
+            held=lambda: bool(QGuiApplication.mouseButtons()),
+            brought=lambda choices, preset: brought_pluck(choices, self.library, preset),
+        )
         self._settings = settings
         self._settings_path = settings_path
         self.audio = AudioControl(window, make_sound, settings.device, settings.sound)
@@ -103,7 +110,6 @@ class Controller(QObject):
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
-        self.library = Library([])
         problems = self.library.refresh()
         self.presets = PresetDesk(window, self.session, self.library, settings.favourites)
         self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
@@ -168,6 +174,7 @@ class Controller(QObject):
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
+        window.transport.trained_asked.connect(self.pluck_as_trained)
         window.face_asked.connect(self.show_face)
 
     def _connect_panel(self, panel: Panel) -> None:
@@ -211,6 +218,7 @@ class Controller(QObject):
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
+            "trained": self.pluck_as_trained,
             **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
             "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
@@ -261,6 +269,20 @@ class Controller(QObject):
             self.instruments.pluck()
         else:
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
+
+    def pluck_as_trained(self) -> None:
+        """Choose the pluck in the middle of what the preset was trained on, and pluck."""
+        entry = self.performance.entry
+        if entry is not None and entry.info.middle_pluck is not None:
+            self.session.update(**asdict(entry.info.middle_pluck))
+            self.pluck()
+
+    def _show_trained(self) -> None:
+        """Let the string be plucked as trained, or say why it cannot be."""
+        entry = self.performance.entry
+        drums = self.session.choices.drums is not None
+        why = "No string is played" if entry is None or drums else why_no_middle(entry.info)
+        self.window.show_trained(why)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -424,6 +446,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         if names & {"patch", "single"}:
             self._show_kind()
+            self._show_trained()
         window.show_solo(choices.solo)
         window.show_through(*through_words(choices))
         self.patches.choices_changed(names)

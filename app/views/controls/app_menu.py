@@ -56,6 +56,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
     "&Play": (
         MenuEntry("play", "Pluck or stop", "Space", "pluck, or stop"),
         MenuEntry("pluck", "Pluck", "Return", "pluck"),
+        MenuEntry("trained", "Pluck as trained", "Ctrl+Shift+P", "pluck in the middle of the preset's training"),
         MenuEntry("loop", "Loop", "Ctrl+L", "loop"),
         MenuEntry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),
         MenuEntry("browse", "Presets …", "Ctrl+P", "browse the presets"),
