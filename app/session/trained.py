@@ -14,8 +14,8 @@ from engine.presets import PresetInfo, outside_training
 def brought_pluck(choices: Choices, library: Library, name: str) -> Mapping[str, Any]:
     """The fields of `Choices` that change with the preset that is chosen.
 
-    It brings its trained pluck, unless the present one lies within its training or the preset before was trained on
-    the same plucks of the same string: so models are compared on one pluck, whichever it is.
+    It brings its trained pluck, unless the present one lies within its training. After a preset with the same
+    training nothing changes: models of one training are compared on one pluck, whichever it is.
     """
     entry, before = library.find(name), library.find(choices.single or "")
     pluck = None if entry is None else entry.info.middle_pluck

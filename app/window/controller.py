@@ -22,6 +22,7 @@ from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
 from app.audio.sound import Sound
+from app.export.compared import ComparedModels
 from app.export.sound import compared_sounds
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
@@ -181,6 +182,7 @@ class Controller(QObject):
         panel.seek_asked.connect(self.performance.seek)
         panel.pluck_asked.connect(self.pluck)
         panel.strike_asked.connect(self.instruments.strike)
+        panel.export_asked.connect(self._export_models)
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
@@ -212,6 +214,7 @@ class Controller(QObject):
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
+            "models": self._compare_models,
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
@@ -283,6 +286,17 @@ class Controller(QObject):
         drums = self.session.choices.drums is not None
         why = "No string is played" if entry is None or drums else why_no_middle(entry.info)
         self.window.show_trained(why)
+
+    def _compare_models(self) -> None:
+        """Show the table of all models on this pluck, with the keyboard in it."""
+        self.show_face("lab")
+        self.session.update(right_view="compare")
+        panel = next(panel for panel in self.panels if panel.key == "compare")
+        panel.setFocus()
+
+    def _export_models(self, models: ComparedModels) -> None:
+        self.exports.models = models
+        self.exports.open("models")
 
     def play_or_stop(self) -> None:
         if self._abx is None:

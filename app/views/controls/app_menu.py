@@ -64,6 +64,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("next", "Next preset", "PgDown", "next preset"),
         MenuEntry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
         MenuEntry("all_modes", "Play all modes", "Esc", "play all modes again"),
+        MenuEntry("models", "All models on this pluck …"),
         MenuEntry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
     ),
     "&View": (

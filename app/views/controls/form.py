@@ -183,7 +183,7 @@ class FilePicker(QWidget):
             self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
 
     def browse(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Save as", self.edit.text(), FILTERS[self.suffix])
+        path, _ = QFileDialog.getSaveFileName(self, "Save as", self.edit.text(), FILTERS.get(self.suffix, ""))
         if path:
             self.edit.setText(path)
             self.edit.setText(str(self.path))

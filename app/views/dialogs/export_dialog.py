@@ -18,6 +18,7 @@ from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
     Kind,
+    ModelsPage,
     NotePage,
     PerformancePage,
     PluginPage,
@@ -53,10 +54,9 @@ class ExportDialog(WorkDialog):
         self._subjects: Mapping[Kind, Any] = {}
         self.wav = WavForm(export)
         self.note, self.performance = NotePage(export, self.wav), PerformancePage(export, self.wav)
-        self.sampler, self.plugin = SamplerPage(sampled), PluginPage()
-        self.pages: dict[Kind, ExportPage] = dict(
-            zip(KINDS, (self.note, self.performance, self.sampler, self.plugin), strict=True)
-        )
+        self.models, self.sampler, self.plugin = ModelsPage(export, self.wav), SamplerPage(sampled), PluginPage()
+        pages = self.note, self.performance, self.models, self.sampler, self.plugin
+        self.pages: dict[Kind, ExportPage] = dict(zip(KINDS, pages, strict=True))
         self.tabs = QTabBar(drawBase=False, expanding=False)
         self.tabs.setAccessibleName("What to export")
         self.tabs.setToolTip("A note, what was recorded, or the instrument for samplers or as a plug-in")
@@ -97,7 +97,8 @@ class ExportDialog(WorkDialog):
 
     def choices(self) -> Remembered:
         """The choices of all pages, to be remembered."""
-        return self.note.choices(), self.sampler.choices()
+        matched = {"level_match": self.models["level_match"].isChecked()}
+        return self.note.choices().model_copy(update=matched), self.sampler.choices()
 
     def open_at(self, kind: Kind) -> None:
         """Show a page, unless an export is under way, and bring the dialog to the front."""
@@ -163,7 +164,7 @@ class ExportDialog(WorkDialog):
 
     def _show_finished(self, words: str) -> None:
         if self._job is not None and self.page.writes_wav:
-            for page in (self.note, self.performance):
+            for page in (self.note, self.performance, self.models):
                 page.file.follow(str(self._job.folder))
         self.exported.emit(self._job)
         self._end(words)
