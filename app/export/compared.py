@@ -67,7 +67,7 @@ class ComparedExport:
                 try:
                     for done, (sound, figures) in enumerate(self.models.lines):
                         share, of = done / len(self.models.lines), 1 / len(self.models.lines)
-                        report = partial(_part, progress, share, of, f"{done + 1} of {len(self.models.lines)}")
+                        report = partial(_part, progress, share, of, f"Model {done + 1} of {len(self.models.lines)}")
                         table.append({**figures, **self._write(made, sound, report)})
                     (made / TABLE).write_text(_csv(table), encoding="utf-8", newline="")
                 except WriteError as error:  # which names the folder that is not there yet

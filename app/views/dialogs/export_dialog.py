@@ -121,6 +121,7 @@ class ExportDialog(WorkDialog):
         for page in self.pages.values():
             page.setVisible(page is self.page)
         self.wav.setVisible(self.page.writes_wav)
+        self.wav.note.setVisible(self.page is self.note)  # of the rate of its model
         self.setWindowTitle(self.page.window_title)
         self._show_offer()
         self.adjustSize()

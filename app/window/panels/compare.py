@@ -247,7 +247,8 @@ class ComparePanel(ComputedPanel):
         self._words.rest(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {self.session.choices.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
-            + self._left
+            + self._left,
+            f"{done}{self._left}",
         )
 
 
