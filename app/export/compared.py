@@ -92,9 +92,11 @@ class ComparedExport:
 
 
 def check_new(out: Path) -> None:
-    """Raise WriteError where there is such a folder or file already: nothing of others is replaced."""
+    """Raise WriteError where such a folder or file is there, as nothing is replaced, or where none can be made."""
     if out.exists():
         raise WriteError(f"{out}: is there already; choose another name")
+    if not out.parent.is_dir():
+        raise WriteError(f"{out.parent}: no such folder; make it first, or choose another")
 
 
 def models_word(count: int) -> str:

@@ -53,6 +53,7 @@ SYSTEM_NAMES = {
     "macos-arm64": "macOS",
     "macos-x64": "macOS (Intel)",
 }
+MOST_OF_A_NAME = 100  # folders of models
 PLUGIN_NOTE = "The first one takes one to three minutes, later ones some seconds."
 RECIPE_NOTE = "Drop the file on the window to restore its instrument, or its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
@@ -284,6 +285,9 @@ class ModelsPage(ExportPage):
         if subject is not None:
             self.what.setText(subject.words)
             self.file.suggest(subject.name)
+            for number in range(2, MOST_OF_A_NAME):
+                if self.file.path.exists():
+                    self.file.suggest(f"{subject.name} ({number})")
 
     def job(self) -> ComparedExport:
         if self._subject is None:

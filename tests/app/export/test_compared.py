@@ -100,6 +100,8 @@ def test_a_folder_that_is_there_stays_and_what_is_not_whole_is_not_left(
     with pytest.raises(WriteError, match=r"out: cannot be written \(full\); free some space"):
         job.run(lambda *_: None)
     assert {path.suffix for path in tmp_path.iterdir()} == {".safetensors"}
+    with pytest.raises(WriteError, match="none: no such folder"):
+        replace(job, out=tmp_path / "none" / "out").run(lambda *_: None)
     out.mkdir()
     (out / "mine.txt").write_text("mine")
     with pytest.raises(WriteError, match="is there already"):

@@ -270,6 +270,16 @@ def test_all_models_are_exported_from_their_table(lab: Window, tmp_path: Path) -
     dialog.save.click()
     lab.wait(lambda: "Saved" in dialog.state.text())
     assert len(list((tmp_path / "out").glob("*.wav"))) == 6 and (tmp_path / "out" / "models.csv").is_file()
+    shown = Path(dialog.models.file.edit.text())
+    assert shown.name == "out" and not dialog.save.isEnabled(), "a name that was given stays"
+    dialog.accept()
+    for name in ("2 models, place 0.35, 4.0 mm", "2 models, place 0.35, 4.0 mm (2)"):
+        (tmp_path / name).mkdir()
+    export.click()
+    dialog = lab.controller.exports.dialog
+    dialog.models.file.follow(str(tmp_path))
+    dialog.show_subjects({"models": lab.controller.exports.models})
+    assert Path(dialog.models.file.edit.text()).name == "2 models, place 0.35, 4.0 mm (3)"
     lab.change(amplitude_mm=3.0)
     lab.wait(lambda: not export.isEnabled())  # of this pluck nothing is computed yet
 
