@@ -25,6 +25,7 @@ LEAST_S, MOST_S = 4.0, 12.0
 UNTIL_DB = 60.0  # or the truth has fallen so far
 HUM_S = 0.5  # before a voice ends
 LONGEST_HUM_S = 300.0  # one that ends later is not listened to so long
+EAR = Ear((DEFAULT_LISTEN,))
 GLIDE_S = 0.25  # pitch is listened to from here on, and past the training
 
 
@@ -33,34 +34,40 @@ def standard_plucks(info: PresetInfo) -> list[Pluck]:
     return [Pluck(amplitude_mm=_bearable(info, amplitude_mm)) for amplitude_mm in AMPLITUDES_MM]
 
 
-def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: None) -> Heard:
-    """The audible errors of a preset.
+def listen_to(
+    preset: Preset,
+    report: Callable[[float], None] = lambda share: None,
+    plucks: Sequence[Pluck] = (),
+    ear: Ear = EAR,
+    seconds: float | None = None,
+) -> Heard:
+    """The audible errors of a preset; of plucks that are given, without the hum at their end.
 
     Args:
         report: receives the share that is done, 0 … 1.
+        seconds: how long they are listened to, unless they have decayed before.
 
     Raises:
-        ValueError: its model cannot be released from rest.
+        ValueError: its model cannot be released from rest, or a pluck is shorter than a frame of a spectrum.
         PresetError: its file cannot be read any more.
     """
     source, digest = ModelSource(preset), preset_digest(preset.path)
-    info = preset.info
-    ear = Ear((DEFAULT_LISTEN,))
+    info, standard = preset.info, not plucks
     programs = model_program(preset, RATE_HZ), truth_program(info, RATE_HZ)
     partials_hz = (info.resonator.omega / (2 * math.pi)).tolist()
     below_hz = [hz for hz in partials_hz if hz < info.rate_hz / 2]
-    wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
-    plucks = standard_plucks(info)
+    wanted_s = seconds or min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
+    plucks = plucks or standard_plucks(info)
     errors: list[AudibleErrors] = []
     runs_away_s: list[float] = []
-    seconds = 0.0
+    longest_s = 0.0
 
     def part_of(number: int) -> Callable[[float], None]:
-        return lambda share: report((number + share) / (len(plucks) + 1))  # the last is the end of one of them
+        return lambda share: report((number + share) / (len(plucks) + standard))  # the last is the end of one
 
     for number, pluck in enumerate(plucks):
         truth = render_voice(programs[1], None, info, pluck, ear, wanted_s, until_db=UNTIL_DB)[:, 0]
-        seconds = max(seconds, len(truth) / RATE_HZ)
+        longest_s = max(longest_s, len(truth) / RATE_HZ)
         try:
             model = render_voice(programs[0], source, info, pluck, ear, len(truth) / RATE_HZ, part_of(number))[:, 0]
         except Runaway as error:
@@ -69,14 +76,14 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
             after_s = max(GLIDE_S, info.horizon_s)
             errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
     hum_db = None
-    if not runs_away_s:
+    if standard and not runs_away_s:
         hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, part_of(len(plucks)))
     report(1.0)
     splits = [e.split_cents for e in errors if e.split_cents is not None]
     return Heard(
         name=preset.name,
         sha256=digest,
-        seconds=seconds,
+        seconds=longest_s,
         distance_db=float(np.mean([*(e.distance_db for e in errors), *(FLOOR_DB for _ in runs_away_s)])),
         level_db=_median([e.level_db for e in errors]) or 0.0,
         rise_db=_median([e.rise_db for e in errors]) or 0.0,

@@ -1,10 +1,12 @@
-"""Several presets on one pluck: errors, null depth of the sound, speed and size."""
+"""Several presets on one pluck: errors, what an ear finds, null depth of the sound, speed and size."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +16,39 @@ from app.rendering.line import BLOCK_FRAMES
 from app.rendering.note_sound import NoteSound
 from app.shared.worker import Cancelled, Job
 from engine.compare.relative import NULL_FLOOR_DB, ErrorSums
-from engine.presets import PresetInfo
+from engine.plain_text import one_line
+from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
+from training.heard import listen_to
+from training.heard_file import Heard
+from training.heard_words import heard_sentence, heard_word
 
 Floats = NDArray[np.floating]
 _Truths = dict[tuple[object, ...], Floats]  # modal amplitudes, by string and rate
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
+
+
+@dataclass(frozen=True, order=True)
+class Audible:
+    """The difference of a sound from the truth's that an ear finds, in words, and in order of the spectra's distance.
+
+    Attributes:
+        distance_db: see `AudibleErrors`.
+        words, sentence: the worst fault, or all faults.
+    """
+
+    distance_db: float
+    words: str = field(compare=False)
+    sentence: str = field(compare=False)
+
+    @classmethod
+    def of(cls, heard: Heard) -> Audible:
+        return cls(heard.distance_db, heard_word(heard), heard_sentence(heard, heard.name))
+
+    def __str__(self) -> str:
+        return self.words
 
 
 @dataclass(frozen=True)
@@ -31,8 +58,9 @@ class ComparedRow:
     Attributes:
         mse, mae: relative, over the whole string and the trained horizon.
         past_mse, past_mae: of all that comes after it; infinite where the output ran away.
-        null_db: null depth at the listening point over the whole pluck: the level of model minus truth relative to
-            the truth's.
+        audible: at the first listening point, through the pick-up.
+        null_db: null depth of the displacement at the listening point over the whole pluck: the level of model minus
+            truth relative to the truth's.
         real_time: seconds of motion of the whole string that one core renders in a second.
         note: why there are no figures, or a remark on them.
         sound: the pluck that they are of; None: no figures, or of an earlier pluck.
@@ -48,6 +76,7 @@ class ComparedRow:
     mae: float | None = None
     past_mse: float | None = None
     past_mae: float | None = None
+    audible: Audible | None = None
     null_db: float | None = None
     real_time: float | None = None
     note: str = ""
@@ -57,6 +86,27 @@ class ComparedRow:
     def of(cls, entry: PresetEntry) -> ComparedRow:
         """A row with what is known without computing."""
         return cls(entry.name, entry.path.name, entry.title, entry.info.model, entry.info.rate_hz, entry.parameters)
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The figures by the names that files and commands have for them."""
+        heard = self.audible
+        return {
+            "preset": self.name,
+            "title": self.title,
+            "model": self.model,
+            "rate_hz": self.rate_hz,
+            "rel_mae": self.mae,
+            "past_rel_mae": self.past_mae,
+            "heard": None if heard is None else heard.words,
+            "distance_db": None if heard is None else heard.distance_db,
+            "rel_mse": self.mse,
+            "past_rel_mse": self.past_mse,
+            "null_db": self.null_db,
+            "real_time": self.real_time,
+            "parameters": self.parameters,
+            "note": one_line(self.note),
+        }
 
 
 def compare(sounds: list[tuple[PresetEntry, NoteSound]], job: Job) -> None:
@@ -96,10 +146,11 @@ def _compare_one(
     preset = plucked.load()
     info = preset.info
     source = ModelSource(preset)
+    share /= 2  # the other half is listening
     job.check()
     true = _true_amplitudes(truths, plucked, info, job)
     synthesis = synthesis_matrix(info.grid_points, info.modes).astype(np.float32)
-    ear = listening_weights(np.array(plucked.ear.points), info.grid_points).astype(np.float32)
+    ear = listening_weights(np.array(plucked.ear.points[:1]), info.grid_points).astype(np.float32)
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
     first = 0
@@ -131,10 +182,21 @@ def _compare_one(
         mae=windows[0].rel_mae,
         past_mse=past.rel_mse if past else None,
         past_mae=past.rel_mae if past else None,
+        audible=_audible(preset, plucked, before + share, share, job),
         null_db=None if null_db == NULL_FLOOR_DB and plucked.pluck.amplitude_mm == 0 else null_db,
         real_time=first / info.rate_hz / work_s if work_s > 0 else None,
         note=note,
     )
+
+
+def _audible(preset: Preset, plucked: NoteSound, before: float, share: float, job: Job) -> Audible | None:
+    """The difference that an ear finds; None of a pluck that is too short for it."""
+    with suppress(ValueError):
+        heard = listen_to(
+            preset, lambda done: job.report(before + share * done), [plucked.pluck], plucked.ear, plucked.seconds
+        )
+        return Audible.of(heard)
+    return None
 
 
 def _frames(source: StringSource, plucked: NoteSound, info: PresetInfo, job: Job) -> Iterator[tuple[Floats, float]]:

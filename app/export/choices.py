@@ -32,6 +32,7 @@ class ExportChoices(BaseModel):
     seconds: float = 4.0
     normalise: bool = True
     difference_gain_db: float = 20.0
+    level_match: bool = False
     alone: bool = Field(False, exclude=True)
 
     @model_validator(mode="before")

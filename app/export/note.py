@@ -88,7 +88,7 @@ def export_sounds(
         except OSError as error:  # the recordings lie in temporary files
             raise WriteError(explain(Path(tempfile.gettempdir()), error)) from error
         # of each file the gain follows from its own recipe, whatever else is written beside it
-        beside: list[SoundSamples] = list(voices.sounds.values()) if settings.normalise else []
+        beside: list[SoundSamples] = [Mixed(voices, voice) for voice in voices.sounds] if settings.normalise else []
         reports = []
         for source, file in opened.items():
             path, samples = paths[source], Mixed(voices, source, settings.difference_gain_db)

@@ -162,6 +162,7 @@ class SoundRecipe(Value):
     bits: Bits
     normalise: bool
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
+    level_match: bool = False
     string: String | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
     through: None = None

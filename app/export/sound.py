@@ -5,6 +5,7 @@ It is rendered by the same voices that a sound device plays, so that a file hold
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import Source
 from app.shared.worker import Progress
 from engine import bounds
+from engine.levels import MATCHED_S, match_gain
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
 from engine.voices import model_program, truth_program, voice_blocks
@@ -45,10 +47,12 @@ class Voices:
 
     Attributes:
         ended: False where the sound was to end by its decay but reached its longest duration first.
+        match: the factor of the model.
     """
 
     sounds: Mapping[Voice, SoundSamples]
     ended: bool = True
+    match: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,19 +64,19 @@ class Mixed:
     difference_gain_db: float = 0.0
 
     def __len__(self) -> int:
-        return min(map(len, self._parts))
+        return min(len(self.voices.sounds[name]) for name in voices_of(self.source))
 
     def __getitem__(self, frames: slice) -> Samples:
-        parts = [part[frames].astype(np.float64) for part in self._parts]
+        names = voices_of(self.source)
+        parts = [self._gain(name) * self.voices.sounds[name][frames].astype(np.float64) for name in names]
         if self.source == "both":
             return np.concatenate(parts, axis=1)
         if self.source == "difference":
             return 10 ** (self.difference_gain_db / 20) * (parts[0] - parts[1])
         return parts[0]
 
-    @property
-    def _parts(self) -> list[SoundSamples]:
-        return [self.voices.sounds[voice] for voice in voices_of(self.source)]
+    def _gain(self, voice: Voice) -> float:
+        return self.voices.match if voice == "model" else 1.0
 
 
 def voices_of(source: Source) -> tuple[Voice, ...]:
@@ -109,8 +113,8 @@ def render_voices(
 
     Args:
         preset: as `sound.load` gives it.
-        settings: where normalised, both are rendered whatever the sources, for the gain; a model that runs away is
-            left out if no source needs it.
+        settings: where normalised or matched, both are rendered whatever the sources, for the gain; a model that runs
+            away is left out if no source needs it.
 
     Raises:
         ValueError: see `check_sources`.
@@ -120,7 +124,8 @@ def render_voices(
     check_sources(sound, sources, preset.info.rate_hz)
     needed = {voice for source in sources for voice in voices_of(source)}
     decay_db, rate_hz = settings.decay_db, settings.rate_hz or preset.info.rate_hz
-    voices = [voice for voice in VOICES if voice in needed or settings.normalise or decay_db is not None]
+    both = settings.normalise or settings.level_match or decay_db is not None
+    voices = [voice for voice in VOICES if voice in needed or both]
     until_db = None if decay_db is None else decay_db + DECAYED_FOR_SURE_DB
     sounds: dict[Voice, Recording] = {}
     for place, voice in enumerate(voices):
@@ -138,12 +143,20 @@ def render_voices(
             for block in rendered:
                 recording.append(block)
             sounds[voice] = recording
+    match = 1.0
+    if settings.level_match and len(sounds) == len(VOICES):
+        match = match_gain(*(_level(sounds[voice], rate_hz) for voice in VOICES))
     if decay_db is None:
-        return Voices(sounds)
+        return Voices(sounds, match=match)
     frames = max(decayed_frames(recording, rate_hz, decay_db) for recording in sounds.values())
     for recording in sounds.values():
         recording.cut(frames)
-    return Voices(sounds, ended=frames < round(sound.seconds * rate_hz))
+    return Voices(sounds, frames < round(sound.seconds * rate_hz), match)
+
+
+def _level(sound: SoundSamples, rate_hz: int) -> float:
+    """Root mean square of the part whose levels are matched."""
+    return math.sqrt(float(np.square(sound[: round(MATCHED_S * rate_hz)], dtype=np.float64).mean()))
 
 
 def compared_sounds(sound: NoteSound, rate_hz: int) -> Mapping[str, NDArray[np.float32]]:

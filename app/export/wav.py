@@ -46,6 +46,7 @@ class WavSettings:
         decay_db: a note ends where both model and truth have fallen this far below their maximum. So all files of a
             note have the same length. None: it lasts as long as its sound says.
         difference_gain_db: gain of a note's difference.
+        level_match: whether a note's model is brought to the level of its truth, in its difference too.
 
     Raises:
         ValueError: a value is out of its range; the message names it.
@@ -57,6 +58,7 @@ class WavSettings:
     fade_out_s: float = 0.010
     decay_db: float | None = None
     difference_gain_db: float = 0.0
+    level_match: bool = False
 
     def __post_init__(self) -> None:
         bounds.check_choice("bits", self.bits, BITS)

@@ -9,11 +9,10 @@ import numpy as np
 
 from app.playing.note import PluckVoices
 from app.playing.sources import Sources
+from engine.levels import MATCHED_S, match_gain
 from engine.voices import Mixer
 
-MATCHED_S = 1.0  # from the pluck on: the part whose levels are compared
 HIGHEST_RATE_HZ = 48_000  # at which they are
-LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 
 
 def level_match(sources: Sources, note: PluckVoices, rate_hz: int) -> Mapping[str, float]:
@@ -21,7 +20,7 @@ def level_match(sources: Sources, note: PluckVoices, rate_hz: int) -> Mapping[st
     seconds = min([MATCHED_S, *(samples.rendered_s for samples in note.ahead)])  # a pluck may be shorter
     rate_hz = min(rate_hz, HIGHEST_RATE_HZ)
     levels = {source: _level(sources, note, source, seconds, rate_hz) for source in note.voices}
-    return {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
+    return {source: match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
 
 
 def _level(sources: Sources, note: PluckVoices, source: str, seconds: float, rate_hz: int) -> float:
@@ -34,9 +33,3 @@ def _level(sources: Sources, note: PluckVoices, source: str, seconds: float, rat
     mixer.add(sources.load(note.subject(source)).voice(source, request.pluck, request.ear, rate_hz))
     sound = mixer.render(round(seconds * rate_hz))
     return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
-
-
-def _match_gain(level: float, truth: float) -> float:
-    limit = 10 ** (LARGEST_MATCH_DB / 20)
-    gain = truth / level if level > 0 else 0.0
-    return gain if 1 / limit <= gain <= limit else 1.0

@@ -23,7 +23,7 @@ from app.playing.ahead import STOLEN_S, Ahead, AheadSamples
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
-from app.playing.levels import MATCHED_S, level_match
+from app.playing.levels import level_match
 from app.playing.note import PluckVoices
 from app.playing.playback import Due
 from app.playing.sources import Sources
@@ -35,6 +35,7 @@ from app.shared.log import faultless
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
+from engine.levels import MATCHED_S
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice

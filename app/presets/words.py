@@ -62,6 +62,17 @@ def error_word(info: PresetInfo) -> str:
     return "–" if info.rel_mae is None else percent(info.rel_mae)
 
 
+def why_no_middle(info: PresetInfo) -> str:
+    """The reason why no pluck is the middle of a preset's training; "" where there is one."""
+    if info.middle_pluck is not None:
+        return ""
+    if info.recorded is not None:
+        return "Its string was learned from a recording, not from plucks"
+    if info.family is not None:
+        return "It was trained on many strings, each with plucks of its own: what lies outside is hatched"
+    return "It was trained on random shapes, and no pluck is like them"
+
+
 def judged(outside: str, error: float) -> tuple[str, bool]:
     """The part outside the training, in words that its error decides; and True if that is a warning.
 

@@ -48,6 +48,7 @@ class Session:
         now_s: a clock, replaced in tests.
         held: whether a gesture that has begun may still be under way. Its `release` may never come, as where a dialog
             or another window takes the mouse.
+        brought: the further fields that change with a preset, by its name.
     """
 
     changed = Signal(frozenset)
@@ -57,9 +58,10 @@ class Session:
         choices: Choices | None = None,
         now_s: Callable[[], float] = time.monotonic,
         held: Callable[[], bool] = lambda: True,
+        brought: Callable[[Choices, str], Mapping[str, Any]] = lambda choices, preset: {},
     ) -> None:
         self.stage = first_stage(choices or Choices())
-        self._now_s, self._still_held = now_s, held
+        self._now_s, self._still_held, self._brought = now_s, held, brought
         self._undo: deque[Step] = deque(maxlen=LARGEST_STEPS)
         self._redo: deque[Step] = deque()
         self._held = False
@@ -83,7 +85,9 @@ class Session:
             self.changed.emit(names)
 
     def update(self, **values: Any) -> None:
-        """Take new values of `Choices`, as `Chosen`. Raise ValueError as `send`."""
+        """Take new values of `Choices`, as `Chosen`, and what a preset brings. Raise ValueError as `send`."""
+        if "preset" in values:
+            values = {**self._brought(self.choices, values["preset"]), **values}
         self.send(Chosen(values))
 
     def play(self, **values: Any) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,11 +22,14 @@ from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
 from app.audio.sound import Sound
+from app.export.compared import ComparedModels
 from app.export.sound import compared_sounds
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
+from app.presets.words import why_no_middle
 from app.session.choices import OBSERVED
 from app.session.slots import missing_presets, sound_of, through_words
+from app.session.trained import brought_pluck
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.stage.session import Session
@@ -88,7 +91,12 @@ class Controller(QObject):
     ) -> None:
         super().__init__(window)
         self.window = window
-        self.session = Session(settings.choices, held=lambda: bool(QGuiApplication.mouseButtons()))
+        self.library = Library([])
+        self.session = Session(
+            settings.choices,
+            held=lambda: bool(QGuiApplication.mouseButtons()),
+            brought=lambda choices, preset: brought_pluck(choices, self.library, preset),
+        )
         self._settings = settings
         self._settings_path = settings_path
         self.audio = AudioControl(window, make_sound, settings.device, settings.sound)
@@ -106,7 +114,6 @@ class Controller(QObject):
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
-        self.library = Library([])
         problems = self.library.refresh()
         self.presets = PresetDesk(window, self.session, self.library, settings.favourites)
         self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
@@ -173,12 +180,14 @@ class Controller(QObject):
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
+        window.transport.trained_asked.connect(self.pluck_as_trained)
         window.face_asked.connect(self.show_face)
 
     def _connect_panel(self, panel: Panel) -> None:
         panel.seek_asked.connect(self.performance.seek)
         panel.pluck_asked.connect(self.pluck)
         panel.strike_asked.connect(self.instruments.strike)
+        panel.export_asked.connect(self._export_models)
         panel.reported.connect(self.window.notices.report)
         self.figures.add(panel)
 
@@ -211,6 +220,7 @@ class Controller(QObject):
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
+            "models": self._compare_models,
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
@@ -219,6 +229,7 @@ class Controller(QObject):
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
+            "trained": self.pluck_as_trained,
             **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
             "instruments": self.patches.toggle,
             "browse": self.presets.toggle,
@@ -277,6 +288,31 @@ class Controller(QObject):
             self.instruments.pluck()
         else:
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
+
+    def pluck_as_trained(self) -> None:
+        """Choose the pluck in the middle of what the preset was trained on, and pluck."""
+        entry = self.performance.entry
+        if entry is not None and entry.info.middle_pluck is not None:
+            self.session.update(**asdict(entry.info.middle_pluck))
+            self.pluck()
+
+    def _show_trained(self) -> None:
+        """Let the string be plucked as trained, or say why it cannot be."""
+        entry = self.performance.entry
+        drums = self.session.choices.drums is not None
+        why = "No string is played" if entry is None or drums else why_no_middle(entry.info)
+        self.window.show_trained(why)
+
+    def _compare_models(self) -> None:
+        """Show the table of all models on this pluck, with the keyboard in it."""
+        self.show_face("lab")
+        self.session.update(right_view="compare")
+        panel = next(panel for panel in self.panels if panel.key == "compare")
+        panel.setFocus()
+
+    def _export_models(self, models: ComparedModels) -> None:
+        self.exports.models = models
+        self.exports.open("models")
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -445,6 +481,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         if names & {"patch", "single"}:
             self._show_kind()
+            self._show_trained()
         window.show_solo(choices.solo)
         window.show_through(*through_words(choices))
         self.patches.choices_changed(names)

@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
+from app.export.compared import ComparedModels
 from app.export.job import ExportJob
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
@@ -48,6 +49,7 @@ class Exports(QObject):
         self._window = window
         self._recordings = recordings
         self._choices = choices
+        self.models: ComparedModels | None = None  # that were asked for last
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
@@ -114,6 +116,7 @@ class Exports(QObject):
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
             "note": heard_note(choices, self._library, self._session.stage.struck),
+            "models": self.models,
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,

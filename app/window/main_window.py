@@ -399,6 +399,11 @@ class MainWindow(QMainWindow):
         words.setObjectName("warning" if grave else "faint")
         words.style().polish(words)
 
+    def show_trained(self, why_not: str) -> None:
+        """Let the string be plucked as its preset was trained; `why_not`: the reason why it cannot be, or ""."""
+        self.action["trained"].setEnabled(not why_not)
+        self.transport.show_trained(why_not)
+
     def show_growth(self, text: str) -> None:
         """Show that the error of the latest pluck grew; "" where it did not."""
         self.growth_sign.setToolTip(plain_tip(text))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from engine import bounds
 from engine.models import MODELS, OF_MANY_STRINGS
-from engine.pluck import SHAPES, Pluck
+from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
 from engine.resonators.family import Bounds, StringFamily
@@ -143,10 +143,33 @@ class PresetInfo:
         low_m, high_m = self.trained_range.peak_m
         return 1000 * low_m, 1000 * high_m
 
+    @cached_property
+    def middle_pluck(self) -> Pluck | None:
+        """The pluck in the middle of its training; None: it was not trained on plucks of so many mm.
+
+        Of plucks, widths and amplitudes were drawn evenly on a logarithmic scale; see `training.data.draws`.
+        """
+        trained = self.trained_range
+        if trained.position is None or trained.peak_m is None or not trained.width:
+            return None
+        shape, width = next(iter(trained.width.items()))
+        middle = _geometric_middle if self.initial == "pluck" else _middle
+        pluck = Pluck(shape=cast(Shape, shape)).nearest(position=_middle(*trained.position), width=middle(*width))
+        low_mm, high_mm = self.trained_amplitudes_mm(pluck)
+        return pluck.nearest(amplitude_mm=round(middle(low_mm, min(high_mm, self.hardest_mm(pluck))), 3))
+
     @property
     def string_kind(self) -> str:
         """The command line's word: "linear" or "nonlinear"."""
         return "nonlinear" if self.tension_modulated else "linear"
+
+
+def _middle(low: float, high: float) -> float:
+    return round((low + high) / 2, 4)
+
+
+def _geometric_middle(low: float, high: float) -> float:
+    return round(math.sqrt(low * high), 4)
 
 
 def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:

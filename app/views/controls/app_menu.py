@@ -63,6 +63,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
     "&Play": (
         MenuEntry("play", "Pluck or stop", "Space", "pluck, or stop"),
         MenuEntry("pluck", "Pluck", "Return", "pluck"),
+        MenuEntry("trained", "Pluck as trained", "Ctrl+Shift+P", "pluck in the middle of the preset's training"),
         MenuEntry("loop", "Loop", "Ctrl+L", "loop"),
         MenuEntry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),
         MenuEntry("browse", "Presets …", "Ctrl+P", "browse the presets"),
@@ -71,6 +72,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
         MenuEntry("difference", "Hear the difference", "Shift+B", "hear model − truth in the Lab, and back"),
         MenuEntry("all_modes", "Play all modes", "Esc", "play all modes again"),
+        MenuEntry("models", "All models on this pluck …"),
         MenuEntry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
     ),
     "&View": (

@@ -177,7 +177,7 @@ class FilePicker(QWidget):
     def browse(self) -> None:
         named = Path(self.edit.text().strip()).name
         suggested = self.path if named else Path(f"untitled{self.suffix}")
-        for path in self.places.ask(self, self.kind, "Save as", "save", FILTERS[self.suffix], suggested):
+        for path in self.places.ask(self, self.kind, "Save as", "save", FILTERS.get(self.suffix, ""), suggested):
             self.edit.setText(str(path))
             self._name_edited()
 

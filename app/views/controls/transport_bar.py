@@ -22,6 +22,7 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
 from engine.pluck import SHAPES
 
 KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
+TRAINED_TIP = "Pluck in the middle of what the preset was trained on: shape, place, height and width (Ctrl+Shift+P)"
 OF_THE_PATCH = "While keys play the instrument, it is the instrument's own and is saved with it"
 
 
@@ -29,6 +30,7 @@ class TransportBar(QFrame):
     """Gestures emit signals and change nothing; `show_choices` shows what became of them."""
 
     play_asked = Signal()
+    trained_asked = Signal()
     export_asked = Signal()
     change_asked = Signal(str, object)  # a field of `Choices` and its new value
 
@@ -89,7 +91,7 @@ class TransportBar(QFrame):
             knob.set_narrow(compact)
         self.slots.set_narrow(compact, tight)
         self.handle.set_compact(compact)
-        for button in (self._play, self._loop, self._stereo, self.export):
+        for button in (self._play, self._loop, self._stereo, self._trained, self.export):
             button.setProperty("compact", compact)
             button.setProperty("tight", tight)
             button.style().unpolish(button)
@@ -112,6 +114,11 @@ class TransportBar(QFrame):
             part.setEnabled(choices.drums is None)  # they are of a string
         self._show_verb("Pluck" if choices.drums is None else "Strike")
         self.slots.show_choices(choices)
+
+    def show_trained(self, why_not: str) -> None:
+        """Let the string be plucked as trained; `why_not`: the reason why it cannot be, or ""."""
+        self._trained.setEnabled(not why_not)
+        self._trained.setToolTip(why_not or TRAINED_TIP)
 
     def show_playing(self, playing: bool) -> None:
         if playing == self._playing:
@@ -153,7 +160,10 @@ class TransportBar(QFrame):
         column.addWidget(Label("PLUCK", objectName="knob"), alignment=Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(1)
         column.addWidget(self._shape)
-        column.addStretch(2)
+        self._trained = tool_button("As trained", "Pluck as trained", TRAINED_TIP, pressed=self.trained_asked)
+        self._trained.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        column.addWidget(self._trained)
+        column.addStretch(1)
         return column
 
     def _group(self, *parts: QWidget | QLayout) -> QWidget:

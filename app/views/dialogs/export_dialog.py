@@ -17,6 +17,7 @@ from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
     Kind,
+    ModelsPage,
     NotePage,
     PerformancePage,
     PluginPage,
@@ -55,10 +56,10 @@ class ExportDialog(WorkDialog):
         self._places = places
         self.wav = WavForm(export)
         self.note, self.performance = NotePage(export, self.wav, places), PerformancePage(self.wav, places)
-        self.sampler, self.plugin = SamplerPage(sampled, places), PluginPage(places)
-        self.pages: dict[Kind, ExportPage] = dict(
-            zip(KINDS, (self.note, self.performance, self.sampler, self.plugin), strict=True)
-        )
+        self.models, self.sampler = ModelsPage(export, self.wav, places), SamplerPage(sampled, places)
+        self.plugin = PluginPage(places)
+        pages = self.note, self.performance, self.models, self.sampler, self.plugin
+        self.pages: dict[Kind, ExportPage] = dict(zip(KINDS, pages, strict=True))
         self.tabs = QTabBar(drawBase=False, expanding=False)
         self.tabs.setAccessibleName("What to export")
         self.tabs.setToolTip("A note, what was recorded, or the instrument for samplers or as a plug-in")
@@ -99,7 +100,8 @@ class ExportDialog(WorkDialog):
 
     def choices(self) -> Remembered:
         """The choices of all pages, to be remembered."""
-        return self.note.choices(), self.sampler.choices()
+        matched = {"level_match": self.models["level_match"].isChecked()}
+        return self.note.choices().model_copy(update=matched), self.sampler.choices()
 
     def open_at(self, kind: Kind) -> None:
         """Show a page, unless an export is under way, and bring the dialog to the front."""
@@ -122,6 +124,7 @@ class ExportDialog(WorkDialog):
         for page in self.pages.values():
             page.setVisible(page is self.page)
         self.wav.setVisible(self.page.writes_wav)
+        self.wav.note.setVisible(self.page is self.note)  # of the rate of its model
         self.setWindowTitle(self.page.window_title)
         self._show_offer()
         self.adjustSize()

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 from PySide6.QtCore import QSignalBlocker
 
 from app.export.choices import Chosen, ExportChoices
+from app.export.compared import TABLE, ComparedExport, ComparedModels, check_new
 from app.export.job import ExportJob
 from app.export.note import HeardNote, NoteExport, paths_of
 from app.export.played import Played, PlayedExport, recorded_files
@@ -34,7 +35,7 @@ from app.views.controls.parts import faint, label
 from app.views.file_places import FilePlaces
 from engine.whole_file import WriteError, explain
 
-Kind = Literal["note", "performance", "sampler", "plugin"]
+Kind = Literal["note", "performance", "models", "sampler", "plugin"]
 SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Model", "model"),
     ("Truth", "truth"),
@@ -59,6 +60,7 @@ SYSTEM_NAMES = {
     "macos-arm64": "macOS",
     "macos-x64": "macOS (Intel)",
 }
+MOST_OF_A_NAME = 100  # folders of models
 PLUGIN_NOTE = "The first one takes one to three minutes, later ones some seconds."
 RECIPE_NOTE = "Drop the file on the window to restore its instrument, or its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
@@ -281,6 +283,47 @@ class PerformancePage(ExportPage):
         return "Replace" if there else "Save", f"Replaces {' and '.join(there)}." if there else MIDI_NOTE
 
 
+class ModelsPage(ExportPage):
+    """The export of all models on one pluck to a folder."""
+
+    title = "Models"
+    missing = "Nothing is compared: choose a preset in the Lab, then the view Compare, and Export … above its table."
+    window_title = "Export the models"
+    TIPS: ClassVar = {
+        "level_match": "One gain brings a model to the level of its truth, in the difference too. Off: as they are",
+        "file": "The folder that is made",
+    }
+
+    def __init__(self, export: ExportChoices, wav: WavForm, places: FilePlaces) -> None:
+        super().__init__(export, self.TIPS)
+        self._wav = wav
+        self._subject: ComparedModels | None = None
+        self.what, self.file = label("faint"), self.file_picker(places, "note")
+        self.file.suffix = ""
+        self.row("Sound", self.what)
+        self.row("Models", self.check("level_match", "As loud as their truth"))
+        self.row("Folder", self.file)
+
+    def show_subject(self, subject: ComparedModels | None) -> None:
+        self._subject = subject
+        if subject is not None:
+            self.what.setText(subject.words)
+            self.file.suggest(subject.name)
+            for number in range(2, MOST_OF_A_NAME):
+                if self.file.path.exists():
+                    self.file.suggest(f"{subject.name} ({number})")
+
+    def job(self) -> ComparedExport:
+        if self._subject is None:
+            raise ValueError(self.missing)
+        choices = ExportChoices.model_validate({**self.values(), **self._wav.values()})
+        return ComparedExport.chosen(self._subject, self.file.path, choices)
+
+    def offer(self) -> tuple[str, str]:
+        check_new(self.job().file)
+        return "Export", f"Model, truth and difference of each, with their recipes, and a table ({TABLE})."
+
+
 class SamplerPage(ExportPage):
     """A patch as an instrument for samplers: format, keys, layers, length, source, place."""
 
@@ -452,6 +495,7 @@ class PluginPage(ExportPage):
 PAGES: dict[Kind, type[ExportPage]] = {
     "note": NotePage,
     "performance": PerformancePage,
+    "models": ModelsPage,
     "sampler": SamplerPage,
     "plugin": PluginPage,
 }

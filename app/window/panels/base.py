@@ -104,6 +104,7 @@ class Panel(QWidget):
     seek_asked = Signal(float)  # move the playhead to this time in s
     pluck_asked = Signal()
     strike_asked = Signal(float, float, float)  # the drum at a place, in half-lengths from its centre; velocity
+    export_asked = Signal(object)  # the `ComparedModels` that are to be exported
     reported = Signal(str, str)  # a notice for the user, and its details
 
     def __init__(self, session: Session, library: Library) -> None:

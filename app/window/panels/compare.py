@@ -6,7 +6,8 @@ The chosen preset comes first, then those in the slots, then the others. Presets
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import time
+from dataclasses import asdict, replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
@@ -14,6 +15,7 @@ from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import ComparedRow, compare, same_string
 from app.export.columns import Columns
+from app.export.compared import ComparedModels, models_word
 from app.presets import words
 from app.presets.library import Library, PresetEntry
 from app.rendering.note_sound import NoteSound
@@ -22,7 +24,7 @@ from app.stage.session import Session
 from app.views.controls.parts import tool_button
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import ComputedPanel, Moment
-from engine.values.ear import Ear
+from engine.plain_text import duration
 
 
 def percent(value: float) -> str:
@@ -47,12 +49,17 @@ def times(value: float) -> str:
 
 
 _TRAINED, _PAST = "over the trained time and the whole string", "from the end of training to the end of the pluck"
+_EAR = (
+    "The worst fault that an ear finds in this pluck, through the pick-up, or how far the spectra are apart; "
+    "sorted by that distance"
+)
 _NULL = "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck"
 _SPEED = "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time"
 COLUMNS = (
-    FigureColumn("title", "Preset", "Double-click or Enter loads the preset"),
+    FigureColumn("title", "Preset", "Click or Enter: hear the model on this pluck"),
     FigureColumn("mae", "MAE", f"Relative mean absolute error {_TRAINED}", percent),
     FigureColumn("past_mae", "MAE past", f"Relative mean absolute error {_PAST}", percent),
+    FigureColumn("audible", "Ear", _EAR),
     FigureColumn("null_db", "Null, dB", _NULL, decibels),
     FigureColumn("real_time", "Speed", _SPEED, times),
     FigureColumn("parameters", "Parameters", "Trainable parameters", lambda n: f"{n:,}"),
@@ -71,8 +78,8 @@ class ComparePanel(ComputedPanel):
     key = "compare"
     title = "Compare"
     help = (
-        "Several presets on the present pluck: errors, null depth and speed. Enter or a double-click loads the "
-        "preset of a row."
+        "All models of this string on the present pluck: errors within the training and past it, what an ear finds, "
+        "null depth and speed. A click or Enter plays the model of a row; Export … saves all of them."
     )
 
     def __init__(self, session: Session, library: Library) -> None:
@@ -84,12 +91,16 @@ class ComparePanel(ComputedPanel):
         presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
+        self._began_s, self._left = 0.0, ""  # when computing began, and the time left in words
+        self._export = tool_button("Export …", "Export the models", "Save all models on this pluck, with the table")
+        self._export.clicked.connect(self._ask_export)
         self._stop = tool_button("Stop")
         self._stop.clicked.connect(self._stop_or_go_on)
         self.table = self.figure = FiguresTable("Presets compared on this pluck", COLUMNS)
-        self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
-        self.table.row_double_clicked.connect(lambda name: session.update(preset=name))
-        self.table.row_entered.connect(lambda name: session.update(preset=name))
+        self.table.setToolTip("Click or Enter plays a model; Delete removes it. Ctrl+C copies the table")
+        self.table.row_clicked.connect(self._hear)
+        self.table.row_entered.connect(self._hear)
+        self.setFocusProxy(self.table)
         self.table.row_deleted.connect(lambda name: self._toggle(name, False))
         self.progress.setAccessibleName("Progress of the comparison")
         self.background.progressed.connect(self._show_progress)
@@ -98,7 +109,7 @@ class ComparePanel(ComputedPanel):
         library.changed.connect(self._library_changed)
         self._fill_menu()
         self._set_computing(None)
-        lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
+        lay_out_table(self, (presets,), self._words, (self._export, self._stop), self.progress, self.table)
 
     def columns(self) -> Columns:
         return self.table.columns()
@@ -127,9 +138,26 @@ class ComparePanel(ComputedPanel):
             self._actions[entry.name] = action
 
     def _sound(self, entry: PresetEntry) -> NoteSound:
-        """The present pluck of a preset's string, at one point."""
+        """The present pluck of a preset's string, with all modes."""
         choices = self.session.choices
-        return replace(sound_of(choices, entry.path), ear=Ear((choices.listen,)))
+        return replace(sound_of(choices, entry.path), ear=replace(choices.ear, solo=0))
+
+    def _hear(self, name: str) -> None:
+        """Play the model of a preset on the present pluck, which stays as it is."""
+        choices = self.session.choices
+        slot = "b" if choices.b == "model" else "a"
+        self.session.update(preset=name, **asdict(choices.pluck), **{slot: "model", "heard": slot})
+        self.pluck_asked.emit()
+
+    def _ask_export(self) -> None:
+        """Ask for an export of the models that are compared by now."""
+        rows = [row for row, fresh in map(self._row, self._entries) if fresh and row.mae is not None]
+        if rows:
+            choices, sounds = self.session.choices, [row.sound for row in rows]
+            lines = [(sound, row.figures) for sound, row in zip(sounds, rows, strict=True) if sound is not None]
+            words = lines[0][0].words(models_word(len(lines)))
+            name = f"{models_word(len(lines))}, place {choices.position:.2f}, {choices.amplitude_mm:.1f} mm"
+            self.export_asked.emit(ComparedModels(words, name, lines))
 
     def _row(self, entry: PresetEntry) -> tuple[ComparedRow, bool]:
         """The row of a preset as far as it is known, and True if it is of the present pluck."""
@@ -157,6 +185,7 @@ class ComparePanel(ComputedPanel):
         entries = sorted(self._entries, key=lambda entry: self._urgency(entry.name))
         missing = [(entry, self._sound(entry)) for entry in entries if not self._row(entry)[1]]
         if missing:
+            self._began_s = time.monotonic()
             self._set_computing(0.0)
             self.compute(lambda job: compare(missing, job))
         self._show()
@@ -167,14 +196,16 @@ class ComparePanel(ComputedPanel):
         return presets_in_use.index(name) if name in presets_in_use else len(presets_in_use)
 
     def _show_progress(self, share: float, _: str, row: ComparedRow | None) -> None:
-        self._set_computing(share)
         if row is not None:
             self._rows[row.name] = row
-            self._show()
+        self._set_computing(share)
+        self._show(row is not None)
 
     def _set_computing(self, share: float | None) -> None:
         """Set the share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
+        left_s = (time.monotonic() - self._began_s) * (1 - share) / share if share else 0.0
+        self._left = f"; about {duration(max(left_s, 1.0))} left" if left_s else ""
         stops = share is not None
         self._stop.setText("Stop" if stops else "Compute again")
         self._stop.setAccessibleName("Stop comparing" if stops else "Compare again")
@@ -202,7 +233,8 @@ class ComparePanel(ComputedPanel):
         self._ask()
         self._show()
 
-    def _show(self) -> None:
+    def _show(self, whole: bool = True) -> None:
+        """Show the rows and the words; not `whole`: the words alone."""
         entries = self._entries
         present = self.session.choices.preset
         names = {entry.name for entry in entries}
@@ -210,17 +242,22 @@ class ComparePanel(ComputedPanel):
             with QSignalBlocker(action):
                 action.setChecked(name in names)
         rows = [self._row(entry) for entry in entries]
-        self.table.show_rows([_table_row(row, fresh, row.name == present) for row, fresh in rows])
+        if whole:
+            self.table.show_rows([_table_row(row, fresh, row.name == present) for row, fresh in rows])
+        self._export.setEnabled(any(of_this and row.mae is not None for row, of_this in rows))
         count, fresh = len(entries), sum(of_this for _, of_this in rows)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
         former = any(row.mae is not None and not of_this for row, of_this in rows)
         self._words.rest(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {self.session.choices.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
+            + self._left,
+            f"{done}{self._left}",
         )
 
 
 def _table_row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
     """The row of the table; `fresh`: of the present pluck; `present`: of the chosen preset."""
-    tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
+    heard = "" if row.audible is None else row.audible.sentence
+    tip = "\n".join(line for line in (row.title, row.file, heard, row.note) if line)
     return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

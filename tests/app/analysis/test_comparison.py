@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,17 @@ import pytest
 import torch
 
 from app.analysis.comparison import compare
+from app.export.wav import WavSettings
 from app.presets.library import PresetEntry, list_presets
 from app.rendering.note_sound import NoteSound
+from engine.compare.audible import audible_errors
 from engine.pluck import Pluck
 from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights, project
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
+from tests.app.sounds import render_sound
+from training.heard import GLIDE_S, RATE_HZ
 
 PLUCK, LISTEN = Pluck(0.35, 4.0), 0.37
 
@@ -56,6 +61,20 @@ def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: An
     assert row.real_time > 0
     assert row.note == ""
     assert job.shares[-1] == 1
+
+
+def test_the_ear_finds_what_it_finds_in_the_exported_sound(entries: list[PresetEntry], job: Any) -> None:
+    """Through the pick-up, unless it is too short for a spectrum."""
+    sound = NoteSound(entries[0].path, PLUCK, 1.0, Ear((LISTEN,), "bridge"))
+    compare([(entries[0], sound), (entries[0], replace(sound, seconds=0.1))], job)
+    row, short = job.results
+    model, truth = (render_sound(sound, source, WavSettings(rate_hz=RATE_HZ)) for source in ("model", "truth"))
+    info = entries[0].info
+    expected = audible_errors(model, truth, RATE_HZ, (info.resonator.omega / (2 * math.pi)).tolist(), GLIDE_S)
+    assert expected.distance_db > 0.01
+    assert row.audible.distance_db == pytest.approx(expected.distance_db, rel=0.01)
+    assert str(row.audible) == row.figures["heard"] and "spectra" in row.audible.sentence
+    assert short.audible is None and short.mae is not None
 
 
 def test_a_bad_preset_is_a_row_and_the_next_one_follows(entries: list[PresetEntry], job: Any) -> None:

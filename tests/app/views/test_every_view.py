@@ -194,6 +194,7 @@ MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
     export_pages.WavForm: lambda: export_pages.WavForm(ExportChoices()),
     export_pages.NotePage: export_at("note"),
     export_pages.PerformancePage: export_at("performance"),
+    export_pages.ModelsPage: export_at("models"),
     export_pages.SamplerPage: export_at("sampler"),
     export_pages.PluginPage: export_at("plugin"),
     export_dialog.ExportDialog: export_at("note"),

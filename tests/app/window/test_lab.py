@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QToolButton
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
 from app.instrument.events import PluckAt
+from app.patches.library import find_patch
 from app.playing.note import PluckVoices
 from app.session.choices import Choices
 from app.views.stage import MARGIN_X
@@ -33,6 +34,7 @@ from tests.app.window.conftest import SPEAKERS, Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, choose, find
 from tests.app.window.panels.conftest import curves
 
+KNOWN = ("gaussian_4k_koopman", "gaussian_4k_koopman_var", "noise_4k_koopman")
 RATE_HZ = 48_000
 TURN_S = 1.0  # of a loop; it is handed over by so much early, so that a busy computer does not come too late
 
@@ -530,3 +532,32 @@ def test_how_long_a_model_is_waited_for_is_shown_and_space_stops_it(
 def test_an_error_that_grew_is_put_into_words(errors: list[float], own: float | None, words: str) -> None:
     assert words in growth_words(errors, own)
     assert bool(growth_words(errors, own)) == bool(words)
+
+
+def test_a_preset_is_plucked_as_trained_and_a_pluck_by_hand_stays_while_models_are_compared(opened: Open) -> None:
+    known, same, noise = (f"nylon_nonlinear_{name}" for name in KNOWN)
+    lab = opened(known, same, noise, "studio_any_string", instrument=find_patch("Classical guitar").patch, face="lab")
+    before, middle = lab.choices.pluck, Pluck(0.5, 5.5, "gaussian", 0.06)
+    button = lab.find(QToolButton, "Pluck as trained")
+    assert not button.isEnabled() and "trained on many strings" in button.toolTip()
+    lab.change(preset=known)
+    assert lab.choices.pluck == middle and button.isEnabled()
+    lab.key(KEY.Key_Z, CONTROL)
+    assert (lab.choices.plays_patch, lab.choices.pluck) == (True, before), "preset and pluck are one step"
+    lab.change(preset=known)
+    lab.wait(lambda: lab.performance.ready)
+    lab.change(position=0.1, amplitude_mm=9.0, shape="triangular")
+    by_hand = lab.choices.pluck
+    lab.change(preset=same)
+    assert lab.choices.pluck == by_hand
+    lab.key(KEY.Key_P, CONTROL | SHIFT)
+    assert (lab.choices.pluck, lab.struck[-1].request.pluck) == (middle, middle)
+    lab.key(KEY.Key_Z, CONTROL)
+    assert lab.choices.pluck == by_hand
+    button.click()
+    assert lab.choices.pluck == middle
+    lab.change(preset=noise)
+    assert not button.isEnabled() and "random shapes" in button.toolTip() and lab.choices.pluck == middle
+    count = len(lab.struck)
+    lab.key(KEY.Key_P, CONTROL | SHIFT)
+    assert len(lab.struck) == count

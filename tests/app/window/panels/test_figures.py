@@ -211,7 +211,8 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     assert [row.key for row in panel.table.rows if row.bold] == ["first"]
     assert words_of(panel) == "2 presets on this pluck, 0.5 s"
     (second,) = (row for row in panel.table.rows if row.key == "second")
-    assert second.tip.splitlines() == [second.values[0], "second.safetensors"]
+    title, file, heard = second.tip.splitlines()
+    assert (title, file) == (second.values[0], "second.safetensors") and "dB apart over 0.5 s" in heard
     order: list[str] = []
     panel.background.progressed.connect(lambda share, text, row: order.append(row.name) if row else None)
     lab.change(preset="second", position=0.6)
@@ -230,8 +231,15 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     menu_of(panel)[1].trigger()  # all
     panel.table.setFocus()
     panel.table.choose("first")
+    lab.change(a="difference", b="truth", position=0.1)  # outside the training
+    before = lab.choices.pluck
     lab.key(KEY.Key_Return, on=panel.table)
-    assert lab.choices.preset == "first"
+    assert (lab.choices.preset, lab.choices.source_heard, lab.choices.pluck) == ("first", "model", before)
+    assert lab.struck[-1].request.pluck == before
+    place = panel.table.visualItemRect(panel.table.item(1, 0)).center()
+    lab.qtbot.mouseClick(panel.table.viewport(), LEFT, pos=place)
+    assert (lab.choices.preset, len(lab.struck)) == ("second", 2)
+    lab.change(preset="first")
     lab.wait(lambda: [row.key for row in panel.table.rows if row.bold] == ["first"])
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "third.safetensors")
     lab.controller.library.refresh()
@@ -241,6 +249,38 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
     lab.change(amplitude_mm=lab.choices.amplitude_mm + 0.5)  # or have read it
     lab.wait(lambda: "second.safetensors" in figures(panel)["second"][-1])
+
+
+def test_all_models_are_exported_from_their_table(lab: Window, tmp_path: Path) -> None:
+    lab.window.action["models"].trigger()
+    panel = lab.panel("compare")
+    assert lab.choices.right_view == "compare" and panel.table.hasFocus()
+    export = find(panel, QToolButton, "Export the models")
+    lab.wait(lambda: computed(panel) == {"first", "second"})
+    assert figures(panel)["first"][3].distance_db == figures(panel)["second"][3].distance_db
+    export.click()
+    dialog = lab.controller.exports.dialog
+    assert dialog.windowTitle() == "Export the models" and "2 models" in dialog.models.what.text()
+    for name in ("", "out"):
+        dialog.models.file.edit.setText(str(tmp_path / name))
+        dialog.models.file.edit.textEdited.emit("")
+        dialog.models["level_match"].setChecked(True)
+        lab.wait(lambda name=name: dialog.save.isEnabled() == bool(name))
+    assert dialog.choices()[0].level_match
+    dialog.save.click()
+    lab.wait(lambda: "Saved" in dialog.state.text())
+    assert len(list((tmp_path / "out").glob("*.wav"))) == 6 and (tmp_path / "out" / "models.csv").is_file()
+    shown = Path(dialog.models.file.edit.text())
+    assert shown.name == "out" and not dialog.save.isEnabled(), "a name that was given stays"
+    dialog.accept()
+    for name in ("2 models, place 0.35, 4.0 mm", "2 models, place 0.35, 4.0 mm (2)"):
+        (tmp_path / name).mkdir()
+    export.click()
+    dialog = lab.controller.exports.dialog
+    dialog.show_subjects({"models": lab.controller.exports.models})
+    assert Path(dialog.models.file.edit.text()).name == "2 models, place 0.35, 4.0 mm (3)"
+    lab.change(amplitude_mm=3.0)
+    lab.wait(lambda: not export.isEnabled())  # of this pluck nothing is computed yet
 
 
 def test_a_pluck_that_comes_back_while_it_is_compared_is_computed(
