@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from PySide6.QtWidgets import QInputDialog
 
@@ -33,6 +34,7 @@ from app.patches.library import (
     save_patch,
 )
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
+from app.patches.scales import SCALES
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
@@ -117,7 +119,8 @@ class PatchDesk(BrowserDesk):
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
-        bar.scala_remove_asked.connect(self.remove_scala)
+        bar.scale_asked.connect(self.choose_scale)
+        bar.scala_file_asked.connect(self._window.action["open"].trigger)
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
@@ -330,26 +333,25 @@ class PatchDesk(BrowserDesk):
         self._song.load(file.name, song.events)
 
     def _tune(self, file: Path) -> None:
-        """Tune the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
-        patch, text = self.patch, read_scala(file)
-        if patch is None:
-            self._notices.report(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
-            return
-        field = "scale"
-        other = patch.tuning.keymap
-        kind = "keyboard mapping"
-        if file.suffix.lower() == ".kbm":
-            field = "keymap"
-            other = patch.tuning.scale
-            kind = "scale"
-        tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
-        self._update(tuning=tuning)
-        joined = f", with the {kind} that it had" if other else ""
-        self._notices.inform(f"{file.name} tunes {patch.name}{joined}.")
+        """Tune the patch by a Scala file."""
+        self._tune_by(file.name, "keymap" if file.suffix.lower() == ".kbm" else "scale", read_scala(file))
 
-    def remove_scala(self) -> None:
-        """Tune the patch in twelve equal steps again."""
-        if (patch := self.patch) is not None:
+    def _tune_by(self, name: str, field: Literal["scale", "keymap"], text: str) -> None:
+        """Tune the patch by a Scala text: a mapping joins the scale that it has, and a scale its mapping."""
+        patch = self.patch
+        if patch is None:
+            self._notices.report(f"{name} tunes an instrument, and none is chosen; choose one first.")
+            return
+        other, kind = (patch.tuning.keymap, "keyboard mapping") if field == "scale" else (patch.tuning.scale, "scale")
+        self._update(tuning=TuningChoice.model_validate({**dict(patch.tuning), field: text}))
+        joined = f", with the {kind} that it had" if other else ""
+        self._notices.inform(f"{name} tunes {patch.name}{joined}.")
+
+    def choose_scale(self, name: str) -> None:
+        """Tune the patch by one of SCALES; "": in twelve equal steps again, without a mapping."""
+        if name:
+            self._tune_by(name, "scale", SCALES[name])
+        elif (patch := self.patch) is not None:
             self._update(tuning=TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose))
 
     def take_body(self, name: str) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Macro, MacroTarget, Patch
+from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
 from tests.app.gestures import LEFT, press_keys, reported
@@ -69,16 +70,22 @@ def test_the_record_button_shows_its_time_and_saves_or_discards_what_is_not_save
         qtbot.mouseClick(bar.record, LEFT)
 
 
-def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+def test_a_scale_is_chosen_shown_by_name_and_left_again(bar: PatchBar, guitar: Patch) -> None:
     scale = "! a.scl\n!\nTwo <b>halves</b>\n 2\n!\n 600.\n 2/1\n"
     keymap = "2\n0\n127\n60\n69\n440\n2\n0\n1\n"
     for tuning in ({"scale": scale}, {"keymap": keymap}, {"scale": scale, "keymap": keymap}):
         bar.show_patch(guitar.model_copy(update={"tuning": TuningChoice(**tuning)}), own=True)
-        assert bar.scala.isVisible()
-        assert ("halves" in bar.scala.toolTip()) == ("scale" in tuning)
-        assert ("keyboard mapping" in bar.scala.toolTip()) == ("keymap" in tuning)
-        assert "<b>" not in bar.scala.toolTip()
-    with qtbot.waitSignal(bar.scala_remove_asked):
-        qtbot.mouseClick(bar.scala, LEFT)
+        assert bar.scale.text() == ("Two <b>halves</b>  ▾" if "scale" in tuning else "Twelve equal steps  ▾")
+        assert ("halves" in bar.scale.toolTip()) == ("scale" in tuning)
+        assert ("keyboard mapping" in bar.scale.toolTip()) == ("keymap" in tuning)
+        assert "<b>" not in bar.scale.toolTip()
+    asked, actions = reported(bar.scale_asked), {each.text(): each for each in bar.scale.menu().actions()}
+    actions["Vallotti"].trigger()
+    bar.show_patch(guitar.model_copy(update={"tuning": TuningChoice(scale=SCALES["Vallotti"])}), own=True)
+    assert bar.scale.text() == "Vallotti  ▾"
+    assert [name for name, each in actions.items() if each.isChecked()] == ["Vallotti"]
+    actions["Twelve equal steps"].trigger()
+    assert asked == ["Vallotti", ""]
     bar.show_patch(guitar, own=True)
-    assert not bar.scala.isVisible()
+    assert bar.scale.text() == "Scale  ▾"
+    assert [name for name, each in actions.items() if each.isChecked()] == ["Twelve equal steps"]
