@@ -124,6 +124,7 @@ class Controller(QObject):
         self.patches = PatchDesk(
             window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
+        self.patches.recordings.set_choices(dict(settings.record))
         window.show_keys(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
@@ -202,6 +203,7 @@ class Controller(QObject):
         session = self.session
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
+            "takes": window.instrument.bar.popup_takes,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
@@ -383,6 +385,7 @@ class Controller(QObject):
                 "choices": self.session.choices,
                 "export": self.exports.choices[0],
                 "sampled": self.exports.choices[1],
+                "record": self.patches.recordings.choices,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.window.look,

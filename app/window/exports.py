@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeyEvent
 
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
+from app.export.takes import RecordedTake
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
@@ -65,7 +66,7 @@ class Exports(QObject):
         if self.dialog is None:
             self.dialog = ExportDialog(self._choices, self._window)
             self.dialog.finished.connect(self._end_dialog)
-            self.dialog.exported.connect(self._forget_saved)
+            self.dialog.exported.connect(self._keep_saved)
             self.dialog.ended.connect(self.ended)
         self.dialog.show_subjects(subjects)
         self.dialog.open_at(kind)
@@ -104,21 +105,24 @@ class Exports(QObject):
 
     def _subjects(self) -> dict[Kind, Any]:
         """The subjects that can be exported now, by kind; None: nothing."""
-        choices, played = self._session.choices, self._recordings.latest
+        choices, take = self._session.choices, self._recordings.offered
         patch = choices.patch
-        preset = None if played is None else self._library.find(played.patch.preset)
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
             "note": heard_note(choices, self._library, self._session.stage.struck),
-            "performance": played and HeardPerformance(played, None if preset is None else preset.path),
+            "performance": None if take is None else self._performance(take),
             "sampler": instrument,
             "plugin": instrument,
         }
 
-    def _forget_saved(self, job: object) -> None:
+    def _performance(self, take: RecordedTake) -> HeardPerformance:
+        preset = self._library.find(take.played.patch.preset)
+        return HeardPerformance(take.played, None if preset is None else preset.path, take.name)
+
+    def _keep_saved(self, job: object) -> None:
         if isinstance(job, PlayedExport):
-            self._recordings.forget(job.played)
+            self._recordings.keep(job)
 
     def _end_dialog(self) -> None:
         assert self.dialog is not None

@@ -18,6 +18,7 @@ from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
+from app.session.record_choices import RecordChoices
 from app.shared.value import Value
 from app.views.look import Look
 from engine import bounds
@@ -46,6 +47,7 @@ class Settings(Value):
     export: ExportChoices = ExportChoices()
     sampled: SampledChoices = SampledChoices()
     abx: AbxChoices = AbxChoices()
+    record: RecordChoices = RecordChoices()
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()
     look: Look = Look()

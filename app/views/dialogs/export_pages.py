@@ -59,10 +59,11 @@ MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 
 @dataclass(frozen=True)
 class HeardPerformance:
-    """A performance, and the file of the preset that plays its patch; None: that is gone."""
+    """A performance, the file of the preset that plays its patch (None: that is gone), and the take's name."""
 
     played: Played
     preset: Path | None
+    name: str
 
 
 @dataclass(frozen=True)
@@ -241,7 +242,7 @@ class PerformancePage(ExportPage):
             self.what.setText(
                 f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
-            self.file.suggest(f"{played.patch.name}.wav")
+            self.file.suggest(f"{subject.name}.wav")
 
     def job(self) -> PlayedExport:
         if self._subject is None:

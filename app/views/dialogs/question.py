@@ -1,8 +1,17 @@
-"""A question before work is lost. No key answers it with the loss: that takes a click, or Tab to its button."""
+"""A question before work is lost: no key answers it with the loss, which takes a click, or Tab to its button.
+
+Another asks for a name.
+"""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QMessageBox, QWidget
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QInputDialog, QMessageBox, QWidget
+
+from engine.plain_text import one_line
+from engine.schema import explained
+from engine.whole_file import WriteError
 
 Roles = QMessageBox.ButtonRole
 
@@ -23,3 +32,31 @@ def ask(parent: QWidget, title: str, question: str, stays: str, loses: str, keep
     box.exec()
     pressed = box.clickedButton()
     return stays if pressed is None else pressed.text()  # None: the app ends
+
+
+def ask_name(
+    parent: QWidget,
+    title: str,
+    question: str,
+    name: str,
+    do: Callable[[str], object],
+    report: Callable[[str], None],
+) -> None:
+    """Ask for a name and do what it is for; again, with the reason, where `do` raises ValueError.
+
+    Args:
+        report: is called with a message where `do` raises WriteError.
+    """
+    reason = ""
+    while True:
+        name, typed_name = QInputDialog.getText(parent, title, f"{reason}{question}", text=name)
+        if not typed_name:
+            return
+        try:
+            do(name)
+            return
+        except ValueError as error:
+            reason = f"{one_line(explained(error))}.\n\n"
+        except WriteError as error:
+            report(one_line(str(error)))
+            return

@@ -6,6 +6,7 @@ Scala scale, octave and velocity of the computer's keys, the number of voices, a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -23,6 +24,7 @@ from PySide6.QtWidgets import (
 from app.patches.patch import Macro, Patch
 from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
+from app.session.record_choices import RecordChoices
 from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.choosers import ChoiceBar
 from app.views.controls.knob import NARROW_WIDTH, Knob
@@ -40,6 +42,7 @@ from app.views.controls.parts import (
     words_label,
 )
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
+from app.views.instrument.takes_menu import TakesMenu
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
@@ -64,8 +67,6 @@ class PatchBar(ChoiceBar):
     revert_asked = Signal()
     compare_asked = Signal(bool)  # whether keys are to play the saved patch
     record_asked = Signal()  # begin or end
-    recording_save_asked = Signal()  # one that is not saved yet
-    recording_discard_asked = Signal()
     scale_asked = Signal(str)  # one of SCALES; "": twelve equal steps, without a keyboard mapping
     scala_file_asked = Signal()
     octave_asked = Signal(int)  # up or down by so many
@@ -80,7 +81,7 @@ class PatchBar(ChoiceBar):
         self._compact = self._tight = self._tuned = False
         self._shows_macros = True
         self._recorded_s: float | None = None
-        self._unsaved = 0
+        self._record_tip = ""
         self.knobs = {field: Knob(OF_PATCHES[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(partial(self.changed.emit, field))
@@ -136,15 +137,18 @@ class PatchBar(ChoiceBar):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.record = tool_button("", kind="record", pressed=self.record_asked, checkable=True)
-        self._unsaved_menu = QMenu(self.record)
-        self._unsaved_menu.addAction("Save the recording …").triggered.connect(self.recording_save_asked)
-        self._unsaved_menu.addAction("Discard the recording").triggered.connect(self.recording_discard_asked)
+        tip = "Takes: play, name, export or delete each. Count-in and metronome (Ctrl+Shift+R)"
+        instant = QToolButton.ToolButtonPopupMode.InstantPopup
+        self.takes_button = tool_button("Takes  ▾", "Takes, count-in and metronome", tip, "small", popupMode=instant)
+        self.takes = TakesMenu(self.takes_button)
+        self.takes_button.setMenu(self.takes)
         keys = self._lower, self.octave, self._higher, self.velocity
-        row = filled(QHBoxLayout(), self.filtered, self.note, self.scale, *keys, self.voices, self.record, spacing=8)
+        row = filled(QHBoxLayout(), self.filtered, self.note, self.scale, *keys, self.voices, spacing=8)
+        filled(row, self.record, self.takes_button)
         row.setStretchFactor(self.note, 1)
         self.show_octave(3, 3, 3)
         self.show_velocity(90)
-        self.show_recording(None)
+        self.show_record_choices(RecordChoices())
         self.show_note("")
         return row
 
@@ -194,6 +198,7 @@ class PatchBar(ChoiceBar):
             self.compare: not self._tight or self.compare.isChecked(),
             self.category: not close,
             self.scale: self._tuned or not self._tight,
+            self.takes_button: not self._tight,
             self.voices: roomy or not self._tight,
         }
         for part, there in fits.items():
@@ -308,40 +313,36 @@ class PatchBar(ChoiceBar):
             widget.setVisible(pitches)
 
     def show_recording(self, seconds: float | None) -> None:
-        """Show the seconds that it has been recording; None: it is not."""
+        """Show the seconds that it has been recording, below 0 in the count-in; None: it is not."""
         self._recorded_s = seconds
         self._show_record()
 
-    def show_unsaved(self, recordings: int) -> None:
-        """Show the number of recordings that wait to be saved.
-
-        While any does, the button saves or discards the latest.
-        """
-        self._unsaved = recordings
+    def show_record_choices(self, choices: RecordChoices) -> None:
+        """Show count-in and metronome."""
+        self.takes.show_choices(choices)
+        bars, tempo = choices.count_in_bars, f"{choices.tempo_bpm} beats a minute"
+        parts = [f"after a count-in of {bars} bar{'s' * (bars > 1)}"] if bars else []
+        parts += ["with the metronome"] if choices.metronome else []
+        self._record_tip = ", ".join(["Record what is played (Ctrl+R)", *parts, *([tempo] if parts else [])])
         self._show_record()
+
+    def popup_takes(self) -> None:
+        """Open the menu of takes, also where its button has no room."""
+        self.takes.popup(self.record.mapToGlobal(self.record.rect().bottomLeft()))
 
     def _show_record(self) -> None:
         seconds, button = self._recorded_s, self.record
-        on, waits = seconds is not None, seconds is None and self._unsaved > 0
-        button.setChecked(on)
-        if seconds is not None:
-            words = (
-                f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}",
-                "End recording",
-                "End the recording and save it",
-            )
-        elif waits:
-            tip = "What was played is not saved yet: save it, or discard it to record again"
-            words = "●  Unsaved  ▾", "Recording that is not saved", tip
+        button.setChecked(seconds is not None)
+        if seconds is None:
+            words = "●  Record", "Record what is played", self._record_tip
         else:
-            words = "●  Record", "Record what is played", "Record what is played"
+            whole = math.floor(seconds)  # below 0 in the count-in
+            time = f"{whole // 60}:{whole % 60:02d}" if whole >= 0 else f"−{-whole}"
+            words = f"■  {time}", "End recording", "End the recording and save it"
         text, name, tip = words
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)
-        modes = QToolButton.ToolButtonPopupMode
-        button.setPopupMode(modes.InstantPopup if waits else modes.DelayedPopup)
-        button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
         self.note.say(text)
