@@ -1,4 +1,4 @@
-"""The takes of a session: recordings in the order in which they were played, with the files that are theirs."""
+"""The takes of a session: recordings as they were played, with the files that are theirs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pydantic import TypeAdapter
 from app.export.journal import Journal
 from app.export.played import Played, recorded_files
 from app.patches.fields import Name
-from engine.schema import explained
 from engine.whole_file import WriteError, explain
 
 _NAME = TypeAdapter(Name)
@@ -22,26 +21,19 @@ class RecordedTake:
     """A recording, kept in memory and, until it is saved, in its journal.
 
     Attributes:
-        name: of its files, without their endings.
         journal: None: it is saved, or could not be begun.
+        name: of its files, without their endings.
         files: WAV and MIDI file that are its own, each with its mark; none until it is saved.
     """
 
     played: Played
     journal: Journal | None
-    name: str = ""
+    name: str
     files: dict[Path, tuple[int, ...]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        self.name = self.name or self.played.patch.name
-
     @property
-    def saved(self) -> bool:
-        return bool(self.files)
-
-    @property
-    def folder(self) -> Path:
-        return next(iter(self.files)).parent
+    def folder(self) -> Path | None:
+        return next((file.parent for file in self.files), None)
 
     def save_to(self, path: Path) -> None:
         """Make the files of a recording that were just written to `path` its own."""
@@ -55,32 +47,27 @@ class RecordedTake:
         self.journal = None
 
     def rename(self, name: str) -> None:
-        """Rename it and its files, or change nothing.
+        """Rename it and its files.
 
         Raises:
-            ValueError: no file can have the name, or one has it; or its own were moved, deleted or replaced.
-            WriteError: the folder cannot be written to.
+            ValueError: no file can have the name, or one has it; its own were moved or changed; or they cannot be
+                renamed. What is renamed by then stays its own.
         """
-        try:
-            name = _NAME.validate_python(name)
-        except ValueError as error:
-            raise ValueError(explained(error)) from error
-        if name == self.name:
-            return
-        wanted = recorded_files(self.folder / f"{name}.wav") if self.saved else ()
-        renamed = dict(zip(self._own_files(), wanted, strict=True))
-        if taken := next((file for file in renamed.values() if file.exists()), None):
-            raise ValueError(f"{taken.name} is there already; choose another name")
-        done: list[Path] = []
+        name = _NAME.validate_python(name)
+        after_names = [file.name for file in recorded_files(Path(f"{name}.wav"))]
+        renamed = {file: file.with_name(after) for file, after in zip(self.files, after_names, strict=False)}
+        for before, after in renamed.items():
+            if _mark(before) != self.files[before]:
+                raise ValueError(f"{before} is not there as it was saved")
+            if after.exists() and before != after:
+                raise ValueError(f"{after.name} is there already; choose another name")
         for before, after in renamed.items():
             try:
                 before.rename(after)
             except OSError as error:
-                for file, back in zip(done, renamed, strict=False):
-                    file.rename(back)
-                raise WriteError(explain(after, error)) from error
-            done.append(after)
-        self.name, self.files = name, {file: _mark(file) for file in done}
+                raise ValueError(explain(after, error)) from error
+            self.files[after] = self.files.pop(before)
+        self.name = name
 
     def delete(self) -> list[Path]:
         """Delete its files, or its journal; return those of its names that are other files by now, which stay.
@@ -88,34 +75,20 @@ class RecordedTake:
         Raises:
             WriteError: one cannot be deleted.
         """
-        others = []
         for file, mark in self.files.items():
-            if (found := _mark(file)) != mark:
-                others += [file] if found else []
-                continue
             try:
-                file.unlink()
+                if _mark(file) == mark:
+                    file.unlink()
             except OSError as error:
                 raise WriteError(explain(file, error)) from error
         self.forget_journal()
-        return others
-
-    def _own_files(self) -> list[Path]:
-        """Its files. Raises ValueError: one of them is not there as it was written."""
-        for file, mark in self.files.items():
-            if _mark(file) != mark:
-                raise ValueError(f"{file} is not there as it was saved; nothing was changed")
-        return list(self.files)
+        return [file for file in self.files if file.exists()]
 
 
-def free_path(folder: Path, name: str, taken: Collection[str]) -> Path:
-    """The path of a take's WAV file in a folder, with a number where one of its files is there.
-
-    Args:
-        taken: names of files that will be there.
-    """
+def free_path(folder: Path, name: str, taken: Collection[Path]) -> Path:
+    """The path of a take's WAV file in a folder, with a number where one of its files is or will be there."""
     number, path = 2, folder / f"{name}.wav"
-    while path.name in taken or any(file.exists() or file.is_symlink() for file in recorded_files(path)):
+    while path in taken or any(file.exists() or file.is_symlink() for file in recorded_files(path)):
         number, path = number + 1, folder / f"{name} {number}.wav"
     return path
 

@@ -185,14 +185,22 @@ class TimedEvent:
 
 
 class Meter(Value):
-    """The beats of a recording that was counted.
+    """The counting of a recording.
 
     Attributes:
         beats: of a bar.
+        metronome: whether it clicks while it is recorded.
     """
 
     tempo_bpm: int = Field(120, ge=30, le=300)
     beats: int = Field(4, ge=1, le=12)
+    count_in_bars: int = Field(0, ge=0, le=2)
+    metronome: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Return True if a recording is counted."""
+        return self.metronome or self.count_in_bars > 0
 
 
 def played_from(recorded: Iterable[TimedEvent], end_s: float, counted: bool = False) -> list[TimedEvent]:

@@ -29,18 +29,10 @@ def _equal(steps: int, chosen: Iterable[int] = (), interval: Fraction = OCTAVE) 
     return [*(cents_of(interval) * step / steps for step in chosen or range(1, steps)), interval]
 
 
-def _in_octave(ratio: Fraction) -> Fraction:
-    """The ratio, moved by octaves to 1 … 2."""
-    while ratio >= OCTAVE:
-        ratio /= OCTAVE
-    while ratio < 1:
-        ratio *= OCTAVE
-    return ratio
-
-
 def _lattice(fifths: Iterable[int], thirds: Iterable[int]) -> list[Pitch]:
     """All sums of so many pure fifths and so many pure thirds, in one octave."""
-    ratios = sorted({_in_octave(FIFTH**fifth * THIRD**third) for fifth in fifths for third in thirds} - {1})
+    ratios = [FIFTH**fifth * THIRD**third for fifth in fifths for third in thirds]
+    ratios = sorted(ratio / OCTAVE ** math.floor(math.log2(ratio)) for ratio in ratios if ratio != 1)
     return [*ratios, OCTAVE]
 
 

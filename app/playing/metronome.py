@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.events import Meter
 from app.playing.playback import AHEAD_S, Beginning
-from app.session.record_choices import RecordChoices
 from engine.voices import Mixer, Voice, plain_program
 
 if TYPE_CHECKING:
@@ -32,13 +32,13 @@ class Metronome:
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
-        self._choices = RecordChoices()
+        self._choices = Meter()
         self._beginning: Beginning | None = None
         self._mixer: Mixer | None = None
         self._next = 0  # beat, from the first of the count-in
         self._voices: list[Voice] = []  # the latest clicks
 
-    def begin(self, choices: RecordChoices) -> float:
+    def begin(self, choices: Meter) -> float:
         """Begin the count-in; return when the first beat after it is, on the clock of `time.monotonic`."""
         self._choices, self._voices = choices, []
         self._beginning = Beginning(self._notes, AHEAD_S + self._notes.buffer_s)

@@ -47,7 +47,7 @@ from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
 from app.stage.session import Session
 from app.views.controls.browser_rows import BrowserRow
-from app.views.dialogs.question import ask_name
+from app.views.dialogs.question import ask_text
 from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
@@ -238,8 +238,7 @@ class PatchDesk(BrowserDesk):
             )
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
-        """Ask for a name and do what it is for, as `ask_name`."""
-        ask_name(self._panel, title, question, name, do, self._notices.report)
+        ask_text(self._panel, title, question, name, lambda name: self._write(lambda: do(name)))
 
     def _write(self, do: Callable[[], None]) -> None:
         """Do what writes a file; report that it cannot be written."""

@@ -22,12 +22,11 @@ from app.playing.notes import Notes
 from app.playing.recorder import EventRecorder
 from app.presets.library import Library
 from app.session.choices import Choices
-from app.session.record_choices import RecordChoices
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.stage.session import Session
 from app.views.background import Background
-from app.views.dialogs.question import ask, ask_name
+from app.views.dialogs.question import ask, ask_text
 from app.views.instrument.takes_menu import TakeRow
 from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
@@ -147,9 +146,9 @@ class Recordings(QObject):
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self.choices = RecordChoices()
+        self.choices = Meter()
         self._metronome = Metronome(notes)
-        self._meter: Meter | None = None  # of the recording under way
+        self._meter: Meter | None = None  # of the recording under way; None: it is not counted
         self._takes: list[RecordedTake] = []
         self._asked: RecordedTake | None = None  # to be exported
         self._place: tuple[Path, WavSettings] | None = None
@@ -158,7 +157,7 @@ class Recordings(QObject):
         self._reading = Background("journals", self)
         self._reading.finished.connect(lambda read: self._ask_about(*read))
         self._reading.failed.connect(self._notices.report)
-        self._waiting: list[tuple[RecordedTake, PlayedExport]] = []  # to be written; the first one is
+        self._waiting: list[PlayedExport] = []  # to be written; the first one is
         self._writing = Background("takes", self, expected=EXPECTED)
         self._writing.finished.connect(lambda words: self._end_writing(words, True))
         self._writing.failed.connect(lambda words, _: self._end_writing(words, False))
@@ -170,12 +169,12 @@ class Recordings(QObject):
     @property
     def latest(self) -> Played | None:
         """The latest one that is not saved."""
-        return next((take.played for take in reversed(self._takes) if not take.saved), None)
+        return next((take.played for take in reversed(self._takes) if not take.files), None)
 
     @property
     def offered(self) -> RecordedTake | None:
         """The take for the export dialog: the one that was asked for, the latest that is not saved, or the last."""
-        unsaved = [take for take in self._takes if not take.saved]
+        unsaved = [take for take in self._takes if not take.files]
         return self._asked if self._asked in self._takes else next(reversed(unsaved or self._takes), None)
 
     @property
@@ -185,7 +184,7 @@ class Recordings(QObject):
 
     def set_choices(self, changes: Mapping[str, object]) -> None:
         """Change fields of `choices`, which the next take has."""
-        self.choices = RecordChoices.model_validate({**dict(self.choices), **changes})
+        self.choices = Meter.model_validate({**dict(self.choices), **changes})
         self._bar.show_record_choices(self.choices)
 
     def record(self) -> None:
@@ -197,7 +196,7 @@ class Recordings(QObject):
             return
         if not self._session.choices.plays_patch:
             self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
-        self._meter = self.choices.meter
+        self._meter = self.choices if self.choices.counts else None
         beat_s = None if self._meter is None else self._metronome.begin(self.choices)
         self._keys.begin_recording(beat_s)
         self._began_s, self._began = beat_s or time.monotonic(), datetime.now().astimezone()
@@ -206,42 +205,40 @@ class Recordings(QObject):
 
     def save(self) -> None:
         """Write the latest take where others were saved; ask for a place where none was."""
-        self._asked = None
-        take = self.offered
-        entry = None if take is None else self._library.find(take.played.patch.preset)
-        if take is None or any(take is waiting for waiting, _ in self._waiting):
+        self._asked, take = None, self.offered
+        if take is None or any(job.played is take.played for job in self._waiting):
             return
+        entry = self._library.find(take.played.patch.preset)
         if self._place is None or entry is None:
             self.save_asked.emit()
             return
         folder, settings = self._place
-        names = {job.path.name for _, job in self._waiting}
-        path = free_path(folder, take.name, names)
-        self._waiting.append((take, PlayedExport(take.played, entry.path, path, settings)))
+        path = free_path(folder, take.name, [job.path for job in self._waiting])
+        self._waiting.append(PlayedExport(take.played, entry.path, path, settings))
         self._write_next()
 
     def keep(self, job: PlayedExport) -> None:
         """Take note of an export: the place of later takes, and the files of one that was not saved."""
         for take in self._takes:
-            if take.played is job.played and (not take.saved or recorded_files(job.path)[0] in take.files):
+            if take.played is job.played and (not take.files or recorded_files(job.path)[0] in take.files):
                 take.save_to(job.path)
                 self._place = job.folder, job.settings
         self._show_takes()
 
     def _write_next(self) -> None:
         if self._waiting and not self._writing.busy:
-            job = self._waiting[0][1]
+            job = self._waiting[0]
             self._writing.start(lambda work: job.run(work.progress))
         self._show_takes()
 
     def _end_writing(self, words: str, well: bool) -> None:
-        take, job = self._waiting.pop(0)
+        job = self._waiting.pop(0)
         if well:
             self.keep(job)
             self._notices.inform(words)
         else:
             self._place = None
-            self._notices.report(f"{words} {take.name} is kept: save it in the menu of takes, where there is room.")
+            self._notices.report(f"{words} The take is kept: save it elsewhere in the menu beside Record.")
         self._write_next()
         self.written.emit(well)
 
@@ -258,7 +255,7 @@ class Recordings(QObject):
             if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(take.folder))):
                 self._notices.inform(f"No file manager was found here; the folder is {take.folder}.")
         elif what == "rename":
-            ask_name(self._bar, "Rename take", "New name:", take.name, take.rename, self._notices.report)
+            ask_text(self._bar, "Rename take", "New name:", take.name, take.rename)
         else:
             self._delete(take)
         self._show_takes()
@@ -269,13 +266,13 @@ class Recordings(QObject):
         if ask(self._bar, "Delete the take?", question, KEEP, DELETE) != DELETE:
             return
         try:
-            if others := take.delete():
-                names = " and ".join(file.name for file in others)
-                self._notices.inform(f"{names} is not as the take was saved, and was not deleted.")
+            others = take.delete()
         except WriteError as error:
             self._notices.report(str(error))
             return
         self._takes.remove(take)
+        for file in others:
+            self._notices.inform(f"{file} is not as the take was saved, and was not deleted.")
 
     def forget_all(self) -> None:
         """Forget all that is not saved, and what is being recorded."""
@@ -283,7 +280,7 @@ class Recordings(QObject):
         self._stop_writing()
         for take in self._takes:
             take.forget_journal()
-        self._takes = [take for take in self._takes if take.saved]
+        self._takes = [take for take in self._takes if take.files]
         self._show_takes()
 
     def close(self) -> None:
@@ -320,7 +317,7 @@ class Recordings(QObject):
             answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
         for played, journal in journals.items():
             if answer == RECOVER:
-                self._takes.append(RecordedTake(played, journal))
+                self._takes.append(RecordedTake(played, journal, played.patch.name))
             elif answer == DISCARD:
                 journal.delete()
             else:
@@ -352,7 +349,7 @@ class Recordings(QObject):
             return
         choices = self._session.choices
         played = Played(patch, tuple(events), *_heard(choices), self._began, self._meter)
-        self._takes.append(RecordedTake(played, journal))
+        self._takes.append(RecordedTake(played, journal, played.patch.name))
         self._show_takes()
         if choices.solo:
             self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
@@ -361,12 +358,14 @@ class Recordings(QObject):
         self._journaling.hear(*_heard(self._session.choices))
 
     def _show_takes(self) -> None:
-        waiting = [take for take, _ in self._waiting]
+        waiting = [job.played for job in self._waiting]
         rows = []
         for take in self._takes:
-            when = "" if take.played.recorded is None else f"{take.played.recorded.astimezone():%H:%M}, "
-            words = f"{when}{_length_words(take.played)}"
-            rows.append(TakeRow(one_line(take.name, LONGEST_NAME), words, take.saved, take in waiting))
+            saved, waits, recorded = bool(take.files), take.played in waiting, take.played.recorded
+            when = "" if recorded is None else f"{recorded.astimezone():%H:%M}, "
+            state = "" if saved else ", being saved" if waits else ", not saved"
+            text = f"{one_line(take.name, LONGEST_NAME)}:  {when}{_length_words(take.played)}{state}"
+            rows.append(TakeRow(text, saved, waits))
         self._bar.takes.show_takes(rows)
         self.unsaved_changed.emit()
 

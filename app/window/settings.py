@@ -16,9 +16,9 @@ from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
+from app.instrument.events import Meter
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
-from app.session.record_choices import RecordChoices
 from app.shared.value import Value
 from app.views.look import Look
 from engine import bounds
@@ -47,7 +47,7 @@ class Settings(Value):
     export: ExportChoices = ExportChoices()
     sampled: SampledChoices = SampledChoices()
     abx: AbxChoices = AbxChoices()
-    record: RecordChoices = RecordChoices()
+    record: Meter = Meter()
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()
     look: Look = Look()

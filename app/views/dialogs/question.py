@@ -1,6 +1,6 @@
 """A question before work is lost: no key answers it with the loss, which takes a click, or Tab to its button.
 
-Another asks for a name.
+Another asks for a text.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QInputDialog, QMessageBox, QWidget
 
 from engine.plain_text import one_line
 from engine.schema import explained
-from engine.whole_file import WriteError
 
 Roles = QMessageBox.ButtonRole
 
@@ -34,29 +33,15 @@ def ask(parent: QWidget, title: str, question: str, stays: str, loses: str, keep
     return stays if pressed is None else pressed.text()  # None: the app ends
 
 
-def ask_name(
-    parent: QWidget,
-    title: str,
-    question: str,
-    name: str,
-    do: Callable[[str], object],
-    report: Callable[[str], None],
-) -> None:
-    """Ask for a name and do what it is for; again, with the reason, where `do` raises ValueError.
-
-    Args:
-        report: is called with a message where `do` raises WriteError.
-    """
+def ask_text(parent: QWidget | None, title: str, question: str, text: str, do: Callable[[str], object]) -> None:
+    """Ask for a text and do what it is for; again, with the reason, where `do` raises ValueError."""
     reason = ""
     while True:
-        name, typed_name = QInputDialog.getText(parent, title, f"{reason}{question}", text=name)
-        if not typed_name:
+        text, typed_text = QInputDialog.getText(parent, title, f"{reason}{question}", text=text)
+        if not typed_text:
             return
         try:
-            do(name)
+            do(text)
             return
         except ValueError as error:
             reason = f"{one_line(explained(error))}.\n\n"
-        except WriteError as error:
-            report(one_line(str(error)))
-            return

@@ -21,10 +21,10 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
+from app.instrument.events import Meter
 from app.patches.patch import Macro, Patch
 from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
-from app.session.record_choices import RecordChoices
 from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.choosers import ChoiceBar
 from app.views.controls.knob import NARROW_WIDTH, Knob
@@ -42,7 +42,7 @@ from app.views.controls.parts import (
     words_label,
 )
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
-from app.views.instrument.takes_menu import TakesMenu
+from app.views.instrument.takes_menu import COUNT_INS, TakesMenu
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
@@ -148,7 +148,7 @@ class PatchBar(ChoiceBar):
         row.setStretchFactor(self.note, 1)
         self.show_octave(3, 3, 3)
         self.show_velocity(90)
-        self.show_record_choices(RecordChoices())
+        self.show_record_choices(Meter())
         self.show_note("")
         return row
 
@@ -317,13 +317,13 @@ class PatchBar(ChoiceBar):
         self._recorded_s = seconds
         self._show_record()
 
-    def show_record_choices(self, choices: RecordChoices) -> None:
+    def show_record_choices(self, choices: Meter) -> None:
         """Show count-in and metronome."""
         self.takes.show_choices(choices)
-        bars, tempo = choices.count_in_bars, f"{choices.tempo_bpm} beats a minute"
-        parts = [f"after a count-in of {bars} bar{'s' * (bars > 1)}"] if bars else []
-        parts += ["with the metronome"] if choices.metronome else []
-        self._record_tip = ", ".join(["Record what is played (Ctrl+R)", *parts, *([tempo] if parts else [])])
+        bars = choices.count_in_bars
+        parts = [f"after {COUNT_INS[bars]}"] * (bars > 0) + ["with the metronome"] * choices.metronome
+        tempo = f" at {choices.tempo_bpm} beats a minute" if parts else ""
+        self._record_tip = f"Record what is played (Ctrl+R){', '.join(['', *parts])}{tempo}"
         self._show_record()
 
     def popup_takes(self) -> None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
-from app.session.record_choices import RecordChoices
+from app.instrument.events import Meter
+from app.shared.typed_number import typed_number
+from app.views.dialogs.question import ask_text
 
 COUNT_INS = ("No count-in", "1 bar", "2 bars")
-TEMPOS_BPM, BEATS = (30, 300), range(1, 13)
+TEMPOS_BPM, BEATS = range(30, 301), range(1, 13)
 OF_TAKE = {
     "play": "Play",
     "rename": "Rename …",
@@ -23,33 +25,21 @@ OF_TAKE = {
 }
 
 
-@dataclass(frozen=True)
-class TakeRow:
-    """A take as it is listed.
+class TakeRow(NamedTuple):
+    """A take as it is listed."""
 
-    Attributes:
-        words: when it was, and how long.
-        waits: it is being saved.
-    """
-
-    name: str
-    words: str
+    text: str
     saved: bool
-    waits: bool
-
-    @property
-    def text(self) -> str:
-        state = "" if self.saved else ", being saved" if self.waits else ", not saved"
-        return f"{self.name}:  {self.words}{state}".replace("&", "&&")
+    being_saved: bool
 
 
 class TakesMenu(QMenu):
     """Gestures emit signals; setters show what became of them."""
 
     asked = Signal(str, int)  # one of OF_TAKE, and the take's number from 0
-    change_asked = Signal(str, object)  # a field of `RecordChoices` and its new value
+    change_asked = Signal(str, object)  # a field of `Meter` and its new value
 
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Takes", parent)
         self._takes: list[QAction] = []
         self._tempo_bpm = 0
@@ -60,7 +50,7 @@ class TakesMenu(QMenu):
         self._tempo = self.addAction("", self._ask_tempo)
         self._beats = self._add_choices("Beats in a bar", "beats", ((beats, str(beats)) for beats in BEATS))
         self.show_takes(())
-        self.show_choices(RecordChoices())
+        self.show_choices(Meter())
 
     def show_takes(self, rows: Sequence[TakeRow]) -> None:
         """Show the takes, the latest first."""
@@ -70,17 +60,17 @@ class TakesMenu(QMenu):
             self.removeAction(action)
         self._takes = []
         for number, row in reversed(list(enumerate(rows))):
-            menu = QMenu(row.text, self)
+            menu = QMenu(row.text.replace("&", "&&"), self)
             for what, text in OF_TAKE.items():
                 action = menu.addAction("Save …" if what == "export" and not row.saved else text)
                 action.triggered.connect(partial(self.asked.emit, what, number))
-                action.setEnabled((row.saved or what != "folder") and not (row.waits and what != "play"))
+                action.setEnabled(what == "play" or not (row.being_saved or (what == "folder" and not row.saved)))
             self._takes.append(menu.menuAction())
         if not rows:
             self._takes.append(QAction("No takes yet", self, enabled=False))
         self.insertActions(self._below, self._takes)
 
-    def show_choices(self, choices: RecordChoices) -> None:
+    def show_choices(self, choices: Meter) -> None:
         self._tempo_bpm = choices.tempo_bpm
         self._metronome.setChecked(choices.metronome)
         self._tempo.setText(f"Tempo: {choices.tempo_bpm} beats a minute …")
@@ -100,8 +90,10 @@ class TakesMenu(QMenu):
         self.change_asked.emit("metronome", self._metronome.isChecked())
 
     def _ask_tempo(self) -> None:
-        tempo_bpm, chosen = QInputDialog.getInt(
-            self.parentWidget(), "Tempo", "Beats a minute:", self._tempo_bpm, *TEMPOS_BPM
-        )
-        if chosen:
-            self.change_asked.emit("tempo_bpm", tempo_bpm)
+        ask_text(self.parentWidget(), "Tempo", "Beats a minute:", str(self._tempo_bpm), self._set_tempo)
+
+    def _set_tempo(self, text: str) -> None:
+        tempo_bpm = typed_number(text)
+        if tempo_bpm is None or tempo_bpm not in TEMPOS_BPM:
+            raise ValueError(f"it must be a whole number of {TEMPOS_BPM[0]} … {TEMPOS_BPM[-1]}")
+        self.change_asked.emit("tempo_bpm", round(tempo_bpm))

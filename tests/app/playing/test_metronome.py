@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from app.instrument.events import Meter
 from app.playing.metronome import Metronome, click
 from app.playing.playback import AHEAD_S
-from app.session.record_choices import RecordChoices
 from engine.voices import Mixer
 
 
@@ -33,7 +33,7 @@ def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at
     room, tempo_bpm, rate_hz = Room(), 97, 48_000
     beat_s = 60 / tempo_bpm
     for metronome, clicks in ((True, 9), (False, 6)):
-        choices = RecordChoices(tempo_bpm=tempo_bpm, beats=3, count_in_bars=2, metronome=metronome)
+        choices = Meter(tempo_bpm=tempo_bpm, beats=3, count_in_bars=2, metronome=metronome)
         room.metronome.begin(choices)
         heard, wanted = room.heard(8.5 * beat_s + AHEAD_S), np.zeros(2**20, np.float32)
         for beat in range(clicks):
@@ -47,7 +47,7 @@ def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at
 
 def test_another_device_continues_with_the_beat() -> None:
     room = Room()
-    room.metronome.begin(RecordChoices(tempo_bpm=60, metronome=True))
+    room.metronome.begin(Meter(tempo_bpm=60, metronome=True))
     room.heard(1.5)
     room.notes.mixer = Mixer(44_100, limited=False)
     room.metronome.look()
