@@ -50,9 +50,9 @@ class Metronome:
         """Hand over the clicks of the next CLICKS_AHEAD_S; to be called a few times a second."""
         while self._beginning is not None:
             due = self._beginning.due(self._next * 60 / self._choices.tempo_bpm)
-            if self._mixer not in (None, due.mixer):  # it has none of the clicks
-                self._next = 0
-            self._mixer = due.mixer
+            if self._mixer is not due.mixer:  # which has none of the clicks
+                self._mixer, self._next = due.mixer, 0
+                continue
             early_s = (due.frame - due.mixer.frames) / due.mixer.rate_hz
             if early_s > CLICKS_AHEAD_S:
                 return
