@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QInputDialog, QMessageBox, QWidget
 
 from engine.plain_text import one_line
@@ -24,6 +25,7 @@ def ask(parent: QWidget, title: str, question: str, stays: str, loses: str, keep
         keeps: the work is kept, and what was asked for is done; Enter presses it. "": Enter presses `stays`.
     """
     box = QMessageBox(QMessageBox.Icon.Question, title, question, parent=parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)  # it may quote a file's name
     box.addButton(loses, Roles.DestructiveRole)
     stay = box.addButton(stays, Roles.RejectRole)
     box.setEscapeButton(stay)
