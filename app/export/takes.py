@@ -23,7 +23,7 @@ class RecordedTake:
     Attributes:
         journal: None: it is saved, or could not be begun.
         name: of its files, without their endings.
-        files: WAV and MIDI file that are its own, each with its mark; none until it is saved.
+        files: its sound and its MIDI file, each with its mark; none until it is saved.
     """
 
     played: Played
@@ -54,8 +54,7 @@ class RecordedTake:
                 renamed. What is renamed by then stays its own.
         """
         name = _NAME.validate_python(name)
-        after_names = [file.name for file in recorded_files(Path(f"{name}.wav"))]
-        renamed = {file: file.with_name(after) for file, after in zip(self.files, after_names, strict=False)}
+        renamed = {file: file.with_name(f"{name}{file.suffix}") for file in self.files}
         for before, after in renamed.items():
             if _mark(before) != self.files[before]:
                 raise ValueError(f"{before} is not there as it was saved")
@@ -85,12 +84,12 @@ class RecordedTake:
         return [file for file in self.files if file.exists()]
 
 
-def free_path(folder: Path, name: str, taken: Collection[Path]) -> Path:
-    """The path of a take's WAV file in a folder, with a number where one of its files is or will be there."""
-    number, path = 2, folder / f"{name}.wav"
-    while path in taken or any(file.exists() or file.is_symlink() for file in recorded_files(path)):
-        number, path = number + 1, folder / f"{name} {number}.wav"
-    return path
+def free_path(path: Path, taken: Collection[Path]) -> Path:
+    """The path of a take's sound, with a number where one of its files is or will be there."""
+    number, free = 2, path
+    while free in taken or any(file.exists() or file.is_symlink() for file in recorded_files(free)):
+        number, free = number + 1, path.with_name(f"{path.stem} {number}{path.suffix}")
+    return free
 
 
 def _mark(file: Path) -> tuple[int, ...]:

@@ -151,7 +151,7 @@ class Recordings(QObject):
         self._meter: Meter | None = None  # of the recording under way; None: it is not counted
         self._takes: list[RecordedTake] = []
         self._asked: RecordedTake | None = None  # to be exported
-        self._place: tuple[Path, WavSettings] | None = None
+        self._place: tuple[Path, WavSettings] | None = None  # of the take that was saved last, its sound and format
         self._journaling = Journaling(self._keys.recorder, self)
         self._journaling.failed.connect(self._notices.report)
         self._reading = Background("journals", self)
@@ -212,17 +212,19 @@ class Recordings(QObject):
         if self._place is None or entry is None:
             self.save_asked.emit()
             return
-        folder, settings = self._place
-        path = free_path(folder, take.name, [job.path for job in self._waiting])
+        before, settings = self._place
+        wanted = before.with_name(f"{take.name}{before.suffix}")
+        path = free_path(wanted, [job.path for job in self._waiting])
         self._waiting.append(PlayedExport(take.played, entry.path, path, settings))
         self._write_next()
 
     def keep(self, job: PlayedExport) -> None:
         """Take note of an export: the place of later takes, and the files of one that was not saved."""
+        sound = recorded_files(job.path)[0]
         for take in self._takes:
-            if take.played is job.played and (not take.files or recorded_files(job.path)[0] in take.files):
-                take.save_to(job.path)
-                self._place = job.folder, job.settings
+            if take.played is job.played and (not take.files or sound in take.files):
+                take.save_to(sound)
+                self._place = sound, job.settings
         self._show_takes()
 
     def _write_next(self) -> None:
