@@ -26,6 +26,7 @@ from app.instrument.events import (
     Bend,
     ControlChange,
     Event,
+    Meter,
     NoteOff,
     NoteOn,
     PatchTurned,
@@ -69,7 +70,7 @@ class Journal:
         self._patch: dict[str, Any] | None = None  # as it was written last
 
     @classmethod
-    def begun(cls, folder: Path, recorded: datetime) -> Journal:
+    def begun(cls, folder: Path, recorded: datetime, meter: Meter | None = None) -> Journal:
         """A new journal, with its first line written. Raises OSError: the folder cannot be made or written."""
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
@@ -77,7 +78,8 @@ class Journal:
             raise PermissionError(None, "its lock cannot be made", str(path))
         journal = cls(path, lock)
         try:
-            journal._append([{"version": VERSION, "recorded": recorded.isoformat()}])
+            counted = {} if meter is None else {"meter": meter.model_dump()}
+            journal._append([{"version": VERSION, "recorded": recorded.isoformat(), **counted}])
         except OSError:
             journal.delete()
             raise
@@ -175,6 +177,7 @@ class _Read:
     source: PlayedSource = "model"
     difference_gain_db: float = 0.0
     end_s: float | None = None
+    meter: Meter | None = None
     _patch: dict[str, Any] | None = None
 
     def take(self, line: bytes) -> bool:
@@ -200,6 +203,7 @@ class _Read:
         if self.recorded is None:
             if data.get("version") != VERSION:
                 raise ValueError("version: made by another version of the program")
+            self.meter = Meter.model_validate(data["meter"]) if "meter" in data else None
             self.recorded = _RECORDED.validate_python(data["recorded"])
         elif "end" in data:
             self.end_s = _number_within(data["end"], (0.0, LONGEST_S))
@@ -238,10 +242,10 @@ class _Read:
             raise ValueError(f"{self.where}: no recording of this program (it is empty)")
         patch = next((entry.event.patch for entry in self.events if isinstance(entry.event, PatchTurned)), None)
         last_s = max((entry.time_s for entry in self.events), default=0.0)
-        events = played_from(self.events, last_s if self.end_s is None else self.end_s)
+        events = played_from(self.events, last_s if self.end_s is None else self.end_s, self.meter is not None)
         if patch is None or not events:
             return None
-        return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded)
+        return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded, self.meter)
 
 
 def _number_within(value: Any, limits: tuple[float, float]) -> Any:

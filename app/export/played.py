@@ -10,7 +10,7 @@ from pathlib import Path
 from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
 from app.export.wav import WavSettings, WrittenSound, form_of, is_within_full_scale, write_wav
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.events import Meter, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
@@ -36,6 +36,7 @@ class Played:
         source: that is heard: "model", "truth" or "difference".
         difference_gain_db: the gain of the difference.
         recorded: when it began; None: not known, or it was not played.
+        meter: its times are from the first beat; None: it was not counted.
     """
 
     patch: Patch
@@ -43,6 +44,7 @@ class Played:
     source: PlayedSource = "model"
     difference_gain_db: float = 0.0
     recorded: datetime | None = None
+    meter: Meter | None = None
 
 
 def write_played(
@@ -136,7 +138,7 @@ class PlayedExport:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
         with result_file(midi_file) as file:
-            file.write(midi_bytes(played.events, played.patch))
+            file.write(midi_bytes(played.events, played.patch, played.meter))
         preset = load_preset(self.preset)
         written = write_played(sound_file, [(played, preset)], midi_file.name, self.settings, progress=progress)
         sound = source_words(played.source, played.difference_gain_db)

@@ -269,7 +269,7 @@ def read_recipe(path: Path) -> SoundRecipe:
     if isinstance(origin, InstrumentSound):
         raise NotesElsewhere(
             f"{path}: is {origin.words}. It has no recipe to render again:"
-            f" its notes are in the MIDI file {origin.midi}, beside it unless it was moved"
+            f" its notes are in the MIDI file {origin.midi}, beside it unless it was moved or renamed"
         )
     return origin
 

@@ -6,8 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import Field
+
 from app.patches.fields import ranged
 from app.patches.patch import Patch
+from app.shared.value import Value
 from engine.kernels import midi
 from engine.pluck import Pluck
 
@@ -30,6 +33,7 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
     **dict.fromkeys(range(midi.SOUND_OFF, 128), "stops or resets what is played"),
 }
 LONGEST_RECORDING = 100_000  # events
+EARLY_S = 0.12  # before the first beat, at which a key that is struck so late in the count-in counts
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 Number = Annotated[int, ranged(0, 127)]  # of MIDI
 Channel = Annotated[int, ranged(0, KEYS)]
@@ -180,15 +184,44 @@ class TimedEvent:
     event: Event
 
 
-def played_from(recorded: Iterable[TimedEvent], end_s: float) -> list[TimedEvent]:
+class Meter(Value):
+    """The counting of a recording.
+
+    Attributes:
+        beats: of a bar.
+        metronome: whether it clicks while it is recorded.
+    """
+
+    tempo_bpm: int = Field(120, ge=30, le=300)
+    beats: int = Field(4, ge=1, le=12)
+    count_in_bars: int = Field(0, ge=0, le=2)
+    metronome: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Return True if a recording is counted."""
+        return self.metronome or self.count_in_bars > 0
+
+
+def played_from(recorded: Iterable[TimedEvent], end_s: float, counted: bool = False) -> list[TimedEvent]:
     """The events until `end_s`, with times in s from the first note on; empty where there was no note.
 
     Keys and pedals that are down are released at its end.
+
+    Args:
+        counted: times are from the first beat, which is at 0. Of what came before it, keys count that were struck
+            less than EARLY_S too early, and wheels, pedals and knobs as they stand.
     """
     events = [timed_event for timed_event in recorded if timed_event.time_s <= end_s]
     events.sort(key=lambda timed_event: timed_event.time_s)
+    if counted:
+        turned = [entry for entry in events if entry.time_s < 0 and isinstance(entry.event, PatchTurned)]
+        early = [entry for entry in events if entry.time_s <= -EARLY_S and isinstance(entry.event, NoteOn | NoteOff)]
+        left_out = {id(entry) for entry in (*turned[:-1], *early)}
+        events = [entry for entry in events if id(entry) not in left_out]
     events += [TimedEvent(end_s, event) for event in releases_for(timed_event.event for timed_event in events)]
     first = next((timed_event.time_s for timed_event in events if isinstance(timed_event.event, NoteOn)), None)
     if first is None:
         return []
-    return [TimedEvent(max(0.0, timed_event.time_s - first), timed_event.event) for timed_event in events]
+    begin_s = 0.0 if counted else first
+    return [TimedEvent(max(0.0, timed_event.time_s - begin_s), timed_event.event) for timed_event in events]

@@ -17,6 +17,7 @@ from app.instrument.events import (
     Bend,
     ControlChange,
     Event,
+    Meter,
     NoteOff,
     NoteOn,
     PatchTurned,
@@ -266,22 +267,26 @@ def _on_channel_of_keys(event: Event) -> Event:
     return event if isinstance(event, PatchTurned | PluckAt) else replace(event, channel=KEYS)
 
 
-def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes:
-    """The bytes of a MIDI file of one track. Times are rounded to 1/1920 s, and changes of the patch left out.
+def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None, meter: Meter | None = None) -> bytes:
+    """The bytes of a MIDI file of one track. Times are rounded to 1/960 of a beat; changes of the patch are left out.
 
     Args:
         patch: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.
+        meter: its tempo and bars; None: 120 beats a minute, and no bars.
     """
     import mido
 
     if patch is not None:
         timed = _with_ranges(timed, patch)
 
-    track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
+    tempo = TEMPO if meter is None else mido.bpm2tempo(meter.tempo_bpm)
+    track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=tempo)])
+    if meter is not None:
+        track.append(mido.MetaMessage("time_signature", numerator=meter.beats, denominator=4))
     tick = 0
     for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
         if message := message_of(entry.event):
-            now = max(tick, round(mido.second2tick(entry.time_s, TICKS, TEMPO)))
+            now = max(tick, round(mido.second2tick(entry.time_s, TICKS, tempo)))
             track.append(mido.Message.from_bytes(message, time=now - tick))
             tick = now
     file = mido.MidiFile(type=0, ticks_per_beat=TICKS)

@@ -253,11 +253,11 @@ class Keys:
             return self.player.heard_through
         return None if self._wanted is None else self._wanted.patch
 
-    def begin_recording(self) -> None:
-        """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
+    def begin_recording(self, beat_s: float | None = None) -> None:
+        """Record events from now on, wheels and pedals as they stand; arguments as of `EventRecorder.begin`."""
         with self._lock:
             player = self.player
-            self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand])
+            self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand], beat_s)
 
     def hear_dry(self, dry: bool) -> None:
         """Leave out body and room, or not, as while models are compared with the truth."""

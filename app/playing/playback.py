@@ -83,7 +83,7 @@ class Playback:
             thread.join(JOIN_S)
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
-        beginning, due = _Beginning(self._clock, self._ahead_s), None
+        beginning, due = Beginning(self._clock, self._ahead_s), None
         nobody_plays = release_all(channels_in(timed_event.event for timed_event in events))
         for timed_event in events:
             due = beginning.wait(timed_event.time_s, self._ahead_s, stopping)
@@ -106,8 +106,8 @@ class Playback:
         return AHEAD_S + self._clock.buffer_s
 
 
-class _Beginning:
-    """The frame at which a list of events begins; if there is another mixer, it continues in that one."""
+class Beginning:
+    """The frame at which a list of events begins, `ahead_s` from now; in another mixer it continues."""
 
     def __init__(self, clock: Notes, ahead_s: float) -> None:
         self._clock, self._mixer = clock, clock.mixer

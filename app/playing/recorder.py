@@ -30,17 +30,22 @@ class EventRecorder:
         self._recorded: list[TimedEvent] | None = None
         self._unfetched: list[TimedEvent] = []
         self._began_s = self.ended_s = 0.0
-        self._reported_full = False
+        self._reported_full = self._counted = False
 
     @property
     def recording(self) -> bool:
         return self._recorded is not None
 
-    def begin(self, first: Iterable[Event]) -> None:
-        """Record from now on, after the events `first`; an earlier recording is discarded."""
+    def begin(self, first: Iterable[Event], beat_s: float | None = None) -> None:
+        """Record from now on, after the events `first`; an earlier recording is discarded.
+
+        Args:
+            beat_s: when the first beat is, as of `time.monotonic`: the recording is counted; see `played_from`.
+        """
         with self._lock:
             self._recorded, self._unfetched = [], []
-            self._began_s, self._reported_full = time.monotonic(), False
+            self._counted, self._reported_full = beat_s is not None, False
+            self._began_s = time.monotonic() if beat_s is None else beat_s
         for event in first:
             self.take(event)
 
@@ -75,9 +80,9 @@ class EventRecorder:
         """End the recording; return events as `played_from` has them. Those not fetched yet can be, up to here."""
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
-            self.ended_s = time.monotonic() - self._began_s
+            self.ended_s = max(0.0, time.monotonic() - self._began_s)
             self._unfetched = [timed_event for timed_event in self._unfetched if timed_event.time_s <= self.ended_s]
-        return played_from(recorded, self.ended_s)
+        return played_from(recorded, self.ended_s, self._counted)
 
     def fetch(self) -> list[TimedEvent]:
         """The events whose time has come since the last call, with times in s from the beginning."""

@@ -134,6 +134,7 @@ class Controller(QObject):
         self.patches = PatchDesk(
             window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
+        self.patches.recordings.set_choices(dict(settings.record))
         window.show_keys(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
@@ -217,6 +218,7 @@ class Controller(QObject):
         session = self.session
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
+            "takes": window.instrument.bar.popup_takes,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
             "plugin": lambda: self.exports.open("plugin"),
@@ -440,6 +442,7 @@ class Controller(QObject):
                 "export": self.exports.choices[0],
                 "sampled": self.exports.choices[1],
                 "files": self.window.places.choices,
+                "record": self.patches.recordings.choices,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.window.look,

@@ -40,7 +40,7 @@ class DragOut(QObject):
         self._background.failed.connect(self._fail)
         handle.wanted.connect(lambda: self._prepare(handle.subject, self._offer))
         handle.copy_asked.connect(lambda: self.copy(handle.subject))
-        recordings.unsaved_changed.connect(lambda: handle.show_recorded(recordings.latest is not None))
+        recordings.unsaved_changed.connect(lambda: handle.show_recorded(recordings.offered is not None))
 
     def copy(self, subject: Handed) -> None:
         """Put the file on the clipboard, from which a file manager pastes it."""

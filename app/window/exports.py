@@ -12,6 +12,7 @@ from app.export.compared import ComparedModels
 from app.export.job import ExportJob
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
+from app.export.takes import RecordedTake
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
@@ -109,23 +110,26 @@ class Exports(QObject):
     @property
     def subjects(self) -> dict[Kind, Any]:
         """The subjects that can be exported now, by kind; None: nothing."""
-        choices, played = self._session.choices, self._recordings.latest
+        choices, take = self._session.choices, self._recordings.offered
         patch = choices.patch
-        preset = None if played is None else self._library.find(played.patch.preset)
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
             "note": heard_note(choices, self._library, self._session.stage.struck),
             "models": self.models,
-            "performance": played and HeardPerformance(played, None if preset is None else preset.path),
+            "performance": None if take is None else self._performance(take),
             "sampler": instrument,
             "plugin": instrument,
         }
 
+    def _performance(self, take: RecordedTake) -> HeardPerformance:
+        preset = self._library.find(take.played.patch.preset)
+        return HeardPerformance(take.played, None if preset is None else preset.path, take.name)
+
     def _exported(self, job: ExportJob) -> None:
         self._window.notices.inform(f"Saved {job.file}.", file=job.file)
         if isinstance(job, PlayedExport):
-            self._recordings.forget(job.played)
+            self._recordings.keep(job)
 
     def _end_dialog(self) -> None:
         assert self.dialog is not None

@@ -29,6 +29,7 @@ class Leaving(QObject):
         self._asking = False
         window.may_close = self.may_close
         exports.ended.connect(self._export_ended)
+        recordings.written.connect(self._export_ended)
 
     def may_close(self) -> bool:
         """Return True if the window may be closed now; ask where work would be lost."""
@@ -66,7 +67,7 @@ class Leaving(QObject):
             self._recordings.end()
             self._waits = self._recordings.latest is not None  # else nothing was played
             if self._waits:
-                self._exports.open("performance")
+                self._recordings.save()
             return not self._waits
         return False
 

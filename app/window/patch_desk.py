@@ -7,11 +7,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
-from PySide6.QtWidgets import QInputDialog
+from PySide6.QtCore import Signal
 
+from app.export.takes import RecordedTake
 from app.instrument.bodies import body_titles
-from app.instrument.events import KEYS, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, ControlChange, Event, NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.instrument.facts import (
     facts_of,
     facts_of_drum,
@@ -34,10 +36,11 @@ from app.patches.library import (
     write_patch,
 )
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
+from app.patches.scales import SCALES
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
-from app.playing.playback import Playback
+from app.playing.playback import Due, Playback
 from app.presets.library import Library
 from app.presets.words import judged
 from app.rendering import Take
@@ -46,6 +49,7 @@ from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
 from app.stage.session import Session
 from app.views.controls.browser_rows import BrowserRow
+from app.views.dialogs.question import ask_text
 from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
@@ -74,6 +78,8 @@ class PatchDesk(BrowserDesk):
         recordings: of what is played.
     """
 
+    _knob_turned = Signal(object)  # a patch, in a take that is played; emitted in the playback's thread
+
     def __init__(
         self,
         window: MainWindow,
@@ -93,10 +99,12 @@ class PatchDesk(BrowserDesk):
         self._entries: list[PatchEntry] = []
         self._sounding: frozenset[int] = frozenset()  # MIDI keys of the patch for which the octave was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
-        self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
+        self._playback = Playback(self._play_event, performance.notes, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
         self._judged: object = None  # all that the words about the training depend on, as they are
-        self.recordings = Recordings(window, session, performance.notes.keys)
+        self._take: RecordedTake | None = None  # that is played as soon as its instrument can be
+        self._turned = False  # whether keys play the patch as a knob was turned in the take
+        self.recordings = Recordings(window, session, performance.notes, library)
         self.reload()
         self._connect()
 
@@ -118,11 +126,14 @@ class PatchDesk(BrowserDesk):
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
-        bar.scala_remove_asked.connect(self.remove_scala)
+        bar.scale_asked.connect(self.choose_scale)
+        bar.scala_file_asked.connect(self._window.action["open"].trigger)
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
         bar.body_chosen.connect(self._choose_body)
+        self._knob_turned.connect(self._hear_turned)
+        self.recordings.play_asked.connect(self.play_take)
         browser.played.connect(self.audition)
         browser.delete_asked.connect(self.delete)
         browser.rename_asked.connect(self.rename)
@@ -256,17 +267,7 @@ class PatchDesk(BrowserDesk):
         self._notices.inform(f"{patch.name} was saved as {file}.", file=file)
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
-        """Ask for a name and do what it is for; again, with the reason, where the name is impossible or taken."""
-        reason = ""
-        while True:
-            name, typed_name = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
-            if not typed_name:
-                return
-            try:
-                self._write(partial(do, name))
-                return
-            except ValueError as error:
-                reason = f"{one_line(explained(error))}.\n\n"
+        ask_text(self._panel, title, question, name, lambda name: self._write(lambda: do(name)))
 
     def _write(self, do: Callable[[], None]) -> None:
         """Do what writes a file; report that it cannot be written."""
@@ -362,27 +363,57 @@ class PatchDesk(BrowserDesk):
         self._session.play_patch()
         self._song.load(file.name, song.events)
 
-    def _tune(self, file: Path) -> None:
-        """Tune the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
-        patch, text = self.patch, read_scala(file)
-        if patch is None:
-            self._notices.report(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
-            return
-        field = "scale"
-        other = patch.tuning.keymap
-        kind = "keyboard mapping"
-        if file.suffix.lower() == ".kbm":
-            field = "keymap"
-            other = patch.tuning.scale
-            kind = "scale"
-        tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
-        self._update(tuning=tuning)
-        joined = f", with the {kind} that it had" if other else ""
-        self._notices.inform(f"{file.name} tunes {patch.name}{joined}.")
+    def play_take(self, take: RecordedTake) -> None:
+        """Play a take through its instrument as it was, which is chosen, once that can be played."""
+        self.stop()
+        self._session.play_patch()
+        if self.patch != take.played.patch:
+            self._session.update(instrument=take.played.patch)
+        self._take = take
 
-    def remove_scala(self) -> None:
-        """Tune the patch in twelve equal steps again."""
-        if (patch := self.patch) is not None:
+    def _play_waiting(self) -> None:
+        """Begin the take that waits; leave a knob that was turned in one that has ended."""
+        take = self._take
+        if take is not None and self.patch != take.played.patch:
+            self._take = None  # another instrument was chosen meanwhile
+        elif take is not None and self._performance.notes.keys.player is not None:
+            self._take = None
+            self._song.load(one_line(take.name), take.played.events)
+        elif self._turned and not self._playback.playing:
+            self._turned = False
+            self._performance.hear_patch(None)
+
+    def _play_event(self, event: Event, due: Due | None = None) -> None:
+        """Play an event of a file or a take. In the playback's thread."""
+        if isinstance(event, PatchTurned):
+            self._knob_turned.emit(event.patch)
+        else:
+            self._instruments.play(event, due)
+
+    def _hear_turned(self, patch: Patch) -> None:
+        self._turned = True
+        self._performance.hear_patch(patch)
+
+    def _tune(self, file: Path) -> None:
+        """Tune the patch by a Scala file."""
+        self._tune_by(file.name, "keymap" if file.suffix.lower() == ".kbm" else "scale", read_scala(file))
+
+    def _tune_by(self, name: str, field: Literal["scale", "keymap"], text: str) -> None:
+        """Tune the patch by a Scala text: a mapping joins the scale that it has, and a scale its mapping."""
+        patch = self.patch
+        if patch is None:
+            self._notices.report(f"{name} tunes an instrument, and none is chosen; choose one first.")
+            return
+        other, kind = (patch.tuning.keymap, "keyboard mapping") if field == "scale" else (patch.tuning.scale, "scale")
+        self._update(tuning=TuningChoice.model_validate({**dict(patch.tuning), field: text}))
+        joined = f", with the {kind} that it had" if other else ""
+        self._notices.inform(f"{name} tunes {patch.name}{joined}.")
+
+    def choose_scale(self, name: str) -> None:
+        """Tune the patch by one of SCALES; "": in twelve equal steps again, without a mapping."""
+        if name:
+            self._tune_by(name, "scale", SCALES[name])
+        elif (patch := self.patch) is not None:
             self._update(tuning=TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose))
 
     def take_body(self, name: str) -> None:
@@ -397,7 +428,8 @@ class PatchDesk(BrowserDesk):
         self._notices.inform(f"{self.patch.name} now has the body {name}.")
 
     def stop(self) -> None:
-        """Stop the MIDI file that is played, or the note of an audition."""
+        """Stop the MIDI file or the take that is played, or the note of an audition."""
+        self._take = None
         self._song.stop()
         self._playback.stop()
 
@@ -509,12 +541,13 @@ class PatchDesk(BrowserDesk):
     def tick(self) -> None:
         """Show the MIDI file's position and which keys sound; called by the window's timer."""
         self._song.tick()
+        self._play_waiting()
+        self.recordings.tick(time.monotonic())
         if not self._panel.isVisible():
             return
         keys = self._performance.notes.keys
         self._panel.show_sounding(keys.sounding(), keys.sounding_notes())
         self._panel.bar.show_voices(self._performance.notes.ringing)
-        self.recordings.tick(time.monotonic())
 
     def close(self) -> None:
         """End the playback and a recording, which is kept; may be called again."""

@@ -1,33 +1,43 @@
-"""Recordings of what is played through the patch. Unsaved ones are kept, in memory and on disk."""
+"""Recordings of what is played through the patch: the takes of a session, of which unsaved ones are kept on disk."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime
+from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from app.export.job import EXPECTED
 from app.export.journal import Journal, left_journals, recordings_folder
-from app.export.played import Played
-from app.instrument.events import NoteOn, PatchTurned
-from app.playing.keys import Keys
+from app.export.played import Played, PlayedExport
+from app.export.takes import RecordedTake, free_path
+from app.export.wav import WavSettings
+from app.instrument.events import Meter, NoteOn, PatchTurned
+from app.playing.metronome import Metronome
+from app.playing.notes import Notes
 from app.playing.recorder import EventRecorder
+from app.presets.library import Library
 from app.session.choices import Choices
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.stage.session import Session
 from app.views.background import Background
-from app.views.dialogs.question import ask
+from app.views.dialogs.question import ask, ask_text
+from app.views.file_manager import reveal
+from app.views.instrument.takes_menu import TakeRow
 from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
+from engine.whole_file import WriteError
 
 WRITE_EVERY_S = 0.25  # to disk
 LONGEST_NAME = 60  # characters of an instrument
 RECOVER = "Recover"
 LATER = "Later"
 DISCARD = "Discard"
+KEEP, DELETE = "Keep", "Delete"
 
 
 class Journaling(QObject):
@@ -51,13 +61,13 @@ class Journaling(QObject):
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def begin(self, recorded: datetime) -> None:
+    def begin(self, recorded: datetime, meter: Meter | None) -> None:
         """A recording has begun."""
         self._journal, self._broken = None, False
         self._written = ("model", 0.0)
         self._stop.clear()
         try:
-            self._journal = Journal.begun(recordings_folder(), recorded)
+            self._journal = Journal.begun(recordings_folder(), recorded, meter)
         except OSError as error:
             self._fail(error)
             return
@@ -113,87 +123,179 @@ class Journaling(QObject):
 
 
 class Recordings(QObject):
-    """Recordings, which live in the window's thread, as long as the window.
+    """The takes of this session, which live in the window's thread, as long as the window.
 
-    The button of the instrument's bar records, ends, saves and discards.
+    The button of the instrument's bar records and ends; the menu beside it has all takes. The first that is saved
+    chooses the place, where later ones are written as soon as they end. Until it is written, a take is kept in memory
+    and in its journal on disk, which `offer_left` finds after the end of the process.
 
-    A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
-    as long, also past the end of the process, and `offer_left` finds it.
+    Attributes:
+        choices: the settings of count-in and metronome.
     """
 
-    save_asked = Signal()  # of the latest one
+    save_asked = Signal()  # of the one that is offered: its place is to be chosen
+    play_asked = Signal(object)  # a RecordedTake
     unsaved_changed = Signal()
+    written = Signal(bool)  # a take where the others are, well or not
 
-    def __init__(self, window: MainWindow, session: Session, keys: Keys) -> None:
+    def __init__(self, window: MainWindow, session: Session, notes: Notes, library: Library) -> None:
         super().__init__(window)
         self._session = session
-        self._keys = keys
+        self._keys = notes.keys
+        self._library = library
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self._unsaved: dict[Played, Journal | None] = {}  # in their order
-        self._journaling = Journaling(keys.recorder, self)
+        self.choices = Meter()
+        self._metronome = Metronome(notes)
+        self._meter: Meter | None = None  # of the recording under way; None: it is not counted
+        self._takes: list[RecordedTake] = []
+        self._asked: RecordedTake | None = None  # to be exported
+        self._place: tuple[Path, WavSettings] | None = None  # of the take that was saved last, its sound and format
+        self._journaling = Journaling(self._keys.recorder, self)
         self._journaling.failed.connect(self._notices.report)
         self._reading = Background("journals", self)
         self._reading.finished.connect(lambda read: self._ask_about(*read))
         self._reading.failed.connect(self._notices.report)
+        self._waiting: list[PlayedExport] = []  # to be written; the first one is
+        self._writing = Background("takes", self, expected=EXPECTED)
+        self._writing.finished.connect(lambda words: self._end_writing(words, True))
+        self._writing.failed.connect(lambda words, _: self._end_writing(words, False))
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
-        bar.recording_save_asked.connect(self.save_asked)
-        bar.recording_discard_asked.connect(self.discard)
+        bar.takes.asked.connect(self._do)
+        bar.takes.change_asked.connect(lambda field, value: self.set_choices({field: value}))
 
     @property
     def latest(self) -> Played | None:
         """The latest one that is not saved."""
-        return next(reversed(self._unsaved), None)
+        return next((take.played for take in reversed(self._takes) if not take.files), None)
+
+    @property
+    def offered(self) -> RecordedTake | None:
+        """The take for the export dialog: the one that was asked for, the latest that is not saved, or the last."""
+        unsaved = [take for take in self._takes if not take.files]
+        return self._asked if self._asked in self._takes else next(reversed(unsaved or self._takes), None)
 
     @property
     def unsaved(self) -> bool:
         """Return True if anything was played that is not saved, or is being recorded."""
-        return bool(self._unsaved) or self._keys.recorder.recording
+        return self.latest is not None or self._keys.recorder.recording
+
+    def set_choices(self, changes: Mapping[str, object]) -> None:
+        """Change fields of `choices`, which the next take has."""
+        self.choices = Meter.model_validate({**dict(self.choices), **changes})
+        self._bar.show_record_choices(self.choices)
 
     def record(self) -> None:
-        """Begin to record; or end it and have it saved, as a recording that is not saved yet."""
+        """Begin to record, after the count-in; or end it and have it saved, as a take that is not saved yet."""
         if self._keys.recorder.recording:
             self.end()
-            if self._unsaved:
-                self.save_asked.emit()
-        elif self._unsaved:
+            if self.latest is not None:
+                self.save()
+            return
+        if not self._session.choices.plays_patch:
+            self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
+        self._meter = self.choices if self.choices.counts else None
+        beat_s = None if self._meter is None else self._metronome.begin(self.choices)
+        self._keys.begin_recording(beat_s)
+        self._began_s, self._began = beat_s or time.monotonic(), datetime.now().astimezone()
+        self._journaling.begin(self._began, self._meter)
+        self._choices_changed(frozenset())
+
+    def save(self) -> None:
+        """Write the latest take where others were saved; ask for a place where none was."""
+        self._asked, take = None, self.offered
+        if take is None or any(job.played is take.played for job in self._waiting):
+            return
+        entry = self._library.find(take.played.patch.preset)
+        if self._place is None or entry is None:
             self.save_asked.emit()
+            return
+        before, settings = self._place
+        wanted = before.with_name(f"{take.name}{before.suffix}")
+        path = free_path(wanted, [job.path for job in self._waiting])
+        self._waiting.append(PlayedExport(take.played, entry.path, path, settings))
+        self._write_next()
+
+    def keep(self, job: PlayedExport) -> None:
+        """Take note of an export: the place of later takes, and the files of one that was not saved."""
+        for take in self._takes:
+            if take.played is job.played and (not take.files or job.file in take.files):
+                take.save_to(job.file)
+                self._place = job.file, job.settings
+        self._show_takes()
+
+    def _write_next(self) -> None:
+        if self._waiting and not self._writing.busy:
+            job = self._waiting[0]
+            self._writing.start(lambda work: job.run(work.progress))
+        self._show_takes()
+
+    def _end_writing(self, words: str, well: bool) -> None:
+        job = self._waiting.pop(0)
+        if well:
+            self.keep(job)
+            self._notices.inform(words, file=job.file)
         else:
-            self._keys.begin_recording()
-            if not self._session.choices.plays_patch:
-                self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
-            self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
-            self._journaling.begin(self._began)
-            self._choices_changed(frozenset())
+            self._place = None
+            self._notices.report(f"{words} The take is kept: save it elsewhere in the menu beside Record.")
+        self._write_next()
+        self.written.emit(well)
 
-    def discard(self) -> None:
-        """Forget the latest recording."""
-        if (latest := self.latest) is not None:
-            self.forget(latest)
+    def _do(self, what: str, number: int) -> None:
+        """Do what was chosen for a take of the menu."""
+        take = self._takes[number]
+        if what == "play":
+            self.play_asked.emit(take)
+        elif what == "export":
+            self._asked = take
+            self.unsaved_changed.emit()
+            self.save_asked.emit()
+        elif what == "folder":
+            reveal(next(iter(take.files)), self._notices.report)
+        elif what == "rename":
+            ask_text(self._bar, "Rename take", "New name:", take.name, take.rename)
+        else:
+            self._delete(take)
+        self._show_takes()
 
-    def forget(self, played: Played) -> None:
-        """Forget a recording that is written, or not wanted."""
-        if played in self._unsaved:
-            journal = self._unsaved.pop(played)
-            if journal is not None:
-                journal.delete()
-            self._show_unsaved()
+    def _delete(self, take: RecordedTake) -> None:
+        files = " and ".join(file.name for file in take.files)
+        question = f"{files} will be deleted." if files else f"{take.name} is not saved, and will be lost."
+        if ask(self._bar, "Delete the take?", question, KEEP, DELETE) != DELETE:
+            return
+        try:
+            others = take.delete()
+        except WriteError as error:
+            self._notices.report(str(error))
+            return
+        self._takes.remove(take)
+        for file in others:
+            self._notices.inform(f"{file} is not as the take was saved, and was not deleted.")
 
     def forget_all(self) -> None:
         """Forget all that is not saved, and what is being recorded."""
         self.end()
-        for played in list(self._unsaved):
-            self.forget(played)
+        self._stop_writing()
+        for take in self._takes:
+            take.forget_journal()
+        self._takes = [take for take in self._takes if take.files]
+        self._show_takes()
 
     def close(self) -> None:
         """Leave what is not saved to the next start; may be called again."""
         self._reading.close()
         self.end()
-        for journal in self._unsaved.values():
-            if journal is not None:
-                journal.close()
+        self._stop_writing()
+        self._writing.close()
+        for take in self._takes:
+            if take.journal is not None:
+                take.journal.close()
+
+    def _stop_writing(self) -> None:
+        self._writing.cancel()
+        self._waiting = []
 
     def offer_left(self) -> None:
         """Read what an earlier run has left, in the background, then ask whether to recover or discard it."""
@@ -215,17 +317,18 @@ class Recordings(QObject):
             answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
         for played, journal in journals.items():
             if answer == RECOVER:
-                self._unsaved[played] = journal
+                self._takes.append(RecordedTake(played, journal, played.patch.name))
             elif answer == DISCARD:
                 journal.delete()
             else:
                 journal.close()
         if answer == RECOVER:
-            self._show_unsaved()
+            self._show_takes()
             self.save_asked.emit()
 
     def tick(self, now_s: float) -> None:
-        """Show how long it has been recording. `now_s`: of `time.monotonic`."""
+        """Continue with the clicks, and show how long it has been recording. `now_s`: of `time.monotonic`."""
+        self._metronome.look()
         if self._keys.recorder.recording:
             self._bar.show_recording(now_s - self._began_s)
 
@@ -233,6 +336,7 @@ class Recordings(QObject):
         """End the recording that is being made, if any; it is kept, and not saved yet."""
         if not self._keys.recorder.recording:
             return
+        self._metronome.end()
         events = self._keys.recorder.end()
         journal = self._journaling.end()
         self._bar.show_recording(None)
@@ -244,16 +348,25 @@ class Recordings(QObject):
             self._notices.inform("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
-        self._unsaved[Played(patch, tuple(events), *_heard(choices), self._began)] = journal
-        self._show_unsaved()
+        played = Played(patch, tuple(events), *_heard(choices), self._began, self._meter)
+        self._takes.append(RecordedTake(played, journal, played.patch.name))
+        self._show_takes()
         if choices.solo:
             self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
 
     def _choices_changed(self, _: frozenset[str]) -> None:
         self._journaling.hear(*_heard(self._session.choices))
 
-    def _show_unsaved(self) -> None:
-        self._bar.show_unsaved(len(self._unsaved))
+    def _show_takes(self) -> None:
+        waiting = [job.played for job in self._waiting]
+        rows = []
+        for take in self._takes:
+            saved, waits, recorded = bool(take.files), take.played in waiting, take.played.recorded
+            when = "" if recorded is None else f"{recorded.astimezone():%H:%M}, "
+            state = "" if saved else ", being saved" if waits else ", not saved"
+            text = f"{one_line(take.name, LONGEST_NAME)}:  {when}{_length_words(take.played)}{state}"
+            rows.append(TakeRow(text, saved, waits))
+        self._bar.takes.show_takes(rows)
         self.unsaved_changed.emit()
 
 
@@ -288,8 +401,11 @@ def _heard(choices: Choices) -> tuple[PlayedSource, float]:
 
 def _words(played: Played) -> str:
     """A recording in a line: when, through what, how long, how many notes."""
+    when = "" if played.recorded is None else f"{played.recorded.astimezone():%Y-%m-%d %H:%M}, "
+    return f"{when}{one_line(played.patch.name, LONGEST_NAME)}: {_length_words(played)}"
+
+
+def _length_words(played: Played) -> str:
     events = [timed_event.event for timed_event in played.events]
     notes = sum(isinstance(event, NoteOn) and event.velocity > 0 for event in events)
-    when = "" if played.recorded is None else f"{played.recorded.astimezone():%Y-%m-%d %H:%M}, "
-    name = one_line(played.patch.name, LONGEST_NAME)
-    return f"{when}{name}: {duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"
+    return f"{duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"

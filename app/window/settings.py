@@ -16,6 +16,7 @@ from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
+from app.instrument.events import Meter
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
 from app.shared.value import Value
@@ -48,6 +49,7 @@ class Settings(Value):
     sampled: SampledChoices = SampledChoices()
     abx: AbxChoices = AbxChoices()
     files: FileChoices = FileChoices()
+    record: Meter = Meter()
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()
     look: Look = Look()

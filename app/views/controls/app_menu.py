@@ -41,6 +41,7 @@ MENUS: dict[str, tuple[MenuEntry, ...]] = {
         MenuEntry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
         MenuEntry("recent", "Recent files"),
         MenuEntry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
+        MenuEntry("takes", "Takes and metronome …", "Ctrl+Shift+R", "takes: play, name, export; count-in, metronome"),
         MenuEntry("export", "Export …", "Ctrl+E", "export WAV or FLAC"),
         MenuEntry(
             "sampler", "Export for samplers …", "Ctrl+Shift+E", "export the instrument for samplers (SFZ, SoundFont)"

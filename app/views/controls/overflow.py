@@ -48,6 +48,8 @@ class Overflow(QToolButton):
                 action = QAction(part.text(), menu, checkable=part.isCheckable(), checked=part.isChecked())
                 action.setEnabled(part.isEnabled())
                 action.setToolTip(plain_tip(part.toolTip()))
+                if isinstance(part, QToolButton) and part.menu() is not None:
+                    action.setMenu(part.menu())
                 action.triggered.connect(part.click)
                 menu.addAction(action)
         menu.addSeparator()

@@ -68,16 +68,17 @@ MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 
 @dataclass(frozen=True)
 class HeardPerformance:
-    """A performance, and the file of the preset that plays its patch; None: that is gone."""
+    """A performance, the file of the preset that plays its patch (None: that is gone), and the take's name."""
 
     played: Played
     preset: Path | None
+    name: str
 
     def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
         """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
         if self.preset is None:
             raise ValueError(f"The preset {self.played.patch.preset}, which plays the instrument, was not found.")
-        name = name or f"{self.played.patch.name}{choices.ending}"
+        name = name or f"{self.name}{choices.ending}"
         return PlayedExport(self.played, self.preset, folder / name, choices.wav)
 
 
@@ -270,7 +271,7 @@ class PerformancePage(ExportPage):
                 f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
             self._wav.follow(self.file)
-            self.file.suggest(played.patch.name + self.file.suffix)
+            self.file.suggest(subject.name + self.file.suffix)
 
     def job(self) -> PlayedExport:
         if self._subject is None:

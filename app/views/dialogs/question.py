@@ -1,8 +1,17 @@
-"""A question before work is lost. No key answers it with the loss: that takes a click, or Tab to its button."""
+"""A question before work is lost: no key answers it with the loss, which takes a click, or Tab to its button.
+
+Another asks for a text.
+"""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QMessageBox, QWidget
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QInputDialog, QMessageBox, QWidget
+
+from engine.plain_text import one_line
+from engine.schema import explained
 
 Roles = QMessageBox.ButtonRole
 
@@ -16,6 +25,7 @@ def ask(parent: QWidget, title: str, question: str, stays: str, loses: str, keep
         keeps: the work is kept, and what was asked for is done; Enter presses it. "": Enter presses `stays`.
     """
     box = QMessageBox(QMessageBox.Icon.Question, title, question, parent=parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)  # it may quote a file's name
     box.addButton(loses, Roles.DestructiveRole)
     stay = box.addButton(stays, Roles.RejectRole)
     box.setEscapeButton(stay)
@@ -23,3 +33,17 @@ def ask(parent: QWidget, title: str, question: str, stays: str, loses: str, keep
     box.exec()
     pressed = box.clickedButton()
     return stays if pressed is None else pressed.text()  # None: the app ends
+
+
+def ask_text(parent: QWidget | None, title: str, question: str, text: str, do: Callable[[str], object]) -> None:
+    """Ask for a text and do what it is for; again, with the reason, where `do` raises ValueError."""
+    reason = ""
+    while True:
+        text, typed_text = QInputDialog.getText(parent, title, f"{reason}{question}", text=text)
+        if not typed_text:
+            return
+        try:
+            do(text)
+            return
+        except ValueError as error:
+            reason = f"{one_line(explained(error))}.\n\n"

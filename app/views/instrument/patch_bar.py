@@ -6,6 +6,7 @@ Scala scale, octave and velocity of the computer's keys, the number of voices, a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -20,7 +21,9 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
+from app.instrument.events import Meter
 from app.patches.patch import Macro, Patch
+from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.choosers import ChoiceBar
@@ -33,17 +36,21 @@ from app.views.controls.parts import (
     faint,
     filled,
     refill,
+    show_kind,
     tool_button,
     vertical_rule,
     words_label,
 )
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
+from app.views.instrument.takes_menu import COUNT_INS, TakesMenu
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
 ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
+SCALE_LETTERS, TIGHT_LETTERS = 18, 8  # of its name on the button
+EQUAL_STEPS = "Twelve equal steps"
 SAID_MS = 2_500  # a text that says why the octave stops or moves
 COMPARE_TIP = (
     "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
@@ -60,9 +67,8 @@ class PatchBar(ChoiceBar):
     revert_asked = Signal()
     compare_asked = Signal(bool)  # whether keys are to play the saved patch
     record_asked = Signal()  # begin or end
-    recording_save_asked = Signal()  # one that is not saved yet
-    recording_discard_asked = Signal()
-    scala_remove_asked = Signal()  # the Scala scale and keyboard mapping of the patch
+    scale_asked = Signal(str)  # one of SCALES; "": twelve equal steps, without a keyboard mapping
+    scala_file_asked = Signal()
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
     changed = Signal(str, float)  # a field of a patch and its new value
@@ -72,10 +78,10 @@ class PatchBar(ChoiceBar):
         super().__init__("instrument", "No instrument")
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
-        self._compact = self._tight = False
+        self._compact = self._tight = self._tuned = False
         self._shows_macros = True
         self._recorded_s: float | None = None
-        self._unsaved = 0
+        self._record_tip = ""
         self.knobs = {field: Knob(OF_PATCHES[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(partial(self.changed.emit, field))
@@ -113,8 +119,7 @@ class PatchBar(ChoiceBar):
 
     def _build_state(self) -> QHBoxLayout:
         self.note = words_label()
-        tip = "Remove the Scala tuning of the instrument"
-        self.scala = tool_button("Scala  ✕", tip, kind="solo", pressed=self.scala_remove_asked, visible=False)
+        self._build_scales()
         tip = "The computer's keys play an octave lower (Z)"
         self._lower = tool_button("−", "Octave down", tip, "chip", lambda: self.octave_asked.emit(-1))
         tip = "The computer's keys play an octave higher (X)"
@@ -132,17 +137,34 @@ class PatchBar(ChoiceBar):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.record = tool_button("", kind="record", pressed=self.record_asked, checkable=True)
-        self._unsaved_menu = QMenu(self.record)
-        self._unsaved_menu.addAction("Save the recording …").triggered.connect(self.recording_save_asked)
-        self._unsaved_menu.addAction("Discard the recording").triggered.connect(self.recording_discard_asked)
+        tip = "Takes: play, name, export or delete each. Count-in and metronome (Ctrl+Shift+R)"
+        instant = QToolButton.ToolButtonPopupMode.InstantPopup
+        self.takes_button = tool_button("Takes  ▾", "Takes, count-in and metronome", tip, "small", popupMode=instant)
+        self.takes = TakesMenu(self.takes_button)
+        self.takes_button.setMenu(self.takes)
         keys = self._lower, self.octave, self._higher, self.velocity
-        row = filled(QHBoxLayout(), self.filtered, self.note, self.scala, *keys, self.voices, self.record, spacing=8)
+        row = filled(QHBoxLayout(), self.filtered, self.note, self.scale, *keys, self.voices, spacing=8)
+        filled(row, self.record, self.takes_button)
         row.setStretchFactor(self.note, 1)
         self.show_octave(3, 3, 3)
         self.show_velocity(90)
-        self.show_recording(None)
+        self.show_record_choices(Meter())
         self.show_note("")
         return row
+
+    def _build_scales(self) -> None:
+        """Make the menu of scales: what is chosen is checked, and on the button."""
+        self.scale = tool_button("", kind="small", popupMode=QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._scales = menu = QMenu(self.scale)
+        self.scale.setMenu(menu)
+        for name, title in {"": EQUAL_STEPS, **{name: name for name in SCALES}}.items():
+            action = menu.addAction(title)
+            action.setCheckable(True)
+            action.triggered.connect(partial(self.scale_asked.emit, name))
+        menu.insertSeparator(menu.actions()[1])
+        menu.addSeparator()
+        menu.addAction("Scala file …").triggered.connect(self.scala_file_asked)
+        self._show_scale(TuningChoice())
 
     def _build_sound(self) -> QHBoxLayout:
         tip = "The body of the instrument, which colours the sound of the strings"
@@ -159,6 +181,7 @@ class PatchBar(ChoiceBar):
     def set_compact(self, compact: bool, tight: bool = False) -> None:
         """Set the bar for a window with little room; `tight`: with very little."""
         self._compact, self._tight = compact, tight
+        self._show_scale(self._tuning)
         self._share_width()
 
     def _share_width(self) -> None:
@@ -168,12 +191,14 @@ class PatchBar(ChoiceBar):
         """
         many = len(self._macros) > ROOMY_MACROS
         close = self._compact or many
-        roomy = self.scala.isHidden() and len(self._macros) < ROOMY_MACROS
+        roomy = not self._tuned and len(self._macros) < ROOMY_MACROS
         fits: dict[QToolButton | QLabel, bool] = {
             self.rename: not self._tight,
             self.revert: not self._tight,
             self.compare: not self._tight or self.compare.isChecked(),
             self.category: not close,
+            self.scale: self._tuned or not self._tight,
+            self.takes_button: not self._tight,
             self.voices: roomy or not self._tight,
         }
         for part, there in fits.items():
@@ -199,7 +224,8 @@ class PatchBar(ChoiceBar):
             button.setEnabled(changed)
         self.rename.setEnabled(own)
         self._show_macros(patch.macros)
-        self._show_scala(patch.tuning)
+        self._show_scale(patch.tuning)
+        self._share_width()
         for field, knob in self.knobs.items():
             knob.set_value(patch.value(field))
         self.knobs["amp.tone_db"].setEnabled(patch.amp.drive_db > 0)
@@ -237,15 +263,24 @@ class PatchBar(ChoiceBar):
         for field, knob in self.knobs.items():
             knob.setVisible(not (self._shows_macros and (field in alone or field in AMP)))
 
-    def _show_scala(self, tuning: TuningChoice) -> None:
-        """Show the part of Scala that tunes the patch; a click removes it."""
-        scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
-        self.scala.setVisible(scale or keymap)
-        self._share_width()
-        lines = [f"Tuned by the Scala scale: {_scale_name(tuning.scale) or 'without a name'}"] if scale else []
+    def _show_scale(self, tuning: TuningChoice) -> None:
+        """Show what tunes the patch: the name of a scale, and a keyboard mapping in the tool-tip."""
+        name, keymap = _scale_name(tuning.scale) if tuning.scale.strip() else EQUAL_STEPS, bool(tuning.keymap.strip())
+        self._tuning, self._tuned = tuning, bool(tuning.scale.strip()) or keymap
+        for action in self._scales.actions():
+            chosen = action.text() if action.text() in SCALES else ""
+            action.setChecked(
+                action.isCheckable() and (SCALES[chosen] == tuning.scale if chosen else not self._tuned)
+            )
+        button, shown, room = self.scale, name or "Scala", TIGHT_LETTERS if self._tight else SCALE_LETTERS
+        short = shown if len(shown) <= room else f"{shown[: room - 1].rstrip()}…"
+        button.setText(f"{short if self._tuned else 'Scale'}  ▾".replace("&", "&&"))
+        button.setAccessibleName(f"Scale: {shown}")
+        lines = [f"Scale: {name or 'without a name'}"]
         if keymap:
             lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")
-        self.scala.setToolTip(plain_tip("\n".join([*lines, "Click to go back to twelve equal steps"])))
+        button.setToolTip(plain_tip("\n".join([*lines, "Choose a scale, or a Scala file; one can be dropped, too"])))
+        show_kind(button, "solo" if self._tuned else "small")
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
@@ -278,40 +313,36 @@ class PatchBar(ChoiceBar):
             widget.setVisible(pitches)
 
     def show_recording(self, seconds: float | None) -> None:
-        """Show the seconds that it has been recording; None: it is not."""
+        """Show the seconds that it has been recording, below 0 in the count-in; None: it is not."""
         self._recorded_s = seconds
         self._show_record()
 
-    def show_unsaved(self, recordings: int) -> None:
-        """Show the number of recordings that wait to be saved.
-
-        While any does, the button saves or discards the latest.
-        """
-        self._unsaved = recordings
+    def show_record_choices(self, choices: Meter) -> None:
+        """Show count-in and metronome."""
+        self.takes.show_choices(choices)
+        bars = choices.count_in_bars
+        parts = [f"after {COUNT_INS[bars]}"] * (bars > 0) + ["with the metronome"] * choices.metronome
+        tempo = f" at {choices.tempo_bpm} beats a minute" if parts else ""
+        self._record_tip = f"Record what is played (Ctrl+R){', '.join(['', *parts])}{tempo}"
         self._show_record()
+
+    def popup_takes(self) -> None:
+        """Open the menu of takes, also where its button has no room."""
+        self.takes.popup(self.record.mapToGlobal(self.record.rect().bottomLeft()))
 
     def _show_record(self) -> None:
         seconds, button = self._recorded_s, self.record
-        on, waits = seconds is not None, seconds is None and self._unsaved > 0
-        button.setChecked(on)
-        if seconds is not None:
-            words = (
-                f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}",
-                "End recording",
-                "End the recording and save it",
-            )
-        elif waits:
-            tip = "What was played is not saved yet: save it, or discard it to record again"
-            words = "●  Unsaved  ▾", "Recording that is not saved", tip
+        button.setChecked(seconds is not None)
+        if seconds is None:
+            words = "●  Record", "Record what is played", self._record_tip
         else:
-            words = "●  Record", "Record what is played", "Record what is played"
+            whole = math.floor(seconds)  # below 0 in the count-in
+            time = f"{whole // 60}:{whole % 60:02d}" if whole >= 0 else f"−{-whole}"
+            words = f"■  {time}", "End recording", "End the recording and save it"
         text, name, tip = words
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)
-        modes = QToolButton.ToolButtonPopupMode
-        button.setPopupMode(modes.InstantPopup if waits else modes.DelayedPopup)
-        button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
         self.note.say(text)

@@ -15,6 +15,7 @@ from app.instrument.events import (
     Bend,
     ControlChange,
     Event,
+    Meter,
     NoteOff,
     NoteOn,
     PatchTurned,
@@ -58,9 +59,11 @@ def recorded(draw: random.Random, events: int) -> list[TimedEvent]:
     return first + [TimedEvent(time_s, drawn(draw)) for time_s in times_s]
 
 
-def written(folder: Path, events: list[TimedEvent], end_s: float | None = None) -> Journal:
+def written(
+    folder: Path, events: list[TimedEvent], end_s: float | None = None, meter: Meter | None = None
+) -> Journal:
     """A journal that its process has left."""
-    journal = Journal.begun(folder, NOW)
+    journal = Journal.begun(folder, NOW, meter)
     middle = len(events) // 2
     for part in (events[:middle], events[middle:]):
         journal.write(part)
@@ -75,9 +78,13 @@ def written(folder: Path, events: list[TimedEvent], end_s: float | None = None) 
 @pytest.mark.parametrize("seed", range(8))
 def test_what_is_written_is_read(tmp_path: Path, seed: int) -> None:
     events = recorded(random.Random(seed), 120)
-    played = written(tmp_path, events, 101.5).read()
+    meter = Meter(tempo_bpm=90 + seed, metronome=True) if seed % 2 else None
+    if meter is not None:  # begun in the count-in, of which notes are left out
+        events = [TimedEvent(-1.0, events[0].event), TimedEvent(-0.5, NoteOn(61, 90)), *events[1:]]
+    played = written(tmp_path, events, 101.5, meter).read()
     assert played is not None
-    assert list(played.events) == played_from(events, 101.5)
+    assert list(played.events) == played_from(events, 101.5, meter is not None)
+    assert played.meter == meter and NoteOn(61, 90) not in [entry.event for entry in played.events]
     assert played.patch == events[0].event.patch  # type: ignore[union-attr]
     assert played.recorded == NOW
     assert (played.source, played.difference_gain_db) == ("model", 0.0)

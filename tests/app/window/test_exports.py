@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import soundfile
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QToolButton
 
@@ -80,6 +81,20 @@ def record(w: Window) -> None:
         w.window.instrument.bar.record.click()
         if w.keys.recorder.recording:
             w.play(60)
+
+
+def takes(w: Window) -> dict[str, dict[str, QAction]]:
+    """The takes in the menu beside Record, each with what can be done with it."""
+    submenus = [action.menu() for action in w.window.instrument.bar.takes.actions() if action.menu() is not None]
+    rows = [menu for menu in submenus if menu.actions()[0].text() == "Play"]  # type: ignore[union-attr]
+    return {menu.title(): {action.text(): action for action in menu.actions()} for menu in rows}  # type: ignore[union-attr]
+
+
+def discard(w: Window) -> None:
+    """Delete the latest take."""
+    with answered("Delete") as asked:
+        next(iter(takes(w).values()))["Delete …"].trigger()
+    assert asked == ["Delete the take?"]
 
 
 def close(w: Window, *answers: str | Qt.Key) -> list[str]:
@@ -162,18 +177,15 @@ def test_a_recording_hears_the_pick_up_and_the_points_of_the_window(guitar: Wind
 def test_a_recording_is_kept_until_it_is_saved_or_discarded_and_replaces_no_file_unasked(
     guitar: Window, tmp_path: Path
 ) -> None:
-    button, recorder = guitar.window.instrument.bar.record, guitar.keys.recorder
     record(guitar)
-    assert "Unsaved" in button.text()
-    ask, discard = button.menu().actions()
     guitar.controller.patches.choose("concert_harp")  # it was played by the other one
     for _ in range(2):
+        (words,) = takes(guitar)
+        assert words.startswith("Steel-string acoustic:") and words.endswith("1 note, not saved")
         dialog_of(guitar).reject()
-        ask.trigger()
-    guitar.key(KEY.Key_R, CONTROL)  # opens it again, and records nothing over it
-    assert not recorder.recording
+        takes(guitar)[words]["Save …"].trigger()
     save(guitar, tmp_path / "absent" / "take.wav", "absent")
-    assert "Unsaved" in button.text()
+    assert list(takes(guitar)) == [words]
     (tmp_path / "song.mid").write_bytes(b"mine")
     dialog = dialog_of(guitar)
     edit = dialog.performance.file.edit
@@ -188,7 +200,8 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded_and_replaces_no_file
     save(guitar, tmp_path / "take 1.5")
     assert {path.name for path in tmp_path.glob("take 1.5*")} == {"take 1.5.wav", "take 1.5.mid"}
     origin: Any = read_origin(tmp_path / "take 1.5.wav")
-    assert "Unsaved" not in button.text() and origin.instrument == "Steel-string acoustic"
+    assert list(takes(guitar)) == [words.replace("Steel-string acoustic:", "take 1.5:").removesuffix(", not saved")]
+    assert origin.instrument == "Steel-string acoustic"
     view = guitar.controller.string.view
     guitar.change(solo=3)
     guitar.window.activateWindow()
@@ -197,12 +210,6 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded_and_replaces_no_file
     for solo in (3, 0):
         guitar.key(KEY.Key_Escape, on=view)
         assert guitar.controller.exports.dialog is None and guitar.choices.solo == solo, "Escape does one thing"
-    record(guitar)
-    _, discard = button.menu().actions()
-    discard.trigger()
-    assert "Record" in button.text() and button.menu() is None
-    button.click()
-    assert recorder.recording
 
 
 @pytest.mark.parametrize("ended", [False, True])
@@ -211,7 +218,7 @@ def test_no_key_closes_the_window_over_a_recording_and_save_closes_it_once_it_is
 ) -> None:
     record(guitar)
     if not ended:
-        guitar.controller.patches.recordings.discard()
+        discard(guitar)
         guitar.window.instrument.bar.record.click()
         guitar.play(60)
     for answer in (KEY.Key_Escape, KEY.Key_Return, KEY.Key_Space, "Cancel", "Save"):
@@ -227,11 +234,11 @@ def test_no_key_closes_the_window_over_a_recording_and_save_closes_it_once_it_is
     if ended:
         assert close(guitar, "Discard") == [LOST]
     else:
-        close(guitar, "Save")
-        dialog_of(guitar).performance.file.edit.setText(str(tmp_path / "take.wav"))
-        dialog_of(guitar).save.click()
+        close(guitar, "Save")  # where the one before is
         guitar.wait(lambda: not guitar.window.isVisible())
-        assert {path.name for path in tmp_path.glob("take.*")} == {"take.wav", "take.mid"}
+        assert {path.name for path in tmp_path.glob("Steel*")} == {
+            f"Steel-string acoustic{end}" for end in (".wav", ".mid")
+        }
     assert not guitar.window.isVisible() and left_journals(recordings_folder()) == []
 
 
@@ -277,7 +284,7 @@ def play_long(w: Window, notes: int) -> None:
     journal.write([TimedEvent(0.0, PatchTurned(latest.patch))])
     journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(notes)])
     journal.close()
-    recordings.discard()
+    discard(w)
     with answered(KEY.Key_Return):
         recordings.offer_left()
         w.wait(lambda: recordings.latest is not None)

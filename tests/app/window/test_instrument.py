@@ -19,6 +19,7 @@ from app.instrument.strings import Strings, on_string
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, MacroTarget, Patch, Pickup
+from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
@@ -222,12 +223,13 @@ def test_knobs_change_the_patch_its_pluck_and_its_pick_up_and_undo_takes_them_ba
     assert guitar.patch.tuning.transpose == 2
     tuning = TuningChoice(a4_hz=432.0, scale=FIVE_STEPS)
     guitar.change(patch=guitar.patch.model_copy(update={"tuning": tuning}))
-    scala = guitar.window.instrument.bar.scala
-    assert scala.isVisible() and "Five equal steps" in scala.toolTip()
-    scala.click()
-    assert not scala.isVisible() and guitar.patch.tuning == TuningChoice(a4_hz=432.0)
-    history.undo()
-    assert guitar.patch.tuning == tuning
+    scale = guitar.window.instrument.bar.scale
+    assert scale.isVisible() and "Five equal steps" in scale.toolTip()
+    for name, text in (("Werckmeister III", SCALES["Werckmeister III"]), ("Twelve equal steps", "")):
+        next(each for each in scale.menu().actions() if each.text() == name).trigger()
+        assert guitar.patch.tuning == TuningChoice(a4_hz=432.0, scale=text)
+        history.undo()
+        assert guitar.patch.tuning == tuning
 
 
 def test_the_transport_changes_where_the_patch_is_heard(guitar: Window) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QInputDialog, QMenu
 from pytestqt.qtbot import QtBot
 
+from app.instrument.events import Meter
 from app.patches.patch import Macro, MacroTarget, Patch
+from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
+from app.views.instrument.takes_menu import OF_TAKE, TakeRow
 from tests.app.gestures import LEFT, press_keys, reported
 
 
@@ -48,37 +51,52 @@ def test_macros_are_those_of_the_patch_and_say_what_they_change(bar: PatchBar, g
         assert bar.macros[0].toolTip().splitlines()[0] == words
 
 
-def test_the_record_button_shows_its_time_and_saves_or_discards_what_is_not_saved(
-    qtbot: QtBot, bar: PatchBar
+def test_the_record_button_shows_its_time_and_the_menu_beside_it_takes_and_settings(
+    qtbot: QtBot, bar: PatchBar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bar.show_recording(73.4)
-    assert (bar.record.text(), bar.record.isChecked()) == ("■  1:13", True)
-    bar.show_recording(None)
-    bar.show_unsaved(1)
-    assert bar.record.text().startswith("●  Unsaved")
-    asked = [reported(bar.recording_save_asked), reported(bar.recording_discard_asked)]
-    for action in bar.record.findChild(QMenu).actions():
-        action.trigger()
-    assert [len(each) for each in asked] == [1, 1]
-    bar.show_recording(3.0)  # another was begun before the first turned out not to be written
-    assert (bar.record.text(), bar.record.menu()) == ("■  0:03", None)
-    bar.show_recording(None)
-    bar.show_unsaved(0)
-    assert (bar.record.text(), bar.record.isChecked()) == ("●  Record", False)
+    for seconds, text in ((73.4, "■  1:13"), (3.0, "■  0:03"), (-0.2, "■  −1"), (-1.5, "■  −2"), (None, "●  Record")):
+        bar.show_recording(seconds)
+        assert (bar.record.text(), bar.record.isChecked()) == (text, seconds is not None)
+    asked, changed, menu = reported(bar.takes.asked), reported(bar.takes.change_asked), bar.takes
+    assert menu.actions()[0].text() == "No takes yet" and not menu.actions()[0].isEnabled()
+    rows = [TakeRow("a & b:  12:01, 3 s", True, False), TakeRow("c:  being saved", False, True)]
+    menu.show_takes(rows)
+    assert [each.text() for each in menu.actions()[:2]] == ["c:  being saved", "a && b:  12:01, 3 s"]
+    for row, enabled in zip(menu.actions()[:2], (["Play"], list(OF_TAKE.values())), strict=True):
+        assert [each.text() for each in row.menu().actions() if each.isEnabled()] == enabled  # type: ignore[union-attr]
+    for each in menu.actions()[1].menu().actions():  # type: ignore[union-attr]
+        each.trigger()
+    assert asked == [(what, 0) for what in OF_TAKE]
+    menu.show_takes(())
+    actions = {each.text(): each for part in (menu, *menu.findChildren(QMenu)) for each in part.actions()}
+    typed = iter(["9", "ninety", "90"])
+    monkeypatch.setattr(QInputDialog, "getText", lambda *_, **__: (next(typed), True))
+    for name in ("Metronome", "2 bars", "Tempo: 120 beats a minute …", "3"):
+        actions[name].trigger()
+    assert changed == [("metronome", True), ("count_in_bars", 2), ("tempo_bpm", 90), ("beats", 3)]
+    bar.show_record_choices(Meter(count_in_bars=2, metronome=True, tempo_bpm=90, beats=3))
+    assert {name for name, each in actions.items() if each.isChecked()} == {"Metronome", "2 bars", "3"}
+    assert "(Ctrl+R), after 2 bars, with the metronome at 90 beats a minute" in bar.record.toolTip()
     with qtbot.waitSignal(bar.record_asked):
         qtbot.mouseClick(bar.record, LEFT)
 
 
-def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+def test_a_scale_is_chosen_shown_by_name_and_left_again(bar: PatchBar, guitar: Patch) -> None:
     scale = "! a.scl\n!\nTwo <b>halves</b>\n 2\n!\n 600.\n 2/1\n"
     keymap = "2\n0\n127\n60\n69\n440\n2\n0\n1\n"
     for tuning in ({"scale": scale}, {"keymap": keymap}, {"scale": scale, "keymap": keymap}):
         bar.show_patch(guitar.model_copy(update={"tuning": TuningChoice(**tuning)}), own=True)
-        assert bar.scala.isVisible()
-        assert ("halves" in bar.scala.toolTip()) == ("scale" in tuning)
-        assert ("keyboard mapping" in bar.scala.toolTip()) == ("keymap" in tuning)
-        assert "<b>" not in bar.scala.toolTip()
-    with qtbot.waitSignal(bar.scala_remove_asked):
-        qtbot.mouseClick(bar.scala, LEFT)
+        assert bar.scale.text() == ("Two <b>halves</b>  ▾" if "scale" in tuning else "Twelve equal steps  ▾")
+        assert ("halves" in bar.scale.toolTip()) == ("scale" in tuning)
+        assert ("keyboard mapping" in bar.scale.toolTip()) == ("keymap" in tuning)
+        assert "<b>" not in bar.scale.toolTip()
+    asked, actions = reported(bar.scale_asked), {each.text(): each for each in bar.scale.menu().actions()}
+    actions["Vallotti"].trigger()
+    bar.show_patch(guitar.model_copy(update={"tuning": TuningChoice(scale=SCALES["Vallotti"])}), own=True)
+    assert bar.scale.text() == "Vallotti  ▾"
+    assert [name for name, each in actions.items() if each.isChecked()] == ["Vallotti"]
+    actions["Twelve equal steps"].trigger()
+    assert asked == ["Vallotti", ""]
     bar.show_patch(guitar, own=True)
-    assert not bar.scala.isVisible()
+    assert bar.scale.text() == "Scale  ▾"
+    assert [name for name, each in actions.items() if each.isChecked()] == ["Twelve equal steps"]
