@@ -60,10 +60,7 @@ class Plot(pg.PlotWidget):
         """
         item, no_contents = self.getPlotItem(), pg.QtWidgets.QGraphicsItem.GraphicsItemFlag.ItemHasNoContents
         axes = [item.getAxis(side) for side in ("left", "bottom")]
-        things = self.scene().items(Qt.SortOrder.AscendingOrder)
-        inks = [
-            thing for thing in things if isinstance(thing, pg.PlotCurveItem | pg.InfiniteLine | pg.ScatterPlotItem)
-        ]
+        inks = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if isinstance(each, INK)]
         for axis in axes:
             axis.setCacheMode(pg.GraphicsObject.CacheMode.NoCache)
         for ink in inks:
