@@ -206,7 +206,7 @@ def test_the_menu_has_the_figures_that_are_seen_and_copies_pictures(lab: Window)
 def test_a_drum_is_saved_and_what_cannot_be_is_said(
     opened: Open, tmp_path: Path, chosen: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    w = opened("studio_any_string", instrument=read_patch(PATCHES / "frame_drum.json"))
+    w = opened("studio_any_string", face="lab", instrument=read_patch(PATCHES / "frame_drum.json"))
     w.wait_for_keys()
     drum = w.controller.drum
     by_menu_key(w, drum.figure)
