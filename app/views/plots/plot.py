@@ -14,6 +14,7 @@ from app.views.controls.parts import keeps_keys
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.legend import Legend
 
+FIGURE_HEIGHT = 240  # pixels, at least, of a picture
 LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
 INK = pg.PlotCurveItem, pg.InfiniteLine, pg.ScatterPlotItem  # what is drawn at data
 TIP_MS = 3000  # the tooltip covers what is pointed at
@@ -51,7 +52,8 @@ class Plot(pg.PlotWidget):
         self.getPlotItem().getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
 
     def figure_size(self) -> QSize:
-        return self.size()
+        """The size on the screen; of a low plot higher, so that both axes have their labels."""
+        return self.size().expandedTo(QSize(0, FIGURE_HEIGHT))
 
     def paint_figure(self, painter: QPainter) -> None:
         """Paint the plot and its legend, without the line that moves.
@@ -61,6 +63,9 @@ class Plot(pg.PlotWidget):
         item, no_contents = self.getPlotItem(), pg.QtWidgets.QGraphicsItem.GraphicsItemFlag.ItemHasNoContents
         axes = [item.getAxis(side) for side in ("left", "bottom")]
         inks = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if isinstance(each, INK)]
+        size = self.size()
+        self.resize(self.figure_size())
+        item.layout.activate()
         for axis in axes:
             axis.setCacheMode(pg.GraphicsObject.CacheMode.NoCache)
         for ink in inks:
@@ -78,6 +83,7 @@ class Plot(pg.PlotWidget):
         painter.restore()
         for legend in self.findChildren(Legend):
             legend.render(painter, legend.pos(), renderFlags=legend.RenderFlag(0))
+        self.resize(size)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)

@@ -99,6 +99,7 @@ def test_every_figure_is_saved_as_it_looks_and_with_its_numbers(
         lab.panel(panel.key)
         lab.wait(lambda panel=panel: panel.isVisible() and panel.columns() is not None and panel.columns().rows)
         lab.wait(lambda panel=panel: panel.background.busy is False)
+        size = panel.figure.size()
         for words, suffix in (("Save picture as PNG", "png"), ("Save picture as SVG", "svg"), ("Save data", "csv")):
             next(ways)(lab, panel.figure)
             take_action(words)
@@ -108,6 +109,7 @@ def test_every_figure_is_saved_as_it_looks_and_with_its_numbers(
         assert stem.name.endswith(panel.title.lower().replace("–", "-")) and stem.name.startswith("A small string B3")
         image, data = QImage(str(stem) + ".png"), Path(f"{stem}.svg").read_bytes()
         assert image.size() == panel.figure.figure_size() * 2
+        assert panel.figure.size() == size, "the screen stays"
         seen = pixels(image)
         assert len(np.unique(seen.reshape(-1, 3), axis=0)) > 20, "it is not blank"
         assert np.abs(seen - pixels(rendered(data, image))).mean() < 6, panel.key
