@@ -58,9 +58,9 @@ def most_rows(columns: int) -> int:
 
 def aligned(heading: str, curves: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]) -> Columns:
     """Columns of curves, by heading, on all of their places; empty where a curve has no value."""
-    all_places = [places for places, _ in curves.values()]
-    same = all(np.array_equal(places, all_places[0]) for places in all_places)
-    rows = all_places[0] if same else np.unique(np.concatenate(all_places))
+    first, *others = [places for places, _ in curves.values()] or [np.empty(0)]
+    same = all(np.array_equal(places, first) for places in others)
+    rows = first if same else np.unique(np.concatenate([first, *others]))
     kept = rows[: most_rows(1 + len(curves))]
     columns: dict[str, Values] = {heading: kept}
     for name, (places, values) in curves.items():

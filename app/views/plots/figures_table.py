@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -155,9 +156,15 @@ class FiguresTable(QTableWidget):
         return QSize(across.length() + edges, across.height() + down.length() + edges)
 
     def paint_figure(self, painter: QPainter) -> None:
-        size = self.size()
+        """Paint all rows and columns. Cell by cell: `render` would clip them elsewhere in a vector file."""
+        size, model, option = self.size(), self.model(), QStyleOptionViewItem()
         self.resize(self.figure_size())
-        self.render(painter, QPoint())
+        self.horizontalHeader().render(painter, QPoint())
+        self.initViewItemOption(option)
+        for row, column in itertools.product(range(self.rowCount()), range(self.columnCount())):
+            index = model.index(row, column)
+            option.rect = self.visualRect(index).translated(0, self.horizontalHeader().height())
+            self.itemDelegate().paint(painter, option, index)
         self.resize(size)
 
     def copy(self) -> None:

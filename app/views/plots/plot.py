@@ -6,14 +6,17 @@ import math
 from typing import ClassVar
 
 import pyqtgraph as pg
+from pyqtgraph.graphicsItems.ScatterPlotItem import Symbols
 from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPainterPath, QResizeEvent
+from PySide6.QtGui import QMouseEvent, QPainter, QPainterPath, QResizeEvent, QTransform
 
 from app.views.controls.parts import keeps_keys
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.legend import Legend
 
+FIGURE_HEIGHT = 240  # pixels, at least, of a picture
 LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
+INK = pg.PlotCurveItem, pg.InfiniteLine, pg.ScatterPlotItem  # what is drawn at data
 TIP_MS = 3000  # the tooltip covers what is pointed at
 
 
@@ -49,39 +52,38 @@ class Plot(pg.PlotWidget):
         self.getPlotItem().getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
 
     def figure_size(self) -> QSize:
-        return self.size()
+        """The size on the screen; of a low plot higher, so that both axes have their labels."""
+        return self.size().expandedTo(QSize(0, FIGURE_HEIGHT))
 
     def paint_figure(self, painter: QPainter) -> None:
         """Paint the plot and its legend, without the line that moves.
 
-        Curves and lines are painted last, in pixels: a vector file would scale their pens and round their places.
+        What is drawn at data is painted last, in pixels: a vector file would scale its pens and round its places.
         """
         item, no_contents = self.getPlotItem(), pg.QtWidgets.QGraphicsItem.GraphicsItemFlag.ItemHasNoContents
         axes = [item.getAxis(side) for side in ("left", "bottom")]
-        things = self.scene().items(Qt.SortOrder.AscendingOrder)
-        points = [thing for thing in things if isinstance(thing, pg.ScatterPlotItem)]
-        lines = [thing for thing in things if isinstance(thing, pg.PlotCurveItem | pg.InfiniteLine)]
+        inks = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if isinstance(each, INK)]
+        size = self.size()
+        self.resize(self.figure_size())
+        item.layout.activate()
         for axis in axes:
             axis.setCacheMode(pg.GraphicsObject.CacheMode.NoCache)
-        for thing in points:
-            thing.setExportMode(True)  # or symbols would be pixels
-        for line in lines:
-            line.setFlag(no_contents, True)
+        for ink in inks:
+            ink.setFlag(no_contents, True)
         self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
         for axis in axes:
             axis.setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
-        for thing in points:
-            thing.setExportMode(False)
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setClipRect(item.vb.sceneBoundingRect())
-        for line in lines:
-            line.setFlag(no_contents, False)
-            if line.isVisible() and item.vb.isAncestorOf(line):
-                _paint_line(painter, line)
+        for ink in inks:
+            ink.setFlag(no_contents, False)
+            if ink.isVisible() and item.vb.isAncestorOf(ink):
+                _paint_ink(painter, ink)
         painter.restore()
         for legend in self.findChildren(Legend):
             legend.render(painter, legend.pos(), renderFlags=legend.RenderFlag(0))
+        self.resize(size)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)
@@ -105,15 +107,22 @@ class Plot(pg.PlotWidget):
         return keeps_keys(event, *self.KEPT_KEYS) or bool(super().event(event))
 
 
-def _paint_line(painter: QPainter, line: pg.PlotCurveItem | pg.InfiniteLine) -> None:
-    """Paint a curve with the area below it, or a line from end to end, in pixels of the plot."""
-    in_pixels = line.sceneTransform()
-    if isinstance(line, pg.InfiniteLine):
-        ends = line.boundingRect()
-        painter.setPen(line.currentPen)
+def _paint_ink(painter: QPainter, ink: pg.PlotCurveItem | pg.InfiniteLine | pg.ScatterPlotItem) -> None:
+    """Paint a curve with the area below it, a line from end to end, or points, in pixels of the plot."""
+    in_pixels = ink.sceneTransform()
+    if isinstance(ink, pg.InfiniteLine):
+        ends = ink.boundingRect()
+        painter.setPen(ink.currentPen)
         painter.drawLine(in_pixels.map(QLineF(ends.left(), 0.0, ends.right(), 0.0)))
         return
-    path, level, brush = QPainterPath(line.getPath()), line.opts["fillLevel"], line.opts["brush"]
+    if isinstance(ink, pg.ScatterPlotItem):
+        for point in ink.points():
+            at, size = in_pixels.map(QPointF(point.pos())), point.size()
+            painter.setPen(point.pen())
+            painter.setBrush(point.brush())
+            painter.drawPath(QTransform(size, 0, 0, size, at.x(), at.y()).map(Symbols[point.symbol()]))
+        return
+    path, level, brush = QPainterPath(ink.getPath()), ink.opts["fillLevel"], ink.opts["brush"]
     if path.isEmpty():
         return
     if level is not None and brush is not None:
@@ -121,4 +130,4 @@ def _paint_line(painter: QPainter, line: pg.PlotCurveItem | pg.InfiniteLine) -> 
         area.lineTo(path.currentPosition().x(), level)
         area.lineTo(first.x, level)
         painter.fillPath(in_pixels.map(area), pg.mkBrush(brush))
-    painter.strokePath(in_pixels.map(path), pg.mkPen(line.opts["pen"]))
+    painter.strokePath(in_pixels.map(path), pg.mkPen(ink.opts["pen"]))

@@ -182,14 +182,14 @@ class SpectrumPanel(CurvesPanel):
         if source == self._area_of:
             self._area.setData([], [])
 
-    def columns(self) -> Columns | None:
+    def columns(self) -> Columns:
         """The points of the curves in view."""
         take, curves = self._growing, {}
         for shown in shown_sources(self.session.choices, self.library):
             if take is not None and shown.source in self._levels:
                 analyser, levels_db = self._levels[shown.source]
                 curves[shown.heading(level_words(take.pickup))] = analyser.column_hz, levels_db
-        return aligned("frequency (Hz)", curves) if curves else None
+        return aligned("frequency (Hz)", curves)
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources of which it is not drawn."""

@@ -134,7 +134,7 @@ class WaveformPanel(CurvesPanel):
                 signal = origin.read(first, stop)
                 times_s = np.arange(first, first + len(signal)) / rate_hz
                 curves[shown.heading(unit_of(self._take.pickup))] = times_s, signal
-        return aligned("time (s)", curves) if curves else None
+        return aligned("time (s)", curves)
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
         """Set the vertical axis, from −full to full in `unit`."""

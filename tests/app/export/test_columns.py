@@ -44,6 +44,7 @@ def test_curves_of_two_rates_share_their_places_and_what_is_too_much_is_said(mon
     cut = aligned("time (s)", {"fast": (fast, fast), "slow": (slow, slow)})
     assert (most_rows(3), cut.rows, cut.left_out) == (3, 3, 6)
     assert read(cut) == read(Columns({"time (s)": fast[:3], "fast": fast[:3], "slow": [0.0, None, 0.25]}))
+    assert aligned("time (s)", {}).rows == 0
     assert cut.words == " The first 3 of 9 rows; zoom in for others."
 
 

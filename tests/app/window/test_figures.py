@@ -107,6 +107,7 @@ def test_every_figure_is_saved_as_it_looks_and_with_its_numbers(
         lab.panel(panel.key)
         lab.wait(lambda panel=panel: panel.isVisible() and panel.columns() is not None and panel.columns().rows)
         lab.wait(lambda panel=panel: panel.background.busy is False)
+        size = panel.figure.size()
         for words, suffix in (("Save picture as PNG", "png"), ("Save picture as SVG", "svg"), ("Save data", "csv")):
             next(ways)(lab, panel.figure)
             take_action(words)
@@ -116,6 +117,7 @@ def test_every_figure_is_saved_as_it_looks_and_with_its_numbers(
         assert stem.name.endswith(panel.title.lower().replace("–", "-")) and stem.name.startswith("A small string B3")
         image, data = QImage(str(stem) + ".png"), Path(f"{stem}.svg").read_bytes()
         assert image.size() == panel.figure.figure_size() * 2
+        assert panel.figure.size() == size, "the screen stays"
         seen = pixels(image)
         assert len(np.unique(seen.reshape(-1, 3), axis=0)) > 20, "it is not blank"
         assert np.abs(seen - pixels(rendered(data, image))).mean() < 6, panel.key
@@ -214,7 +216,7 @@ def test_the_menu_has_the_figures_that_are_seen_and_copies_pictures(lab: Window)
 def test_a_drum_is_saved_and_what_cannot_be_is_said(
     opened: Open, tmp_path: Path, chosen: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    w = opened("studio_any_string", instrument=read_patch(PATCHES / "frame_drum.json"))
+    w = opened("studio_any_string", face="lab", instrument=read_patch(PATCHES / "frame_drum.json"))
     w.wait_for_keys()
     drum = w.controller.drum
     by_menu_key(w, drum.figure)
