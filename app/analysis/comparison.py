@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,25 +30,25 @@ FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
 
-@dataclass(frozen=True, order=True)
-class Audible:
-    """The difference of a sound from the truth's that an ear finds, in words, and in order of the spectra's distance.
+class Audible(str):
+    """The difference of a sound from the truth's that an ear finds, in words that sort by the spectra's distance.
 
     Attributes:
         distance_db: see `AudibleErrors`.
-        words, sentence: the worst fault, or all faults.
+        sentence: all faults, where the words have the worst.
     """
 
     distance_db: float
-    words: str = field(compare=False)
-    sentence: str = field(compare=False)
+    sentence: str
 
     @classmethod
     def of(cls, heard: Heard) -> Audible:
-        return cls(heard.distance_db, heard_word(heard), heard_sentence(heard, heard.name))
+        made = cls(heard_word(heard))
+        made.distance_db, made.sentence = heard.distance_db, heard_sentence(heard, heard.name)
+        return made
 
-    def __str__(self) -> str:
-        return self.words
+    def __lt__(self, other: str) -> bool:
+        return self.distance_db < other.distance_db if isinstance(other, Audible) else super().__lt__(other)
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class ComparedRow:
     Attributes:
         mse, mae: relative, over the whole string and the trained horizon.
         past_mse, past_mae: of all that comes after it; infinite where the output ran away.
-        audible: at the first listening point, through the pick-up.
+        heard: at the first listening point, through the pick-up.
         null_db: null depth of the displacement at the listening point over the whole pluck: the level of model minus
             truth relative to the truth's.
         real_time: seconds of motion of the whole string that one core renders in a second.
@@ -76,7 +76,7 @@ class ComparedRow:
     mae: float | None = None
     past_mse: float | None = None
     past_mae: float | None = None
-    audible: Audible | None = None
+    heard: Audible | None = None
     null_db: float | None = None
     real_time: float | None = None
     note: str = ""
@@ -90,7 +90,7 @@ class ComparedRow:
     @property
     def figures(self) -> dict[str, Any]:
         """The figures by the names that files and commands have for them."""
-        heard = self.audible
+        heard = self.heard
         return {
             "preset": self.name,
             "title": self.title,
@@ -98,7 +98,7 @@ class ComparedRow:
             "rate_hz": self.rate_hz,
             "rel_mae": self.mae,
             "past_rel_mae": self.past_mae,
-            "heard": None if heard is None else heard.words,
+            "heard": None if heard is None else str(heard),
             "distance_db": None if heard is None else heard.distance_db,
             "rel_mse": self.mse,
             "past_rel_mse": self.past_mse,
@@ -182,7 +182,7 @@ def _compare_one(
         mae=windows[0].rel_mae,
         past_mse=past.rel_mse if past else None,
         past_mae=past.rel_mae if past else None,
-        audible=_audible(preset, plucked, before + share, share, job),
+        heard=_audible(preset, plucked, before + share, share, job),
         null_db=None if null_db == NULL_FLOOR_DB and plucked.pluck.amplitude_mm == 0 else null_db,
         real_time=first / info.rate_hz / work_s if work_s > 0 else None,
         note=note,

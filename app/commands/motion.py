@@ -243,6 +243,8 @@ def _compare_all(name: str, pluck: Pluck, seconds: float, out: Path | None, leve
         print_json(facts)
     else:
         print_table(ALL_COLUMNS, [[line[column] for column in ALL_COLUMNS] for line in facts])
+    if out is not None and not written:
+        raise Failure(f"{out}: not made, for no model could be compared")
     if out is not None:
         models = ComparedModels("", out.name, written)
         with progress("write") as report:

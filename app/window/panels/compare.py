@@ -49,7 +49,7 @@ def times(value: float) -> str:
 
 
 _TRAINED, _PAST = "over the trained time and the whole string", "from the end of training to the end of the pluck"
-_EAR = (
+_HEARD = (
     "The worst fault that an ear finds in this pluck, through the pick-up, or how far the spectra are apart; "
     "sorted by that distance"
 )
@@ -59,7 +59,7 @@ COLUMNS = (
     FigureColumn("title", "Preset", "Click or Enter: hear the model on this pluck"),
     FigureColumn("mae", "MAE", f"Relative mean absolute error {_TRAINED}", percent),
     FigureColumn("past_mae", "MAE past", f"Relative mean absolute error {_PAST}", percent),
-    FigureColumn("audible", "Ear", _EAR),
+    FigureColumn("heard", "Heard", _HEARD),
     FigureColumn("null_db", "Null, dB", _NULL, decibels),
     FigureColumn("real_time", "Speed", _SPEED, times),
     FigureColumn("parameters", "Parameters", "Trainable parameters", lambda n: f"{n:,}"),
@@ -258,6 +258,6 @@ class ComparePanel(ComputedPanel):
 
 def _table_row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
     """The row of the table; `fresh`: of the present pluck; `present`: of the chosen preset."""
-    heard = "" if row.audible is None else row.audible.sentence
+    heard = "" if row.heard is None else row.heard.sentence
     tip = "\n".join(line for line in (row.title, row.file, heard, row.note) if line)
     return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.analysis.comparison import compare
+from app.analysis.comparison import Audible, compare
 from app.export.wav import WavSettings
 from app.presets.library import PresetEntry, list_presets
 from app.rendering.note_sound import NoteSound
@@ -24,6 +24,7 @@ from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
 from tests.app.sounds import render_sound
 from training.heard import GLIDE_S, RATE_HZ
+from training.heard_file import Heard
 
 PLUCK, LISTEN = Pluck(0.35, 4.0), 0.37
 
@@ -72,9 +73,14 @@ def test_the_ear_finds_what_it_finds_in_the_exported_sound(entries: list[PresetE
     info = entries[0].info
     expected = audible_errors(model, truth, RATE_HZ, (info.resonator.omega / (2 * math.pi)).tolist(), GLIDE_S)
     assert expected.distance_db > 0.01
-    assert row.audible.distance_db == pytest.approx(expected.distance_db, rel=0.01)
-    assert str(row.audible) == row.figures["heard"] and "spectra" in row.audible.sentence
-    assert short.audible is None and short.mae is not None
+    assert row.heard.distance_db == pytest.approx(expected.distance_db, rel=0.01)
+    assert str(row.heard) == row.figures["heard"] and "spectra" in row.heard.sentence
+    assert short.heard is None and short.mae is not None
+    worse = [
+        Audible.of(Heard(name, "a" * 64, 4.0, distance_db, 0.0, 0.0))
+        for name, distance_db in (("a", 0.2), ("b", 9.0))
+    ]
+    assert worse == ["true", "9.0 dB off"] and sorted(worse, reverse=True) == worse[::-1], "in order of the distance"
 
 
 def test_a_bad_preset_is_a_row_and_the_next_one_follows(entries: list[PresetEntry], job: Any) -> None:
