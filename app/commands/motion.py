@@ -33,7 +33,6 @@ SolverOption = Annotated[
     typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against."),
 ]
 LONGEST_S = 600.0  # the longest comparison
-ALL_COLUMNS = ("preset", "rel_mae", "past_rel_mae", "heard", "distance_db", "null_db", "real_time")
 
 
 def simulate(
@@ -162,20 +161,6 @@ def compare(
     string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
-    every: Annotated[
-        bool,
-        typer.Option(
-            "--all",
-            help="All presets of the same string: errors within the training and past it, and what an ear finds.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="With --all: write each as WAV (model, truth, difference), and a table."),
-    ] = None,
-    level_match: Annotated[
-        bool, typer.Option("--level-match", help="With --out: bring each model to the level of its truth.")
-    ] = False,
     json: arguments.Json = False,
 ) -> None:
     """Compare a preset's model with the physics on one pluck.
@@ -184,13 +169,6 @@ def compare(
     """
     pluck = options.check_pluck(position, amplitude_mm, shape, width)
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-    if (out is not None or level_match) and not every:
-        raise typer.BadParameter("goes with --all", param_hint="--level-match" if out is None else "--out")
-    if every:
-        if string is not None or rate is not None or modes is not None:
-            raise typer.BadParameter("they have their own string: leave --string, --rate and --modes out")
-        _compare_all(preset, pluck, seconds, out, level_match, json)
-        return
     loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     info = loaded.info
     options.check_shortest(seconds, info.rate_hz)
@@ -208,47 +186,6 @@ def compare(
         for w in facts["windows"]
     ]
     print_table(columns, rows)
-
-
-def _compare_all(name: str, pluck: Pluck, seconds: float, out: Path | None, level_match: bool, json: bool) -> None:
-    """Print the table of the window's view Compare, and write its export."""
-    from app.analysis.comparison import ComparedRow, compare, same_string
-    from app.export.compared import ComparedExport, ComparedModels, check_new
-    from app.export.wav import WavSettings
-    from app.presets.library import PresetEntry, list_presets
-    from app.rendering.note_sound import NoteSound
-    from app.shared.worker import Job
-    from engine.pluck import DEFAULT_LISTEN
-    from engine.values.ear import Ear
-
-    loaded = arguments.open_preset(name)
-    options.check_shortest(seconds, loaded.info.rate_hz)
-    if out is not None:
-        check_new(out)
-    entries = [entry for entry in list_presets()[0] if same_string(entry.info, loaded.info)]
-    if all(entry.name != loaded.name for entry in entries):
-        entries.append(PresetEntry(loaded.name, loaded.path, loaded.info))
-    sounds = [(entry, NoteSound(entry.path, pluck, seconds, Ear((DEFAULT_LISTEN,)))) for entry in entries]
-    rows: list[ComparedRow] = []
-    with progress("compare") as report:
-
-        def take(job: Job, signal: str, share: float, text: str, row: ComparedRow | None) -> None:
-            report(share)
-            rows.extend([row] if row is not None else [])
-
-        compare(sounds, Job(take))
-    facts = [row.figures for row in rows]
-    written = [(row.sound, row.figures) for row in rows if row.sound is not None and row.mae is not None]
-    if json:
-        print_json(facts)
-    else:
-        print_table(ALL_COLUMNS, [[line[column] for column in ALL_COLUMNS] for line in facts])
-    if out is not None and not written:
-        raise Failure(f"{out}: not made, for no model could be compared")
-    if out is not None:
-        models = ComparedModels("", out.name, written)
-        with progress("write") as report:
-            say(ComparedExport(models, out, WavSettings(level_match=level_match)).run(report))
 
 
 def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:

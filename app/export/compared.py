@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from app.export.choices import ExportChoices
+from app.export.columns import Columns
 from app.export.note import default_file_name, export_sounds
 from app.export.wav import WavSettings
 from app.rendering.note_sound import NoteSound
@@ -20,7 +19,6 @@ from engine.whole_file import WriteError, explain, whole_folder
 
 TABLE = "models.csv"
 SOURCES: tuple[Source, ...] = ("model", "truth", "difference")
-FORMULA = "=+-@\t\r"  # begins one in a spreadsheet
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,8 @@ class ComparedExport:
                         share, of = done / len(self.models.lines), 1 / len(self.models.lines)
                         report = partial(_part, progress, share, of, f"Model {done + 1} of {len(self.models.lines)}")
                         table.append({**figures, **self._write(made, sound, report)})
-                    (made / TABLE).write_text(_csv(table), encoding="utf-8", newline="")
+                    columns = Columns({name: [line[name] for line in table] for name in table[0]})
+                    (made / TABLE).write_text(columns.text, encoding="utf-8", newline="")
                 except WriteError as error:  # which names the folder that is not there yet
                     raise WriteError(str(error).replace(str(made), str(self.file))) from error
         except OSError as error:
@@ -110,17 +109,3 @@ def _unused(folder: Path, sound: NoteSound, preset: str, rate_hz: int, ending: s
     while (path := folder / default_file_name(preset, sound.pluck, rate_hz, source, ending)).exists():
         preset = f"_{preset}"
     return path
-
-
-def _csv(table: Sequence[Mapping[str, object]]) -> str:
-    """The table in CSV. A text that a spreadsheet would compute has an apostrophe before it."""
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, list(table[0]))
-    writer.writeheader()
-    for line in table:
-        writer.writerow({name: _plain(value) for name, value in line.items()})
-    return text.getvalue()
-
-
-def _plain(value: object) -> object:
-    return f"'{value}" if isinstance(value, str) and value.startswith(tuple(FORMULA)) else value

@@ -139,7 +139,7 @@ class FilePicker(QWidget):
 
     Attributes:
         places, kind: where it is suggested.
-        suffix: of the file, one of FILTERS; a name without it gets it.
+        suffix: of the file, one of FILTERS, which a name without it gets; "": it is a folder.
     """
 
     changed = Signal()
@@ -176,8 +176,12 @@ class FilePicker(QWidget):
 
     def browse(self) -> None:
         named = Path(self.edit.text().strip()).name
-        suggested = self.path if named else Path(f"untitled{self.suffix}")
-        for path in self.places.ask(self, self.kind, "Save as", "save", FILTERS.get(self.suffix, ""), suggested):
+        if self.suffix:
+            suggested = self.path if named else Path(f"untitled{self.suffix}")
+            chosen = self.places.ask(self, self.kind, "Save as", "save", FILTERS[self.suffix], suggested)
+        else:  # a folder that is made in the chosen one
+            chosen = [folder / named for folder in self.places.ask(self, self.kind, "Save in", "folder")]
+        for path in chosen:
             self.edit.setText(str(path))
             self._name_edited()
 

@@ -120,18 +120,6 @@ def test_compare_is_the_papers_metric_over_grid_and_time(
     assert silent is None or math.isfinite(silent)
 
 
-def test_all_presets_of_a_string_are_compared_and_written(run: Run, folder: Path) -> None:
-    words = ("compare", "studio_steel_ds3", "--position", 0.4, "--seconds", 0.3, "--amplitude-mm", 3)
-    alone = json.loads(run(*words, "--json").out)["windows"][0]
-    found = run(*words, "--all", "--json", "--out", folder / "out")
-    rows = {row["preset"]: row for row in json.loads(found.out)}
-    assert found.status == 0 and set(rows) == {"studio_any_steel_ds3", "studio_steel_ds3"}
-    assert rows["studio_steel_ds3"]["rel_mae"] == pytest.approx(alone["rel_mae"], rel=1e-3)
-    assert rows["studio_any_steel_ds3"]["heard"] == "true"
-    assert len(list((folder / "out").iterdir())) == 7
-    assert "is there already" in run(*words, "--all", "--out", folder / "out").failure
-
-
 def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run: Run, folder: Path) -> None:
     u, m, t = (folder / f"{name}.npy" for name in "umt")
     np.save(u, Pluck(0.3, 1.0).displacement(101)[None])

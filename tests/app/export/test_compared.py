@@ -96,7 +96,7 @@ def test_a_folder_that_is_there_stays_and_what_is_not_whole_is_not_left(
 
     with pytest.raises(Cancelled):
         job.run(cancel)
-    monkeypatch.setattr(compared, "_csv", lambda _: exec("raise OSError(errno.ENOSPC, 'full')", {"errno": errno}))
+    monkeypatch.setattr(compared, "Columns", lambda _: exec("raise OSError(errno.ENOSPC, 'full')", {"errno": errno}))
     with pytest.raises(WriteError, match=r"out: cannot be written \(full\); free some space"):
         job.run(lambda *_: None)
     assert {path.suffix for path in tmp_path.iterdir()} == {".safetensors"}

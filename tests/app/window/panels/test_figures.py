@@ -21,6 +21,7 @@ from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
 from app.window.panels import compare as compare_module
 from engine.pluck import Pluck
+from tests.app.places import choose_files
 from tests.app.window.driver import KEY, LEFT, Window, choose, find, press
 from tests.app.window.panels.conftest import at, items
 
@@ -251,7 +252,9 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     lab.wait(lambda: "second.safetensors" in figures(panel)["second"][-1])
 
 
-def test_all_models_are_exported_from_their_table(lab: Window, tmp_path: Path) -> None:
+def test_all_models_are_exported_from_their_table(
+    lab: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lab.window.action["models"].trigger()
     panel = lab.panel("compare")
     assert lab.choices.right_view == "compare" and panel.table.hasFocus()
@@ -266,6 +269,9 @@ def test_all_models_are_exported_from_their_table(lab: Window, tmp_path: Path) -
         dialog.models.file.edit.textEdited.emit("")
         dialog.models["level_match"].setChecked(True)
         lab.wait(lambda name=name: dialog.save.isEnabled() == bool(name))
+    choose_files(monkeypatch, tmp_path)
+    find(dialog.models, QToolButton, "Browse").click()
+    assert dialog.models.file.path == tmp_path / "out", "its place is chosen, and its name stays"
     assert dialog.choices()[0].level_match
     dialog.save.click()
     lab.wait(lambda: "Saved" in dialog.state.text())
