@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import shlex
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -162,7 +163,7 @@ def read_song(path: Path, patch: Patch | None) -> SongPart:
     part = _part(path, patch, _events_of(path, messages), _ignored_messages(messages))
     if not any(message[0] & 0xF0 == PROGRAM for _, message in messages.timed):
         return part
-    by_programs = f'Each channel with its own instrument: learned-strings play "{path.name}" --out OUT.wav'
+    by_programs = f"Each channel with its own instrument: learned-strings play {shlex.quote(path.name)} --out OUT.wav"
     return replace(part, left_out=f"{part.left_out}. {by_programs}")
 
 

@@ -7,6 +7,7 @@ A second kind of file has what other programs write beside it.
 from __future__ import annotations
 
 import random
+import shlex
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -376,7 +377,7 @@ LEFT_OUT = (*[b"\0\xc0\x05"] * 3, *[b"\0\xb0\x0a\x40"] * 2, b"\0\xb0\x40\x00", b
             one_track(*LEFT_OUT, b"\0\xb0\xff\x40", header=b"\0\1\0\2\0\x60"),
             "1 track that its header counts; 1 message of a key or a controller above 127; "
             "what exceeds 127 in 1 message; its program changes and its controllers 10, 91. "
-            'Each channel with its own instrument: learned-strings play "song.mid" --out OUT.wav',
+            "Each channel with its own instrument: learned-strings play song.mid --out OUT.wav",
         ),
         (one_track(b"\0\xd0\x40", ON), "its pressure"),
         (one_track(b"\0\xa0\x3c\x40", ON), "its pressure"),
@@ -385,6 +386,13 @@ LEFT_OUT = (*[b"\0\xc0\x05"] * 3, *[b"\0\xb0\x0a\x40"] * 2, b"\0\xb0\x40\x00", b
 def test_what_a_song_is_played_without_is_reported_once(file: Path, raw: bytes, left_out: str) -> None:
     file.write_bytes(raw)
     assert read_song(file, None).left_out == f"song.mid is played without {left_out}"
+
+
+def test_the_command_that_is_named_quotes_the_name_of_the_file(tmp_path: Path) -> None:
+    hostile = tmp_path / 'a"$(b);c.mid'
+    hostile.write_bytes(one_track(b"\0\xc0\x05", ON))
+    command = read_song(hostile, None).left_out.rpartition(": ")[2]
+    assert shlex.split(command) == ["learned-strings", "play", hostile.name, "--out", "OUT.wav"]
 
 
 def program(number: int, channel: int = 0, ticks: int = 0) -> bytes:

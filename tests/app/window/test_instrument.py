@@ -346,7 +346,7 @@ def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
     mido.MidiFile(tracks=[[mido.Message("program_change", program=46), mido.Message("note_on", note=52)]]).save(song)
     guitar.drop(song)
     assert "without its program changes. Each channel with its own" in guitar.window.notices.text
-    assert 'learned-strings play "song.mid" --out OUT.wav' in guitar.window.notices.text
+    assert "learned-strings play song.mid --out OUT.wav" in guitar.window.notices.text
     guitar.key(KEY.Key_Space)
     song.write_bytes(b"no")
     guitar.drop(song)
