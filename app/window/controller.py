@@ -369,15 +369,13 @@ class Controller(QObject):
 
         Patches, scales and MIDI files go to `patches`.
         """
+        self.window.places.opened(file)
         if file.suffix.lower() in TAKEN_FILES:
-            if self.patches.take_file(file):
-                self.window.places.opened(file)
+            self.patches.take_file(file)
             return
         dropped = receive(file, self.library)
         if dropped.sound:
             self._ask_what_it_is(file)
-        if dropped.sound or dropped.choices or dropped.body:
-            self.window.places.opened(file)
         self._take(file, dropped)
 
     def _take(self, file: Path, dropped: Dropped) -> None:

@@ -177,7 +177,8 @@ class FilePicker(QWidget):
     def browse(self) -> None:
         named = Path(self.edit.text().strip()).name
         suggested = self.path if named else Path(f"untitled{self.suffix}")
-        for path in self.places.ask(self, self.kind, "Save as", "save", FILTERS.get(self.suffix, ""), suggested):
+        path = self.places.ask_to_save(self, self.kind, "Save as", FILTERS.get(self.suffix, ""), suggested)
+        if path is not None:
             self.edit.setText(str(path))
             self._name_edited()
 
