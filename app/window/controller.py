@@ -226,7 +226,7 @@ class Controller(QObject):
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
-            "copy": lambda: self.drag_out.copy("note"),
+            "copy": lambda: self.drag_out.ask("note", "copy"),
             "save_as": self.patches.save_as,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,

@@ -15,7 +15,6 @@ from PySide6.QtGui import QDesktopServices, QDrag, QGuiApplication
 from PySide6.QtWidgets import QMenu, QToolTip
 
 from app.export.choices import ExportChoices
-from app.export.handed_files import HandedFiles
 from app.export.recipe import read_origin, read_recipe
 from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
@@ -25,7 +24,6 @@ from app.views.controls.drag_handle import DragHandle
 from app.views.file_manager import reveal
 from app.views.file_places import MOST_RECENT, FileChoices, FilePlaces
 from app.window.settings import load_settings
-from engine.whole_file import WriteError
 from tests.app.places import choose_files, files_in
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, press
@@ -145,7 +143,10 @@ def test_a_click_on_the_handle_or_a_key_copies_files_and_drags_nothing(
     made.qtbot.mouseClick(handle, LEFT)
     menu = next(each for each in handle.findChildren(QMenu) if each.isVisible())
     difference, recording, copy = menu.actions()[1], menu.actions()[2], menu.actions()[-1]
-    assert not recording.isEnabled()
+    recording.trigger()
+    pull(made, handle)
+    made.qtbot.mouseRelease(handle, LEFT, pos=AWAY)
+    assert "record" in made.said[-1].lower() and not dropped
     difference.trigger()
     copy.trigger()
     menu.close()
@@ -159,21 +160,25 @@ def test_a_click_on_the_handle_or_a_key_copies_files_and_drags_nothing(
 def test_files_that_are_handed_out_are_bounded_and_a_full_disk_is_said(
     made: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.export.handed_files.LARGEST_BYTES", 25)
+    monkeypatch.setattr("app.window.drag_out.LARGEST_BYTES", 100_000)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    files = HandedFiles()
-    folders = [files.new_folder() for _ in range(2)]
-    for _ in range(4):
-        (folders[-1] / "a.wav").write_bytes(bytes(10))
-        folders.append(files.new_folder())
-    assert [each.exists() for each in folders] == [False] * 3 + [True] * 3
-    files.close()
-    assert not any(tmp_path.glob(".learned-strings-files*"))
+
+    def copied(key: int) -> str:
+        made.play(key)
+        made.wait_for_string()
+        before = made.said
+        made.key(KEY.Key_C, CONTROL | SHIFT)
+        made.wait(lambda: made.said != before)
+        return made.said[-1]
+
+    names = [copied(key).split(": paste")[0].removeprefix("Copied ") for key in (52, 55, 59, 60, 62)]
+    handed = {file.name for file in tmp_path.glob(".learned-strings-files*/*")}
+    assert {*names[-2:]} <= handed < {*names}, "the oldest make room"
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    with pytest.raises(WriteError, match="gone: cannot be written"):
-        HandedFiles().new_folder()
-    made.key(KEY.Key_C, CONTROL | SHIFT)
-    made.wait(lambda: "gone: cannot be written" in " ".join(made.said))
+    assert "gone: cannot be written" in copied(64)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    made.close()
+    assert not any(tmp_path.glob(".learned-strings-files*"))
 
 
 def test_an_instrument_is_saved_anywhere_and_shown_in_its_folder(
