@@ -133,34 +133,24 @@ def find_patch(name_or_path: str) -> PatchEntry:
     raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {choices}")
 
 
-def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
-    """Write the patch into the user's folder, which is made if need be; whole or not at all.
+def save_patch(patch: Patch, file: Path | None = None) -> PatchEntry:
+    """Write the patch, in a folder that is made if need be; whole or not at all.
 
     Args:
-        replace: the file of a patch of the user's that it replaces; None: it is a new one, with a file of its own.
+        file: where it is written, whatever is there; None: a new one in the user's folder.
 
     Raises:
-        PatchError: the name is that of another patch, or the one to replace is shipped.
+        PatchError: the name is that of another patch, or a shipped one would be replaced or hidden.
         WriteError: the folder or the file cannot be written.
     """
-    path = replace or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
-    if replace is None and path.exists():
-        raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
-    return write_patch(patch, path)
-
-
-def write_patch(patch: Patch, path: Path) -> PatchEntry:
-    """Write the patch to a file anywhere, in a folder that is made if need be; whole or not at all.
-
-    Raises:
-        PatchError: it would replace or hide a shipped one.
-        WriteError: the folder or the file cannot be written.
-    """
+    path = file or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
     if path.parent in (SHIPPED, own_patches()) and (SHIPPED / path.name).exists():
         raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
+    if file is None and path.exists():
+        raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     make_folder(path.parent)
-    with result_file(path) as file:
-        file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
+    with result_file(path) as output:
+        output.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
     return PatchEntry(path, patch)
 
 

@@ -14,20 +14,12 @@ from app.shared.value import Value
 from engine.plain_text import name_text
 
 MOST_RECENT = 10
-LONGEST_PATH = 4_096  # characters
 FileKind = Literal["open", "note", "recording", "sampler", "plugin", "instrument", "test", "figure"]
-SOUNDS: tuple[FileKind, ...] = ("note", "recording", "sampler")  # whose first folder is the user's music
-MODES = {
-    "open": (QFileDialog.FileMode.ExistingFiles, QFileDialog.AcceptMode.AcceptOpen),
-    "save": (QFileDialog.FileMode.AnyFile, QFileDialog.AcceptMode.AcceptSave),
-    "folder": (QFileDialog.FileMode.Directory, QFileDialog.AcceptMode.AcceptOpen),
-}
 
 
 def _full_path(path: Path) -> Path:
     """The path, where settings can hold it: bytes of a name may be no characters."""
-    text = str(path)
-    if not path.is_absolute() or len(text) > LONGEST_PATH or "\0" in text or name_text(text) != text:
+    if not path.is_absolute() or "\0" in str(path) or name_text(str(path)) != str(path):
         raise ValueError("give a full path")
     return path
 
@@ -49,56 +41,48 @@ class FilePlaces:
         self.choices = choices or FileChoices()
 
     def folder(self, kind: FileKind, first: Path | None = None) -> Path:
-        """The folder that was used last for a kind of file; where that is gone `first`, else music or documents."""
+        """The folder that was used last for a kind of file; where that is gone `first`, else the user's music."""
         last = self.choices.folders.get(kind)
         if last is not None and QFileInfo(str(last)).isDir():
             return last
-        locations = QStandardPaths.StandardLocation
-        standard = locations.MusicLocation if kind in SOUNDS else locations.DocumentsLocation
-        own = QStandardPaths.writableLocation(standard)
-        return first or (Path(own) if own and QFileInfo(own).isDir() else Path.home())
+        music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
+        return first or (Path(music) if QFileInfo(music).isDir() else Path.home())
 
     def remember(self, kind: FileKind, folder: Path) -> None:
-        self._change(self.choices.recent, {**self.choices.folders, kind: folder.absolute()})
+        self._change(folders={**self.choices.folders, kind: folder.absolute()})
 
     def opened(self, file: Path) -> None:
-        """Put a file first among the recent ones."""
-        self.forget(file)
-        self._change((file.absolute(), *self.choices.recent)[:MOST_RECENT], self.choices.folders)
+        """Put a file first among the recent ones; one that is gone is removed from them."""
+        first = [file.absolute()] if QFileInfo(str(file)).isFile() else []
+        others = (path for path in self.choices.recent if path != file.absolute())
+        self._change(recent=[*first, *others][:MOST_RECENT])
 
-    def forget(self, file: Path) -> None:
-        """Remove a file from the recent ones."""
-        recent = tuple(path for path in self.choices.recent if path != file.absolute())
-        self._change(recent, self.choices.folders)
-
-    def _change(self, recent: tuple[Path, ...], folders: dict[FileKind, Path]) -> None:
+    def _change(self, **fields: object) -> None:
         with suppress(ValueError):  # of a path that cannot be remembered
-            self.choices = FileChoices(recent=recent, folders=folders)
+            self.choices = FileChoices.model_validate({**dict(self.choices), **fields})
 
-    def ask(
-        self, parent: QWidget, kind: FileKind, title: str, mode: str, filters: str = "", path: Path | None = None
-    ) -> list[Path]:
-        """Ask for files, a file to write or a folder, one of MODES; none where the user gives none.
+    def ask_to_open(self, parent: QWidget, filters: str) -> list[Path]:
+        """Ask for files; `filters`: as of `QFileDialog`."""
+        names, _ = QFileDialog.getOpenFileNames(parent, "Open", str(self.folder("open")), filters)
+        for name in names[:1]:
+            self.remember("open", Path(name).parent)
+        return [Path(name) for name in names]
 
-        Args:
-            filters: as of `QFileDialog`.
-            path: that is suggested, or its name alone. A file to write gets its ending.
-        """
-        dialog = QFileDialog(parent, title, str(self.folder(kind)), filters)
-        file_mode, accept_mode = MODES[mode]
-        dialog.setFileMode(file_mode)
-        dialog.setAcceptMode(accept_mode)
-        if path is not None:
-            if path.is_absolute() and QFileInfo(str(path.parent)).isDir():
-                dialog.setDirectory(str(path.parent))
-            dialog.selectFile(path.name)
-            dialog.setDefaultSuffix(path.suffix)
-        accepted, chosen = dialog.exec(), [Path(file) for file in dialog.selectedFiles()]
-        dialog.deleteLater()
-        if not accepted or not chosen:
-            return []
-        self.remember(kind, chosen[0] if mode == "folder" else chosen[0].parent)
-        if path is not None and chosen[0].suffix.lower() != path.suffix.lower():  # of "strings v1.2"
-            named = chosen[0].with_name(chosen[0].name + path.suffix)
-            return self.ask(parent, kind, title, mode, filters, named) if named.exists() else [named]
-        return chosen
+    def ask_folder(self, parent: QWidget, kind: FileKind, title: str) -> Path | None:
+        name = QFileDialog.getExistingDirectory(parent, title, str(self.folder(kind)))
+        if name:
+            self.remember(kind, Path(name))
+        return Path(name) if name else None
+
+    def ask_to_save(self, parent: QWidget, kind: FileKind, title: str, filters: str, path: Path) -> Path | None:
+        """Ask for a file to write, which gets the ending of `path`: that is suggested, or its name alone."""
+        folder = path.parent if path.is_absolute() and QFileInfo(str(path.parent)).isDir() else self.folder(kind)
+        name, _ = QFileDialog.getSaveFileName(parent, title, str(folder / path.name), filters)
+        if not name:
+            return None
+        file = Path(name)
+        self.remember(kind, file.parent)
+        if file.suffix.lower() == path.suffix.lower():
+            return file
+        file = file.with_name(file.name + path.suffix)  # of "strings v1.2"
+        return self.ask_to_save(parent, kind, title, filters, file) if file.exists() else file

@@ -226,7 +226,7 @@ class Controller(QObject):
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
             "save": self.patches.save,
-            "copy": lambda: self.drag_out.copy("note"),
+            "copy": lambda: self.drag_out.ask("note", "copy"),
             "save_as": self.patches.save_as,
             "revert": self.patches.revert,
             "compare": window.instrument.bar.compare.click,
@@ -369,15 +369,13 @@ class Controller(QObject):
 
         Patches, scales and MIDI files go to `patches`.
         """
+        self.window.places.opened(file)
         if file.suffix.lower() in TAKEN_FILES:
-            if self.patches.take_file(file):
-                self.window.places.opened(file)
+            self.patches.take_file(file)
             return
         dropped = receive(file, self.library)
         if dropped.sound:
             self._ask_what_it_is(file)
-        if dropped.sound or dropped.choices or dropped.body:
-            self.window.places.opened(file)
         self._take(file, dropped)
 
     def _take(self, file: Path, dropped: Dropped) -> None:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import QMimeData, QObject, Qt, QUrl
+from PySide6.QtGui import QDrag, QGuiApplication
 
-from app.export.choices import ExportChoices
-from app.export.handed_files import HandedFiles
-from app.export.job import EXPECTED
-from app.export.note import HeardNote
+from app.export.job import EXPECTED, ExportJob
 from app.shared.worker import Job
 from app.views.background import Background
-from app.views.controls.drag_handle import Handed, file_data
-from app.views.dialogs.export_pages import PAGES, HeardPerformance, Kind
+from app.views.controls.drag_handle import Handed, Way
+from app.views.dialogs.export_pages import PAGES, Kind
 from app.window.exports import Exports
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings
+from engine.whole_file import WriteError, explain, lasting_folder
 
-Take = Callable[[list[Path]], None]
+LARGEST_BYTES = 2**30  # of all files together; the latest are there however large they are
 
 
 class DragOut(QObject):
@@ -30,68 +31,72 @@ class DragOut(QObject):
         super().__init__(window)
         self._window, self._exports = window, exports
         self._handle = handle = window.transport.handle
-        self._files = HandedFiles()
-        self._asked: object = None  # what is rendered, or was
-        self._ready: list[Path] = []  # its files
-        self._take: Take = self._offer
-        self._background = Background("files", self, expected=EXPECTED)
-        self._background.progressed.connect(lambda share, *_: handle.show_share(share))
-        self._background.finished.connect(self._give)
-        self._background.failed.connect(self._fail)
-        handle.wanted.connect(lambda: self._prepare(handle.subject, self._offer))
-        handle.copy_asked.connect(lambda: self.copy(handle.subject))
-        recordings.unsaved_changed.connect(lambda: handle.show_recorded(recordings.offered is not None))
+        self._folders: list[Path] = []  # temporary ones, each of one rendering, which a program may still read
+        self._latest: tuple[object, list[Path]] = (None, [])  # the sound that was asked for last, and its files
+        self._way: Way = "prepare"
+        self._background = background = Background("files", self, expected=EXPECTED)
+        background.progressed.connect(lambda share, *_: handle.show_share(share))
+        for ended in (background.finished, background.failed):
+            ended.connect(lambda *_: handle.show_share(None))
+        background.finished.connect(self._give)
+        background.failed.connect(window.notices.report)
+        handle.asked.connect(lambda way: self.ask(handle.subject, way))
+        recordings.unsaved_changed.connect(
+            lambda: handle.show_subject("note" if recordings.offered is None else "recording")
+        )
 
-    def copy(self, subject: Handed) -> None:
-        """Put the file on the clipboard, from which a file manager pastes it."""
-        self._prepare(subject, self._copy)
-
-    def close(self) -> None:
-        """End what is rendered and remove the files; may be called again."""
-        self._background.close(None)
-        self._files.close()
-
-    def _prepare(self, handed: Handed, take: Take) -> None:
-        """Give the files to `take` once they are rendered, unless they are there already."""
+    def ask(self, handed: Handed, way: Way) -> None:
+        """Give the files once they are rendered, unless they are there already."""
+        if way == "prepare" and (handed == "recording" or self._background.busy):  # which may be long
+            return
         kind: Kind = "performance" if handed == "recording" else "note"
         subject, choices = self._exports.subjects[kind], self._exports.choices[0]
         if subject is None:
             self._window.notices.report(PAGES[kind].missing)
             return
-        if kind == "note":
-            source = "difference" if handed == "difference" else subject.chosen(choices.source)
-            choices = choices.model_copy(update={"source": source})
-        bits = choices.format.split()[1]
-        choices = choices.model_copy(update={"format": f"wav {bits}"})  # which every program reads
-        self._take, asked = take, (subject, choices)
-        if asked != self._asked or not (self._background.busy or all(file.is_file() for file in self._ready)):
-            self._asked = asked
-            self._background.start(lambda job: self._rendered(subject, choices, job))
-        elif not self._background.busy:
-            take(self._ready)
+        source = "difference" if handed == "difference" else choices.source
+        if handed == "note":
+            source = subject.chosen(source)
+        wav = choices.format.replace("flac", "wav")  # which every program reads
+        choices = choices.model_copy(update={"source": source, "format": wav})
+        self._way, (latest, files) = way, self._latest
+        if latest == (subject, choices) and files and all(file.is_file() for file in files):
+            self._give(files)
+        elif latest != (subject, choices) or not self._background.busy:
+            self._latest = (subject, choices), []
+            self._background.start(partial(self._render, partial(subject.export, choices)))
 
-    def _rendered(self, subject: HeardNote | HeardPerformance, choices: ExportChoices, job: Job) -> list[Path]:
-        """The files of a subject, which are sounds."""
-        folder = self._files.new_folder()
-        subject.export(choices, folder).run(job.progress)
+    def close(self) -> None:
+        """End what is rendered and remove the files; may be called again."""
+        self._background.close(None)
+        for folder in self._folders:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _render(self, export: Callable[[Path], ExportJob], job: Job) -> list[Path]:
+        """The files of an export, which are sounds. What killed processes have left is removed."""
+        parent = Path(tempfile.gettempdir())
+        try:
+            while sum(file.stat().st_size for folder in self._folders for file in folder.glob("*")) > LARGEST_BYTES:
+                shutil.rmtree(self._folders.pop(0), ignore_errors=True)
+            folder = lasting_folder(parent, "learned-strings-files")
+        except OSError as error:
+            raise WriteError(explain(parent, error)) from error
+        self._folders.append(folder)
+        export(folder).run(job.progress)
         return sorted(file for file in folder.iterdir() if file.suffix != ".mid")
 
     def _give(self, files: list[Path]) -> None:
-        self._ready = files
-        self._handle.show_share(None)
-        self._take(files)
-
-    def _fail(self, message: str, details: str) -> None:
-        self._asked = None
-        self._handle.show_share(None)
-        self._window.notices.report(message, details)
-
-    def _offer(self, files: list[Path]) -> None:
-        self._handle.offer(files)
-        if self._handle.pulled:  # and released since
+        """Give the files, which are whole, in the way that was asked for last."""
+        self._latest = self._latest[0], files
+        data = QMimeData()
+        data.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
+        if self._way == "copy":
+            QGuiApplication.clipboard().setMimeData(data)
+            names = " and ".join(file.name for file in files)
+            self._window.notices.inform(f"Copied {names}: paste in a file manager.")
+        elif self._way == "drag" and self._handle.pulled:
+            drag = QDrag(self._handle)
+            drag.setMimeData(data)
+            drag.exec(Qt.DropAction.CopyAction)
+        elif self._way == "drag":  # released since
             self._window.say_briefly("Rendered: drag it now")
-
-    def _copy(self, files: list[Path]) -> None:
-        QGuiApplication.clipboard().setMimeData(file_data(files))
-        names = " and ".join(file.name for file in files)
-        self._window.notices.inform(f"Copied {names}: paste in a file manager.")

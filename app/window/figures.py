@@ -108,13 +108,15 @@ class Figures(QObject):
         note = heard_note(self._session.choices, self._library, self._session.stage.struck)
         title = re.sub(r"[^\w .+-]", "-", panel.title.lower())
         proposed = Path(f"{note.name if note else 'Figure'} {title}{suffix}")
-        for path in self._window.places.ask(self._window, "figure", "Save as", "save", FILTERS[suffix], proposed):
-            try:
-                with result_file(path) as file:
-                    file.write(data)
-            except WriteError as error:
-                self._window.notices.report(str(error))
-                return
+        path = self._window.places.ask_to_save(self._window, "figure", "Save as", FILTERS[suffix], proposed)
+        if path is None:
+            return
+        try:
+            with result_file(path) as file:
+                file.write(data)
+        except WriteError as error:
+            self._window.notices.report(str(error))
+        else:
             self._window.notices.inform(f"Saved {path}.{words}", file=path)
 
 

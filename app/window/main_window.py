@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
-from PySide6.QtCore import QByteArray, QEvent, QFileInfo, QMargins, QObject, QPoint, QRect, Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import QByteArray, QEvent, QMargins, QObject, QPoint, QRect, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -147,7 +147,7 @@ class MainWindow(QMainWindow):
         self._lay_out()
         self.setAcceptDrops(True)
         self.menu.look_asked.connect(self._change_look)
-        self.menu.recent_asked.connect(self._open_recent)
+        self.menu.recent_asked.connect(self.file_dropped)
         self.menu.aboutToShow.connect(lambda: self.menu.show_recent(self.places.choices.recent))
         QApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         enter = QShortcut(QKeySequence("Return"), self)
@@ -477,15 +477,8 @@ class MainWindow(QMainWindow):
     # Files: dropped, or chosen in a dialog
 
     def _ask_for_files(self) -> None:
-        for file in self.places.ask(self, "open", "Open", "open", FILE_FILTER):
+        for file in self.places.ask_to_open(self, FILE_FILTER):
             self.file_dropped.emit(file)
-
-    def _open_recent(self, file: Path) -> None:
-        if QFileInfo(str(file)).isFile():
-            self.file_dropped.emit(file)
-        else:
-            self.places.forget(file)
-            self.notices.report(f"{file} is not there any more, and was removed from the recent files.")
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         ours = event.source() is not None  # dragged out of this window

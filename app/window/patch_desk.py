@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -33,7 +32,6 @@ from app.patches.library import (
     read_patch,
     rename_patch,
     save_patch,
-    write_patch,
 )
 from app.patches.patch import ASSIGNABLE, BodyChoice, Patch, StringSet
 from app.patches.scales import SCALES
@@ -241,30 +239,19 @@ class PatchDesk(BrowserDesk):
             )
 
     def save_as(self) -> None:
-        """Save the patch as a file anywhere, whose name it has there."""
+        """Save the patch as a file anywhere, by whose name it is called there."""
         patch = self.patch
         if patch is None:
-            self._notices.report("There is no instrument to save: choose one first.")
             return
-        suggested = Path(f"{patch.name}{SUFFIX}")
-        places, title = self._window.places, "Save instrument as"
-        for file in places.ask(self._panel, "instrument", title, "save", f"Instrument (*{SUFFIX})", suggested):
-            try:
-                self._write(partial(self._save_at, patch, file))
-            except ValueError as error:
-                self._notices.report(f"{file}: {one_line(explained(error))}; choose another name.")
-
-    def _save_at(self, patch: Patch, file: Path) -> None:
-        """Save a patch as a file, by the name of that; in the user's own folder it is played from now on."""
-        patch = Patch.model_validate({**dict(patch), "name": name_text(file.stem)})
-        write_patch(patch, file)
-        self.reload()
-        if file.parent == own_patches():
-            self._session.update(patch=patch)
-        self._inform_saved(patch, file)
-
-    def _inform_saved(self, patch: Patch, file: Path) -> None:
-        self._notices.inform(f"{patch.name} was saved as {file}.", file=file)
+        suggested, filters = Path(f"{patch.name}{SUFFIX}"), f"Instrument (*{SUFFIX})"
+        file = self._window.places.ask_to_save(self._panel, "instrument", "Save instrument as", filters, suggested)
+        if file is None:
+            return
+        try:
+            named = Patch.model_validate({**dict(patch), "name": name_text(file.stem)})
+            self._write(lambda: self._save(named, file))
+        except ValueError as error:
+            self._notices.report(f"{file}: {one_line(explained(error))}; choose another name.")
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
         ask_text(self._panel, title, question, name, lambda name: self._write(lambda: do(name)))
@@ -276,13 +263,15 @@ class PatchDesk(BrowserDesk):
         except WriteError as error:
             self._notices.report(one_line(str(error)))
 
-    def _save(self, patch: Patch, replace: Path | None = None) -> None:
-        saved = save_patch(patch, replace)
+    def _save(self, patch: Patch, file: Path | None = None) -> None:
+        """Save the patch; in the user's own folder it is played from now on."""
+        saved = save_patch(patch, file)
         self.reload()
-        self._session.update(patch=patch)
-        self._show_patch()
-        self.browser.reveal(saved.name)
-        self._inform_saved(patch, saved.path)
+        if saved.path.parent == own_patches():
+            self._session.update(patch=patch)
+            self._show_patch()
+            self.browser.reveal(saved.name)
+        self._notices.inform(f"{patch.name} was saved as {saved.path}.", file=saved.path)
 
     def rename(self, name: str = "") -> None:
         """Ask for a new name of one of the user's own patches, by default the present one."""
@@ -325,11 +314,8 @@ class PatchDesk(BrowserDesk):
         self._performance.hear_patch(None if entry is None else entry.patch)
         self._panel.bar.show_comparing(entry is not None)
 
-    def take_file(self, file: Path) -> bool:
-        """Take a dropped file of TAKEN_FILES: add and choose a patch, play a MIDI file, tune by a scale.
-
-        Returns True if it could be used.
-        """
+    def take_file(self, file: Path) -> None:
+        """Take a dropped file of TAKEN_FILES: add and choose a patch, play a MIDI file, tune by a scale."""
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._play_file(file)
@@ -339,8 +325,6 @@ class PatchDesk(BrowserDesk):
                 self._add(file)
         except (MidiFileError, PatchError, OSError, ValueError) as error:
             self._notices.report(one_line(str(error)))
-            return False
-        return True
 
     def _add(self, file: Path) -> None:
         """Add a patch's file to the library, and choose it; where it cannot be added, it is only chosen."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.views.file_places import FileChoices, FileKind, FilePlaces
 
@@ -20,9 +20,15 @@ def places_in(folder: Path) -> FilePlaces:
     return FilePlaces(files_in(folder))
 
 
-def choose_files(monkeypatch: pytest.MonkeyPatch, *files: Path) -> list[QFileDialog]:
-    """Choose these in every dialog from now on; none: cancel. The dialogs that were shown."""
-    shown: list[QFileDialog] = []
-    monkeypatch.setattr(QFileDialog, "exec", lambda dialog: shown.append(dialog) or bool(files))
-    monkeypatch.setattr(QFileDialog, "selectedFiles", lambda dialog: [str(file) for file in files])
+def choose_files(monkeypatch: pytest.MonkeyPatch, *files: Path) -> list[str]:
+    """Choose these in every dialog from now on; none: cancel. The places that the dialogs suggested."""
+    shown: list[str] = []
+
+    def choose(parent: QWidget, title: str, place: str, *filters: str) -> list[str]:
+        shown.append(place)
+        return [str(file) for file in files]
+
+    monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *given: (choose(*given), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *given: (next(iter(choose(*given)), ""), ""))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *given: next(iter(choose(*given)), ""))
     return shown

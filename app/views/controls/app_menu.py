@@ -11,7 +11,6 @@ from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.views.controls.parts import tool_button
-from app.views.controls.plain import plain_tip
 from app.views.look import Look
 from engine.plain_text import one_line
 
@@ -128,9 +127,7 @@ class AppMenu(QMenu):
                 self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
                 self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         self._recent = QMenu(self)
-        self._recent.setToolTipsVisible(True)
         self.action["recent"].setMenu(self._recent)
-        self.show_recent([])
         if window is not None:
             window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
 
@@ -145,7 +142,6 @@ class AppMenu(QMenu):
         for number, file in enumerate(files, 1):
             name, folder = (one_line(text, LONGEST_FILE).replace("&", "&&") for text in (file.name, file.parent.name))
             action = self._recent.addAction(f"&{number % 10}  {name}\t{folder}")
-            action.setToolTip(plain_tip(str(file)))
             action.triggered.connect(lambda _=False, file=file: self.recent_asked.emit(file))
 
     def show_steps(self, undo: str, redo: str) -> None:

@@ -176,12 +176,14 @@ class FilePicker(QWidget):
 
     def browse(self) -> None:
         named = Path(self.edit.text().strip()).name
+        path: Path | None
         if self.suffix:
             suggested = self.path if named else Path(f"untitled{self.suffix}")
-            chosen = self.places.ask(self, self.kind, "Save as", "save", FILTERS[self.suffix], suggested)
+            path = self.places.ask_to_save(self, self.kind, "Save as", FILTERS[self.suffix], suggested)
         else:  # a folder that is made in the chosen one
-            chosen = [folder / named for folder in self.places.ask(self, self.kind, "Save in", "folder")]
-        for path in chosen:
+            folder = self.places.ask_folder(self, self.kind, "Save in")
+            path = folder and folder / named
+        if path is not None:
             self.edit.setText(str(path))
             self._name_edited()
 

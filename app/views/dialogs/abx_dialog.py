@@ -231,7 +231,8 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        for folder in self._places.ask(self, "test", "Folder of the result", "folder"):
+        folder = self._places.ask_folder(self, "test", "Folder of the result")
+        if folder is not None:
             self._save(folder)
 
     # What is shown, and leaving

@@ -35,18 +35,11 @@ def chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     """The names that file dialogs propose; each is chosen, without its ending, in an own folder."""
     proposed: list[str] = []
 
-    def choose(dialog: QFileDialog) -> bool:
-        proposed.append(dialog.selectedFiles()[0])
-        monkeypatch.setattr(QFileDialog, "selectedFiles", lambda _: [str(tmp_path / Path(proposed[-1]).stem)])
-        return True
+    def choose(parent: QWidget, title: str, place: str, filters: str) -> tuple[str, str]:
+        proposed.append(place)
+        return str(tmp_path / Path(place).stem), filters
 
-    selected = QFileDialog.selectedFiles
-
-    def exec_(dialog: QFileDialog) -> bool:
-        monkeypatch.setattr(QFileDialog, "selectedFiles", selected)
-        return choose(dialog)
-
-    monkeypatch.setattr(QFileDialog, "exec", exec_)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", choose)
     return proposed
 
 
@@ -142,14 +135,14 @@ def test_files_have_the_numbers_of_the_take_at_the_command(
     lab.panel("waveform")
     waveform = lab.panel("waveform")
     lab.wait(lambda: waveform.columns() is not None and waveform.columns().rows == take.frames)
-    choose = QFileDialog.exec
+    choose = QFileDialog.getSaveFileName
 
-    def choose_late(dialog: QFileDialog) -> Any:
+    def choose_late(*given: Any) -> Any:
         lab.change(position=0.21)
         lab.wait_for_take()
-        return choose(dialog)
+        return choose(*given)
 
-    monkeypatch.setattr(QFileDialog, "exec", choose_late)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", choose_late)
     by_shift_f10(lab, waveform.figure)
     take_action("Save data")
     found = table((tmp_path / Path(chosen[-1]).name).read_text("utf-8"))
@@ -158,7 +151,7 @@ def test_files_have_the_numbers_of_the_take_at_the_command(
     for name in ("model", "truth"):
         column = found["A model (m)" if name == "model" else "B truth (m)"].astype(np.float32)
         assert (column == take.listened.signals[name].read()[:, 0]).all()
-    monkeypatch.setattr(QFileDialog, "exec", choose)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", choose)
     take = lab.performance.take
 
     def copied(key: str) -> Table:
