@@ -270,7 +270,7 @@ class _Map(Plot):
 
     def _pluck_at(self, at: QPointF) -> tuple[float, float] | None:
         """The pluck that a place on the axes stands for, None beside the map."""
-        if not self._area.contains(at):
+        if math.isnan(at.x()) or not self._area.contains(at):  # which holds NaN, in Qt's arithmetic
             return None
         position = min(max(at.x(), float(POSITIONS[0])), float(POSITIONS[-1]))
         amplitude_mm = min(max(10 ** at.y(), float(AMPLITUDES_MM[0])), float(AMPLITUDES_MM[-1]))

@@ -147,6 +147,8 @@ def test_the_map_of_errors_is_computed_once_a_shape_pointed_at_and_plucked_in(
         point(position, amplitude_mm)
         lab.wait(lambda words=f"Pluck at {position:.2f}": words in panel.words)
         assert ("outside the training range" in panel.words) == outside
+    plane.hovered.emit(math.nan, math.nan)  # the pointer has left
+    assert plane.cursor is None
     lab.qtbot.mouseClick(plane.viewport(), LEFT, pos=point(0.6, 8.0))
     assert "error as trained about 5 %" in panel.words
     assert lab.choices.position == pytest.approx(0.6, abs=0.01) == round(lab.choices.position, 3)
