@@ -58,7 +58,6 @@ def test_takes_are_written_where_the_first_was_saved_and_their_own_files_alone_a
         for _ in range(2):
             chosen(guitar, 0, "Delete …")
             assert names(folder) == (before if len(questions) == 1 else before - {"Best.wav"})
-    assert f"{folder / 'Best.mid'} is not as the take was saved, and was not deleted." in guitar.said
     assert len(takes(guitar)) == 2 and (folder / "Steel-string acoustic 2.mid").read_bytes() == b"mine"
     (folder / "Steel-string acoustic 3.wav").unlink()
     folder.rename(tmp_path / "moved")
