@@ -169,11 +169,6 @@ class Recordings(QObject):
         return [take for take in self._takes if not take.files]
 
     @property
-    def latest(self) -> Played | None:
-        """The latest one that is not saved."""
-        return self._unsaved[-1].played if self._unsaved else None
-
-    @property
     def offered(self) -> RecordedTake | None:
         """The take for the export dialog: the one that was asked for, or the last."""
         return self._asked if self._asked in self._takes else next(reversed(self._takes), None)
@@ -181,7 +176,7 @@ class Recordings(QObject):
     @property
     def unsaved(self) -> bool:
         """Return True if anything was played that is not saved, or is being recorded."""
-        return self.latest is not None or self._keys.recorder.recording
+        return bool(self._unsaved) or self._keys.recorder.recording
 
     def set_choices(self, changes: Mapping[str, object]) -> None:
         """Change fields of `choices`, which the next take has."""
