@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -128,9 +128,6 @@ class Recordings(QObject):
     The button of the instrument's bar records and ends; the menu beside it has all takes. The first that is saved
     chooses the place, where later ones are written as soon as they end. Until it is written, a take is kept in memory
     and in its journal on disk, which `offer_left` finds after the end of the process.
-
-    Attributes:
-        choices: the settings of count-in and metronome.
     """
 
     save_asked = Signal()  # of the take that is offered: its place is to be chosen
@@ -146,7 +143,6 @@ class Recordings(QObject):
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self.choices = Meter()
         self._metronome = Metronome(notes)
         self._meter: Meter | None = None  # of the recording under way; None: it is not counted
         self._takes: list[RecordedTake] = []
@@ -162,7 +158,6 @@ class Recordings(QObject):
         self._writing.failed.connect(self._fail_to_write)
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
-        bar.takes.change_asked.connect(lambda field, value: self.set_choices({field: value}))
 
     @property
     def _unsaved(self) -> list[RecordedTake]:
@@ -178,11 +173,6 @@ class Recordings(QObject):
         """Return True if anything was played that is not saved, or is being recorded."""
         return bool(self._unsaved) or self._keys.recorder.recording
 
-    def set_choices(self, changes: Mapping[str, object]) -> None:
-        """Change fields of `choices`, which the next take has."""
-        self.choices = Meter.model_validate({**dict(self.choices), **changes})
-        self._bar.takes.show_choices(self.choices)
-
     def record(self) -> None:
         """Begin to record, after the count-in; or end it and have it saved, as a take that is not saved yet."""
         if self._keys.recorder.recording:
@@ -191,8 +181,9 @@ class Recordings(QObject):
             return
         if not self._session.choices.plays_patch:
             self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
-        self._meter = self.choices if self.choices.metronome or self.choices.count_in_bars else None
-        beat_s = None if self._meter is None else self._metronome.begin(self.choices)
+        meter = self._bar.takes.meter
+        self._meter = meter if meter.metronome or meter.count_in_bars else None
+        beat_s = None if self._meter is None else self._metronome.begin(meter)
         self._keys.begin_recording(beat_s)
         self._began_s, self._began = beat_s or time.monotonic(), datetime.now().astimezone()
         self._journaling.begin(self._began, self._meter)

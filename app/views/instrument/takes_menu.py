@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
 
@@ -19,17 +18,16 @@ TakeRow = tuple[str, Mapping[str, Callable[[], object]]]  # a take's words; what
 
 
 class TakesMenu(QMenu):
-    """Choices emit a signal, and a row of a take does what it was given; setters show what became of it."""
-
-    change_asked = Signal(str, object)  # a field of `Meter` and its new value
+    """A row of a take does what it was given; `meter` has what is chosen for the next one."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Takes", parent)
+        self.meter = Meter()
         self._takes: list[QMenu] = []
         self._below = self.addSeparator()
         self._metronome = self.addAction("Metronome")
         self._metronome.setCheckable(True)
-        self._metronome.triggered.connect(lambda on: self.change_asked.emit("metronome", on))
+        self._metronome.triggered.connect(lambda on: self.choose({"metronome": on}))
         self._tempo = self.addAction("", self._ask_tempo)
         self._choices: dict[tuple[str, int], QAction] = {}
         for title, field, entries in CHOICES:
@@ -37,9 +35,9 @@ class TakesMenu(QMenu):
             for value, text in entries.items():
                 action = self._choices[field, value] = menu.addAction(text)
                 action.setCheckable(True)
-                action.triggered.connect(partial(self.change_asked.emit, field, value))
+                action.triggered.connect(partial(self.choose, {field: value}))
         self.show_takes(())
-        self.show_choices(Meter())
+        self.choose({})
 
     def show_takes(self, rows: Sequence[TakeRow]) -> None:
         """Show the takes, in this order."""
@@ -55,15 +53,16 @@ class TakesMenu(QMenu):
             self.insertMenu(self._below, menu)
             self._takes.append(menu)
 
-    def show_choices(self, choices: Meter) -> None:
-        self._meter = choices
-        self._metronome.setChecked(choices.metronome)
-        self._tempo.setText(f"Tempo: {choices.tempo_bpm} beats a minute …")
+    def choose(self, changes: Mapping[str, object]) -> None:
+        """Change fields of `meter`."""
+        self.meter = Meter.model_validate({**dict(self.meter), **changes})
+        self._metronome.setChecked(self.meter.metronome)
+        self._tempo.setText(f"Tempo: {self.meter.tempo_bpm} beats a minute …")
         for (field, value), action in self._choices.items():
-            action.setChecked(getattr(choices, field) == value)
+            action.setChecked(getattr(self.meter, field) == value)
 
     def _ask_tempo(self) -> None:
-        limits = self._meter.tempo_bpm, *TEMPOS_BPM
+        limits = self.meter.tempo_bpm, *TEMPOS_BPM
         tempo_bpm, chosen = QInputDialog.getInt(self.parentWidget(), "Tempo", "Beats a minute:", *limits)
         if chosen:
-            self.change_asked.emit("tempo_bpm", tempo_bpm)
+            self.choose({"tempo_bpm": tempo_bpm})
