@@ -57,9 +57,8 @@ class RecordedTake:
         if self.own_files != list(self.files):
             raise ValueError(f"the files of {self.name} were moved or changed since they were saved")
         renamed = {file: file.with_name(f"{name}{file.suffix}") for file in self.files}
-        for after in renamed.values():
-            if after.exists():
-                raise ValueError(f"{after.name} is there already; choose another name")
+        if there := [file.name for file in renamed.values() if os.path.lexists(file)]:
+            raise ValueError(f"{there[0]} is there already; choose another name")
         for before, after in renamed.items():
             before.rename(after)
             self.files[after] = self.files.pop(before)

@@ -5,17 +5,13 @@ Each click is a voice of the mixer at the frame of its beat, handed over ahead.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.events import Meter
+from app.playing.notes import Notes
 from app.playing.playback import AHEAD_S, Beginning
 from engine.voices import Voice, plain_program
-
-if TYPE_CHECKING:
-    from app.playing.notes import Notes
 
 CLICKS_AHEAD_S = 1.0  # lead of clicks: so long the window's timer may stand still; another device lacks them
 PITCHES_HZ, DECAY_S, CLICK_S, LEVEL = (1318.5, 1760.0), 0.008, 0.06, 0.25  # of a beat, of the first in a bar
@@ -23,11 +19,7 @@ STOP_S = 0.005
 
 
 class Metronome:
-    """A metronome, whose methods belong to the window's thread.
-
-    Args:
-        notes: have the mixer, whose frames are its time.
-    """
+    """A metronome in the time of the mixer that `notes` have. Its methods belong to the window's thread."""
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes

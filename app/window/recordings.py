@@ -183,7 +183,7 @@ class Recordings(QObject):
             self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
         meter = self._bar.takes.meter
         self._meter = meter if meter.metronome or meter.count_in_bars else None
-        beat_s = None if self._meter is None else self._metronome.begin(meter)
+        beat_s = self._metronome.begin(meter) if self._meter else None
         self._keys.begin_recording(beat_s)
         self._began_s, self._began = beat_s or time.monotonic(), datetime.now().astimezone()
         self._journaling.begin(self._began, self._meter)
