@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from pydantic import TypeAdapter
+from PySide6.QtCore import QFileInfo
 
 from app.export.journal import Journal
 from app.export.played import Played, recorded_files
 from app.patches.fields import Name
-from engine.whole_file import WriteError, explain
 
 _NAME = TypeAdapter(Name)
 
@@ -29,69 +29,57 @@ class RecordedTake:
     played: Played
     journal: Journal | None
     name: str
-    files: dict[Path, tuple[int, ...]] = field(default_factory=dict)
+    files: dict[Path, tuple[int, int]] = field(default_factory=dict)
+
+    @property
+    def own_files(self) -> list[Path]:
+        """The files that were not moved or changed since it was saved."""
+        return [file for file, mark in self.files.items() if _mark(file) == mark]
 
     def save_to(self, path: Path) -> None:
-        """Make the files of a recording that were just written to `path` its own."""
-        files = recorded_files(path)
-        self.name, self.files = files[0].stem, {file: _mark(file) for file in files}
+        """Make files its own that were just written; `path`: its sound's."""
+        self.files, self.name = {file: _mark(file) for file in recorded_files(path)}, path.stem
         self.forget_journal()
 
     def forget_journal(self) -> None:
         if self.journal is not None:
             self.journal.delete()
-        self.journal = None
+            self.journal = None
 
     def rename(self, name: str) -> None:
         """Rename it and its files.
 
         Raises:
-            ValueError: no file can have the name, or one has it; its own were moved or changed; or they cannot be
-                renamed. What is renamed by then stays its own.
+            ValueError: no file can have the name, or one has it; or its own were moved or changed.
+            OSError: a file cannot be renamed.
         """
         name = _NAME.validate_python(name)
+        if self.own_files != list(self.files):
+            raise ValueError(f"the files of {self.name} were moved or changed since they were saved")
         renamed = {file: file.with_name(f"{name}{file.suffix}") for file in self.files}
+        if there := [file.name for file in renamed.values() if os.path.lexists(file)]:
+            raise ValueError(f"{there[0]} is there already; choose another name")
         for before, after in renamed.items():
-            if _mark(before) != self.files[before]:
-                raise ValueError(f"{before} is not there as it was saved")
-            if after.exists() and before != after:
-                raise ValueError(f"{after.name} is there already; choose another name")
-        for before, after in renamed.items():
-            try:
-                before.rename(after)
-            except OSError as error:
-                raise ValueError(explain(after, error)) from error
+            before.rename(after)
             self.files[after] = self.files.pop(before)
         self.name = name
 
-    def delete(self) -> list[Path]:
-        """Delete its files, or its journal; return those of its names that are other files by now, which stay.
-
-        Raises:
-            WriteError: one cannot be deleted.
-        """
-        for file, mark in self.files.items():
-            try:
-                if _mark(file) == mark:
-                    file.unlink()
-            except OSError as error:
-                raise WriteError(explain(file, error)) from error
+    def delete(self) -> None:
+        """Delete its own files, or its journal. Raises OSError: a file cannot be deleted."""
+        for file in self.own_files:
+            file.unlink()
         self.forget_journal()
-        return [file for file in self.files if file.exists()]
 
 
-def free_path(path: Path, taken: Collection[Path]) -> Path:
-    """The path of a take's sound, with a number where one of its files is or will be there."""
+def free_path(path: Path) -> Path:
+    """The path of a take's sound, with a number where one of its files is there."""
     number, free = 2, path
-    while free in taken or any(file.exists() or file.is_symlink() for file in recorded_files(free)):
+    while any(os.path.lexists(file) for file in recorded_files(free)):
         number, free = number + 1, path.with_name(f"{path.stem} {number}{path.suffix}")
     return free
 
 
-def _mark(file: Path) -> tuple[int, ...]:
-    """Numbers that another file of the same name does not have; none where there is none."""
-    try:
-        there = file.stat()
-    except OSError:
-        return ()
-    return there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns
+def _mark(file: Path) -> tuple[int, int]:
+    """Numbers that another file of the same name does not have, nor one that was changed."""
+    there = QFileInfo(str(file))
+    return there.size(), there.lastModified().toMSecsSinceEpoch()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
@@ -33,6 +34,7 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
     **dict.fromkeys(range(midi.SOUND_OFF, 128), "stops or resets what is played"),
 }
 LONGEST_RECORDING = 100_000  # events
+TEMPOS_BPM = 30, 300  # the slowest and the fastest
 EARLY_S = 0.12  # before the first beat, at which a key that is struck so late in the count-in counts
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 Number = Annotated[int, ranged(0, 127)]  # of MIDI
@@ -192,15 +194,14 @@ class Meter(Value):
         metronome: whether it clicks while it is recorded.
     """
 
-    tempo_bpm: int = Field(120, ge=30, le=300)
+    tempo_bpm: int = Field(120, ge=TEMPOS_BPM[0], le=TEMPOS_BPM[1])
     beats: int = Field(4, ge=1, le=12)
     count_in_bars: int = Field(0, ge=0, le=2)
     metronome: bool = False
 
     @property
-    def counts(self) -> bool:
-        """Return True if a recording is counted."""
-        return self.metronome or self.count_in_bars > 0
+    def count_in_beats(self) -> int:
+        return self.count_in_bars * self.beats
 
 
 def played_from(recorded: Iterable[TimedEvent], end_s: float, counted: bool = False) -> list[TimedEvent]:
@@ -215,10 +216,9 @@ def played_from(recorded: Iterable[TimedEvent], end_s: float, counted: bool = Fa
     events = [timed_event for timed_event in recorded if timed_event.time_s <= end_s]
     events.sort(key=lambda timed_event: timed_event.time_s)
     if counted:
-        turned = [entry for entry in events if entry.time_s < 0 and isinstance(entry.event, PatchTurned)]
-        early = [entry for entry in events if entry.time_s <= -EARLY_S and isinstance(entry.event, NoteOn | NoteOff)]
-        left_out = {id(entry) for entry in (*turned[:-1], *early)}
-        events = [entry for entry in events if id(entry) not in left_out]
+        turned_s = [entry.time_s for entry in events if entry.time_s < 0 and isinstance(entry.event, PatchTurned)]
+        from_s = {PatchTurned: max(turned_s, default=0.0), NoteOn: -EARLY_S, NoteOff: -EARLY_S}
+        events = [entry for entry in events if entry.time_s >= from_s.get(type(entry.event), -math.inf)]
     events += [TimedEvent(end_s, event) for event in releases_for(timed_event.event for timed_event in events)]
     first = next((timed_event.time_s for timed_event in events if isinstance(timed_event.event, NoteOn)), None)
     if first is None:

@@ -134,7 +134,7 @@ class Controller(QObject):
         self.patches = PatchDesk(
             window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
         )
-        self.patches.recordings.set_choices(dict(settings.record))
+        window.instrument.bar.takes.choose(dict(settings.record))
         window.show_keys(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
@@ -440,7 +440,7 @@ class Controller(QObject):
                 "export": self.exports.choices[0],
                 "sampled": self.exports.choices[1],
                 "files": self.window.places.choices,
-                "record": self.patches.recordings.choices,
+                "record": self.window.instrument.bar.takes.meter,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.window.look,

@@ -65,7 +65,7 @@ class Leaving(QObject):
             return True
         if answer == SAVE:
             self._recordings.end()
-            self._waits = self._recordings.latest is not None  # else nothing was played
+            self._waits = self._recordings.unsaved  # else nothing was played
             if self._waits:
                 self._recordings.save()
             return not self._waits

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
@@ -27,13 +28,12 @@ from app.stage.session import Session
 from app.views.background import Background
 from app.views.dialogs.question import ask, ask_text
 from app.views.file_manager import reveal
-from app.views.instrument.takes_menu import TakeRow
 from app.window.main_window import MainWindow
 from engine.plain_text import duration, one_line
-from engine.whole_file import WriteError
+from engine.whole_file import explain
 
 WRITE_EVERY_S = 0.25  # to disk
-LONGEST_NAME = 60  # characters of an instrument
+LONGEST_NAME = 60  # characters of an instrument or a take
 RECOVER = "Recover"
 LATER = "Later"
 DISCARD = "Discard"
@@ -128,12 +128,9 @@ class Recordings(QObject):
     The button of the instrument's bar records and ends; the menu beside it has all takes. The first that is saved
     chooses the place, where later ones are written as soon as they end. Until it is written, a take is kept in memory
     and in its journal on disk, which `offer_left` finds after the end of the process.
-
-    Attributes:
-        choices: the settings of count-in and metronome.
     """
 
-    save_asked = Signal()  # of the one that is offered: its place is to be chosen
+    save_asked = Signal()  # of the take that is offered: its place is to be chosen
     play_asked = Signal(object)  # a RecordedTake
     unsaved_changed = Signal()
     written = Signal(bool)  # a take where the others are, well or not
@@ -146,77 +143,66 @@ class Recordings(QObject):
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self.choices = Meter()
         self._metronome = Metronome(notes)
         self._meter: Meter | None = None  # of the recording under way; None: it is not counted
         self._takes: list[RecordedTake] = []
-        self._asked: RecordedTake | None = None  # to be exported
+        self._asked: RecordedTake | None = None  # for the export dialog
         self._place: tuple[Path, WavSettings] | None = None  # of the take that was saved last, its sound and format
         self._journaling = Journaling(self._keys.recorder, self)
         self._journaling.failed.connect(self._notices.report)
         self._reading = Background("journals", self)
         self._reading.finished.connect(lambda read: self._ask_about(*read))
         self._reading.failed.connect(self._notices.report)
-        self._waiting: list[PlayedExport] = []  # to be written; the first one is
         self._writing = Background("takes", self, expected=EXPECTED)
-        self._writing.finished.connect(lambda words: self._end_writing(words, True))
-        self._writing.failed.connect(lambda words, _: self._end_writing(words, False))
+        self._writing.finished.connect(lambda written: self._end_writing(*written))
+        self._writing.failed.connect(self._fail_to_write)
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
-        bar.takes.asked.connect(self._do)
-        bar.takes.change_asked.connect(lambda field, value: self.set_choices({field: value}))
 
     @property
-    def latest(self) -> Played | None:
-        """The latest one that is not saved."""
-        return next((take.played for take in reversed(self._takes) if not take.files), None)
+    def _unsaved(self) -> list[RecordedTake]:
+        return [take for take in self._takes if not take.files]
 
     @property
     def offered(self) -> RecordedTake | None:
-        """The take for the export dialog: the one that was asked for, the latest that is not saved, or the last."""
-        unsaved = [take for take in self._takes if not take.files]
-        return self._asked if self._asked in self._takes else next(reversed(unsaved or self._takes), None)
+        """The take for the export dialog: the one that was asked for, or the last."""
+        return self._asked if self._asked in self._takes else next(reversed(self._takes), None)
 
     @property
     def unsaved(self) -> bool:
         """Return True if anything was played that is not saved, or is being recorded."""
-        return self.latest is not None or self._keys.recorder.recording
-
-    def set_choices(self, changes: Mapping[str, object]) -> None:
-        """Change fields of `choices`, which the next take has."""
-        self.choices = Meter.model_validate({**dict(self.choices), **changes})
-        self._bar.show_record_choices(self.choices)
+        return bool(self._unsaved) or self._keys.recorder.recording
 
     def record(self) -> None:
         """Begin to record, after the count-in; or end it and have it saved, as a take that is not saved yet."""
         if self._keys.recorder.recording:
             self.end()
-            if self.latest is not None:
-                self.save()
+            self.save()
             return
         if not self._session.choices.plays_patch:
             self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
-        self._meter = self.choices if self.choices.counts else None
-        beat_s = None if self._meter is None else self._metronome.begin(self.choices)
+        meter = self._bar.takes.meter
+        self._meter = meter if meter.metronome or meter.count_in_bars else None
+        beat_s = self._metronome.begin(meter) if self._meter else None
         self._keys.begin_recording(beat_s)
         self._began_s, self._began = beat_s or time.monotonic(), datetime.now().astimezone()
         self._journaling.begin(self._began, self._meter)
         self._choices_changed(frozenset())
 
     def save(self) -> None:
-        """Write the latest take where others were saved; ask for a place where none was."""
-        self._asked, take = None, self.offered
-        if take is None or any(job.played is take.played for job in self._waiting):
+        """Write the latest that is not saved where others were saved; ask for a place where none was."""
+        if not self._unsaved or self._writing.busy:
             return
+        take = self._unsaved[-1]
         entry = self._library.find(take.played.patch.preset)
         if self._place is None or entry is None:
-            self.save_asked.emit()
+            self._export(take)
             return
         before, settings = self._place
-        wanted = before.with_name(f"{take.name}{before.suffix}")
-        path = free_path(wanted, [job.path for job in self._waiting])
-        self._waiting.append(PlayedExport(take.played, entry.path, path, settings))
-        self._write_next()
+        path = free_path(before.with_name(f"{take.name}{before.suffix}"))
+        job = PlayedExport(take.played, entry.path, path, settings)
+        self._writing.start(lambda work: (job, job.run(work.progress)))
+        self._show_takes()
 
     def keep(self, job: PlayedExport) -> None:
         """Take note of an export: the place of later takes, and the files of one that was not saved."""
@@ -226,58 +212,33 @@ class Recordings(QObject):
                 self._place = job.file, job.settings
         self._show_takes()
 
-    def _write_next(self) -> None:
-        if self._waiting and not self._writing.busy:
-            job = self._waiting[0]
-            self._writing.start(lambda work: job.run(work.progress))
-        self._show_takes()
+    def _end_writing(self, job: PlayedExport, words: str) -> None:
+        self.keep(job)
+        self._notices.inform(words, file=job.file)
+        self.save()  # one that ended meanwhile
+        self.written.emit(True)
 
-    def _end_writing(self, words: str, well: bool) -> None:
-        job = self._waiting.pop(0)
-        if well:
-            self.keep(job)
-            self._notices.inform(words, file=job.file)
-        else:
-            self._place = None
-            self._notices.report(f"{words} The take is kept: save it elsewhere in the menu beside Record.")
-        self._write_next()
-        self.written.emit(well)
-
-    def _do(self, what: str, number: int) -> None:
-        """Do what was chosen for a take of the menu."""
-        take = self._takes[number]
-        if what == "play":
-            self.play_asked.emit(take)
-        elif what == "export":
-            self._asked = take
-            self.unsaved_changed.emit()
-            self.save_asked.emit()
-        elif what == "folder":
-            reveal(next(iter(take.files)), self._notices.report)
-        elif what == "rename":
-            ask_text(self._bar, "Rename take", "New name:", take.name, take.rename)
-        else:
-            self._delete(take)
+    def _fail_to_write(self, words: str) -> None:
+        self._place = None
         self._show_takes()
+        self._notices.report(f"{words} The take is kept: save it elsewhere in the menu beside Record.")
+        self.written.emit(False)
+
+    def _export(self, take: RecordedTake) -> None:
+        self._asked = take
+        self.save_asked.emit()
 
     def _delete(self, take: RecordedTake) -> None:
-        files = " and ".join(file.name for file in take.files)
-        question = f"{files} will be deleted." if files else f"{take.name} is not saved, and will be lost."
-        if ask(self._bar, "Delete the take?", question, KEEP, DELETE) != DELETE:
-            return
-        try:
-            others = take.delete()
-        except WriteError as error:
-            self._notices.report(str(error))
-            return
-        self._takes.remove(take)
-        for file in others:
-            self._notices.inform(f"{file} is not as the take was saved, and was not deleted.")
+        files = " and ".join(file.name for file in take.own_files)
+        question = f"{files} will be deleted." if files else f"{take.name} has no file, and will be lost."
+        if ask(self._bar, "Delete the take?", question, KEEP, DELETE) == DELETE:
+            take.delete()
+            self._takes.remove(take)
 
     def forget_all(self) -> None:
         """Forget all that is not saved, and what is being recorded."""
         self.end()
-        self._stop_writing()
+        self._writing.cancel()
         for take in self._takes:
             take.forget_journal()
         self._takes = [take for take in self._takes if take.files]
@@ -287,15 +248,10 @@ class Recordings(QObject):
         """Leave what is not saved to the next start; may be called again."""
         self._reading.close()
         self.end()
-        self._stop_writing()
         self._writing.close()
         for take in self._takes:
             if take.journal is not None:
                 take.journal.close()
-
-    def _stop_writing(self) -> None:
-        self._writing.cancel()
-        self._waiting = []
 
     def offer_left(self) -> None:
         """Read what an earlier run has left, in the background, then ask whether to recover or discard it."""
@@ -311,20 +267,19 @@ class Recordings(QObject):
             self._notices.inform("An earlier recording is not saved yet; the next start offers it.")
             answer = LATER
         else:
-            lines = "\n".join(_words(played) for played in journals)
+            lines = "\n".join(_words(played, played.patch.name) for played in journals)
             were = "These recordings were" if len(journals) > 1 else "This recording was"
             question = f"{were} not saved when the app ended.\n\n{lines}"
             answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
         for played, journal in journals.items():
             if answer == RECOVER:
-                self._takes.append(RecordedTake(played, journal, played.patch.name))
+                self._add(played, journal)
             elif answer == DISCARD:
                 journal.delete()
             else:
                 journal.close()
         if answer == RECOVER:
-            self._show_takes()
-            self.save_asked.emit()
+            self.save()
 
     def tick(self, now_s: float) -> None:
         """Continue with the clicks, and show how long it has been recording. `now_s`: of `time.monotonic`."""
@@ -348,26 +303,47 @@ class Recordings(QObject):
             self._notices.inform("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
-        played = Played(patch, tuple(events), *_heard(choices), self._began, self._meter)
-        self._takes.append(RecordedTake(played, journal, played.patch.name))
-        self._show_takes()
+        self._add(Played(patch, tuple(events), *_heard(choices), self._began, self._meter), journal)
         if choices.solo:
             self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
 
     def _choices_changed(self, _: frozenset[str]) -> None:
         self._journaling.hear(*_heard(self._session.choices))
 
+    def _add(self, played: Played, journal: Journal | None) -> None:
+        self._asked = RecordedTake(played, journal, played.patch.name)
+        self._takes.append(self._asked)
+        self._show_takes()
+
     def _show_takes(self) -> None:
-        waiting = [job.played for job in self._waiting]
+        """List the takes, the latest first."""
         rows = []
-        for take in self._takes:
-            saved, waits, recorded = bool(take.files), take.played in waiting, take.played.recorded
-            when = "" if recorded is None else f"{recorded.astimezone():%H:%M}, "
-            state = "" if saved else ", being saved" if waits else ", not saved"
-            text = f"{one_line(take.name, LONGEST_NAME)}:  {when}{_length_words(take.played)}{state}"
-            rows.append(TakeRow(text, saved, waits))
+        for take in reversed(self._takes):
+            state = "" if take.files else ", not saved"
+            deeds = {words: partial(self._do, deed) for words, deed in self._deeds(take).items()}
+            rows.append((f"{_words(take.played, take.name)}{state}", deeds))
         self._bar.takes.show_takes(rows)
         self.unsaved_changed.emit()
+
+    def _deeds(self, take: RecordedTake) -> dict[str, Callable[[], None]]:
+        """The deeds that can be done with a take, by their words; one that is maybe being written is only played."""
+        deeds: dict[str, Callable[[], None]] = {"Play": lambda: self.play_asked.emit(take)}
+        if take.files:
+            deeds["Show in folder"] = lambda: reveal(next(iter(take.files)), self._notices.report)
+        if take.files or not self._writing.busy:
+            rename = partial(ask_text, self._bar, "Rename take", "New name:")
+            deeds["Rename …"] = lambda: rename(take.name, take.rename)
+            deeds["Export …" if take.files else "Save …"] = lambda: self._export(take)
+            deeds["Delete …"] = lambda: self._delete(take)
+        return deeds
+
+    def _do(self, deed: Callable[[], None], *_: bool) -> None:
+        """Do what was chosen for a take."""
+        try:
+            deed()
+        except OSError as error:
+            self._notices.report(explain(Path(error.filename), error))
+        self._show_takes()
 
 
 def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[str]]:
@@ -399,13 +375,10 @@ def _heard(choices: Choices) -> tuple[PlayedSource, float]:
     return played_source(choices), choices.difference_gain_db
 
 
-def _words(played: Played) -> str:
-    """A recording in a line: when, through what, how long, how many notes."""
+def _words(played: Played, name: str) -> str:
+    """A recording in a line: its name, when it was, how long, how many notes."""
     when = "" if played.recorded is None else f"{played.recorded.astimezone():%Y-%m-%d %H:%M}, "
-    return f"{when}{one_line(played.patch.name, LONGEST_NAME)}: {_length_words(played)}"
-
-
-def _length_words(played: Played) -> str:
     events = [timed_event.event for timed_event in played.events]
     notes = sum(isinstance(event, NoteOn) and event.velocity > 0 for event in events)
-    return f"{duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"
+    length = f"{duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"
+    return f"{one_line(name, LONGEST_NAME)}: {when}{length}"

@@ -1,7 +1,4 @@
-"""A question before work is lost: no key answers it with the loss, which takes a click, or Tab to its button.
-
-Another asks for a text.
-"""
+"""Questions: for a text, or before work is lost. No key answers with the loss: a click does, or Tab to a button."""
 
 from __future__ import annotations
 

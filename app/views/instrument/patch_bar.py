@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
-from app.instrument.events import Meter
 from app.patches.patch import Macro, Patch
 from app.patches.scales import SCALES
 from app.patches.tuning import TuningChoice
@@ -42,7 +41,7 @@ from app.views.controls.parts import (
     words_label,
 )
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
-from app.views.instrument.takes_menu import COUNT_INS, TakesMenu
+from app.views.instrument.takes_menu import TakesMenu
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
@@ -51,6 +50,7 @@ NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with 
 LONGEST_SCALE_NAME = 120  # characters
 SCALE_LETTERS, TIGHT_LETTERS = 18, 8  # of its name on the button
 EQUAL_STEPS = "Twelve equal steps"
+INSTANT = QToolButton.ToolButtonPopupMode.InstantPopup
 SAID_MS = 2_500  # a text that says why the octave stops or moves
 COMPARE_TIP = (
     "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
@@ -80,8 +80,6 @@ class PatchBar(ChoiceBar):
         self._macros: tuple[Macro, ...] = ()
         self._compact = self._tight = self._tuned = False
         self._shows_macros = True
-        self._recorded_s: float | None = None
-        self._record_tip = ""
         self.knobs = {field: Knob(OF_PATCHES[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(partial(self.changed.emit, field))
@@ -138,8 +136,7 @@ class PatchBar(ChoiceBar):
         self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.record = tool_button("", kind="record", pressed=self.record_asked, checkable=True)
         tip = "Takes: play, name, export or delete each. Count-in and metronome (Ctrl+Shift+R)"
-        instant = QToolButton.ToolButtonPopupMode.InstantPopup
-        self.takes_button = tool_button("Takes  ▾", "Takes, count-in and metronome", tip, "small", popupMode=instant)
+        self.takes_button = tool_button("Takes  ▾", "Takes, count-in and metronome", tip, "small", popupMode=INSTANT)
         self.takes = TakesMenu(self.takes_button)
         self.takes_button.setMenu(self.takes)
         keys = self._lower, self.octave, self._higher, self.velocity
@@ -148,22 +145,22 @@ class PatchBar(ChoiceBar):
         row.setStretchFactor(self.note, 1)
         self.show_octave(3, 3, 3)
         self.show_velocity(90)
-        self.show_record_choices(Meter())
+        self.show_recording(None)
         self.show_note("")
         return row
 
     def _build_scales(self) -> None:
         """Make the menu of scales: what is chosen is checked, and on the button."""
-        self.scale = tool_button("", kind="small", popupMode=QToolButton.ToolButtonPopupMode.InstantPopup)
-        self._scales = menu = QMenu(self.scale)
-        self.scale.setMenu(menu)
-        for name, title in {"": EQUAL_STEPS, **{name: name for name in SCALES}}.items():
-            action = menu.addAction(title)
+        self.scale = tool_button("", kind="small", popupMode=INSTANT)
+        self._scales = QMenu(self.scale)
+        for name, text in {"": "", **SCALES}.items():
+            action = self._scales.addAction(name or EQUAL_STEPS)
             action.setCheckable(True)
+            action.setData(text)
             action.triggered.connect(partial(self.scale_asked.emit, name))
-        menu.insertSeparator(menu.actions()[1])
-        menu.addSeparator()
-        menu.addAction("Scala file …").triggered.connect(self.scala_file_asked)
+        self._scales.addSeparator()
+        self._scales.addAction("Scala file …", self.scala_file_asked.emit)
+        self.scale.setMenu(self._scales)
         self._show_scale(TuningChoice())
 
     def _build_sound(self) -> QHBoxLayout:
@@ -265,22 +262,19 @@ class PatchBar(ChoiceBar):
 
     def _show_scale(self, tuning: TuningChoice) -> None:
         """Show what tunes the patch: the name of a scale, and a keyboard mapping in the tool-tip."""
-        name, keymap = _scale_name(tuning.scale) if tuning.scale.strip() else EQUAL_STEPS, bool(tuning.keymap.strip())
-        self._tuning, self._tuned = tuning, bool(tuning.scale.strip()) or keymap
+        scaled, mapped = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
+        name = (_scale_name(tuning.scale) or "Scala") if scaled else EQUAL_STEPS
+        self._tuning, self._tuned = tuning, scaled or mapped
         for action in self._scales.actions():
-            chosen = action.text() if action.text() in SCALES else ""
-            action.setChecked(
-                action.isCheckable() and (SCALES[chosen] == tuning.scale if chosen else not self._tuned)
-            )
-        button, shown, room = self.scale, name or "Scala", TIGHT_LETTERS if self._tight else SCALE_LETTERS
-        short = shown if len(shown) <= room else f"{shown[: room - 1].rstrip()}…"
-        button.setText(f"{short if self._tuned else 'Scale'}  ▾".replace("&", "&&"))
-        button.setAccessibleName(f"Scale: {shown}")
-        lines = [f"Scale: {name or 'without a name'}"]
-        if keymap:
-            lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")
-        button.setToolTip(plain_tip("\n".join([*lines, "Choose a scale, or a Scala file; one can be dropped, too"])))
-        show_kind(button, "solo" if self._tuned else "small")
+            action.setChecked(action.data() == tuning.scale)
+        room = TIGHT_LETTERS if self._tight else SCALE_LETTERS
+        short = name if len(name) <= room else f"{name[: room - 1].rstrip()}…"
+        self.scale.setText(f"{short if self._tuned else 'Scale'}  ▾".replace("&", "&&"))
+        self.scale.setAccessibleName(f"Scale: {name}")
+        mapping = ["A Scala keyboard mapping says which key plays which step, and gives the reference pitch"] * mapped
+        lines = [f"Scale: {name}", *mapping, "Choose a scale, or a Scala file; one can be dropped, too"]
+        self.scale.setToolTip(plain_tip("\n".join(lines)))
+        show_kind(self.scale, "solo" if self._tuned else "small")
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
@@ -314,35 +308,21 @@ class PatchBar(ChoiceBar):
 
     def show_recording(self, seconds: float | None) -> None:
         """Show the seconds that it has been recording, below 0 in the count-in; None: it is not."""
-        self._recorded_s = seconds
-        self._show_record()
-
-    def show_record_choices(self, choices: Meter) -> None:
-        """Show count-in and metronome."""
-        self.takes.show_choices(choices)
-        bars = choices.count_in_bars
-        parts = [f"after {COUNT_INS[bars]}"] * (bars > 0) + ["with the metronome"] * choices.metronome
-        tempo = f" at {choices.tempo_bpm} beats a minute" if parts else ""
-        self._record_tip = f"Record what is played (Ctrl+R){', '.join(['', *parts])}{tempo}"
-        self._show_record()
+        button = self.record
+        button.setChecked(seconds is not None)
+        if seconds is None:
+            text, name, tip = "●  Record", "Record what is played", "Record what is played (Ctrl+R)"
+        else:
+            whole = math.floor(seconds)
+            time = f"{whole // 60}:{whole % 60:02d}" if whole >= 0 else f"−{-whole}"
+            text, name, tip = f"■  {time}", "End recording", "End the recording and save it"
+        button.setText(text)
+        button.setAccessibleName(name)
+        button.setToolTip(tip)
 
     def popup_takes(self) -> None:
         """Open the menu of takes, also where its button has no room."""
         self.takes.popup(self.record.mapToGlobal(self.record.rect().bottomLeft()))
-
-    def _show_record(self) -> None:
-        seconds, button = self._recorded_s, self.record
-        button.setChecked(seconds is not None)
-        if seconds is None:
-            words = "●  Record", "Record what is played", self._record_tip
-        else:
-            whole = math.floor(seconds)  # below 0 in the count-in
-            time = f"{whole // 60}:{whole % 60:02d}" if whole >= 0 else f"−{-whole}"
-            words = f"■  {time}", "End recording", "End the recording and save it"
-        text, name, tip = words
-        button.setText(text)
-        button.setAccessibleName(name)
-        button.setToolTip(tip)
 
     def show_note(self, text: str) -> None:
         self.note.say(text)

@@ -263,14 +263,18 @@ def test_a_window_that_is_ended_keeps_the_recording_which_is_read_aside_and_offe
     guitar.window.instrument.bar.record.click()
     with answered(KEY.Key_Return) as asked:
         recordings.offer_left()
-        guitar.wait(lambda: recordings.latest is not None)
+        guitar.wait(lambda: recordings.offered is not None)
     assert asked == ["Recover what was played?"] and readers and threading.main_thread() not in readers
-    latest = recordings.latest
+    latest = recordings.offered
     guitar.close()  # as by a signal
     (left,) = left_journals(recordings_folder())
     found = left.read()
-    assert latest is not None and found is not None and found.recorded == latest.recorded
-    assert (found.events, found.patch, found.source) == (latest.events, latest.patch, latest.source)
+    assert latest is not None and found is not None and found.recorded == latest.played.recorded
+    assert (found.events, found.patch, found.source) == (
+        latest.played.events,
+        latest.played.patch,
+        latest.played.source,
+    )
     left.delete()
 
 
@@ -278,16 +282,16 @@ def play_long(w: Window, notes: int) -> None:
     """A recording of so many seconds, in place of the one of a note: as a journal of an earlier run."""
     record(w)
     recordings = w.controller.patches.recordings
-    latest = recordings.latest
+    latest = recordings.offered
     assert latest is not None
     journal = Journal.begun(recordings_folder(), datetime.now(UTC))
-    journal.write([TimedEvent(0.0, PatchTurned(latest.patch))])
+    journal.write([TimedEvent(0.0, PatchTurned(latest.played.patch))])
     journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(notes)])
     journal.close()
     discard(w)
     with answered(KEY.Key_Return):
         recordings.offer_left()
-        w.wait(lambda: recordings.latest is not None)
+        w.wait(lambda: recordings.offered is not None)
 
 
 @pytest.mark.parametrize("finish", [True, False])

@@ -101,8 +101,8 @@ def watch(controller):
             asked.append(box.text())
             QTest.keyClick(box, Qt.Key[key])
         elif asked and (controller.exports.dialog is not None or key == "Key_Escape"):
-            latest = controller.patches.recordings.latest
-            print(json.dumps([each.time_s for each in latest.events] if latest else None), flush=True)
+            latest = controller.patches.recordings.offered
+            print(json.dumps([each.time_s for each in latest.played.events] if latest else None), flush=True)
             controller.window.may_close = lambda: True
             return controller.window.close()
 
