@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 
 from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
@@ -13,10 +13,11 @@ from app.views.plots.zoom_plot import ZoomPlot
 
 TIP = (
     "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
-    "The wheel zooms, a drag pans, double-click shows all. Arrow keys read partial after partial, with Shift point\n"
-    "after point; + and − zoom"
+    "The wheel zooms, a drag pans, double-click shows all. Arrow keys move the cursor, with Shift finely; "
+    "+ and − zoom"
 )
-_SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+STEP_SHARE, FINE_SHARE = 1 / 60, 1 / 480  # of the view, for a press of an arrow key
+SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class SpectrumPlot(ZoomPlot):
@@ -24,7 +25,6 @@ class SpectrumPlot(ZoomPlot):
 
     SHORTEST_VIEW = 0.005  # a third of a semitone
     PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton
-    stepped = Signal(int, bool)  # the cursor, to the next partial on this side, or to the next point of the curve
 
     def __init__(self) -> None:
         super().__init__("Spectrum", TIP, "frequency (Hz)")
@@ -49,8 +49,13 @@ class SpectrumPlot(ZoomPlot):
         self.getPlotItem().getAxis("bottom").setTicks([frequency_ticks(10**low, 10**high)])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        side = _SIDES.get(Qt.Key(event.key()))
+        side = SIDES.get(Qt.Key(event.key()))
         if side is None:
             super().keyPressEvent(event)
-        else:
-            self.stepped.emit(side, bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
+            return
+        low, high = self.view_range
+        here = self.line_at if low <= self.line_at <= high else low
+        share = FINE_SHARE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else STEP_SHARE
+        at = min(max(here + side * share * (high - low), self._ends[0]), self._ends[1])
+        self.pan(max(at - high, 0.0) + min(at - low, 0.0))  # where it has left the view
+        self.hovered.emit(at, math.nan)

@@ -5,6 +5,8 @@ A click or a drag moves the playhead, and so do arrows and Home. The middle or r
 
 from __future__ import annotations
 
+import math
+
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
@@ -71,6 +73,12 @@ class TimePlot(ZoomPlot):
     def times_s(self) -> tuple[float, float]:
         """The start and the end of the view, within the take."""
         return self.view_range
+
+    def frames_in_view(self, rate_hz: float, ready: int) -> range:
+        """The frames in view, of the first `ready` at a rate."""
+        low_s, high_s = self.times_s
+        first = math.ceil(low_s * rate_hz)
+        return range(first, max(first, min(math.floor(high_s * rate_hz) + 1, ready)))
 
     @property
     def columns(self) -> int:

@@ -98,7 +98,7 @@ class Panel(QWidget):
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     location: Location = "stage"  # above the decks, or in one
     every: ClassVar[int] = 1  # of so many moments one is drawn
-    figure: Any  # the widget that is saved as a picture; a `Figure`
+    figure: Any  # the widget that is saved: a `Figure`, or a table
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -141,8 +141,8 @@ class Panel(QWidget):
         self._cover.setGeometry(self.rect())
 
     def columns(self) -> Columns | None:
-        """The numbers that are shown now; None: nothing is."""
-        raise NotImplementedError
+        """The numbers that are shown now; None: nothing is. Those of a table by default."""
+        return self.figure.columns()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Take the fields of `Choices` that have new values; at the start all of them."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
-from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.stage.session import Session
@@ -82,9 +81,6 @@ class PartialsPanel(ComputedPanel):
         self.background.progressed.connect(self.progress.show_share)
         self.background.finished.connect(self._show_measured)
         lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
-
-    def columns(self) -> Columns:
-        return self.table.columns()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "solo" in names:

@@ -126,14 +126,12 @@ class WaveformPanel(CurvesPanel):
         """The frames in view."""
         if self._take is None:
             return None
-        (low_s, high_s), curves = self.plot.times_s, {}
+        curves, unit = {}, unit_of(self._take.pickup)
         for shown in shown_sources(self.session.choices, self.library):
             if (drawn := self._drawn.get(shown.source)) is not None:
-                origin, rate_hz = drawn.origin, drawn.origin.rate_hz
-                first, stop = math.ceil(low_s * rate_hz), math.floor(high_s * rate_hz) + 1
-                signal = origin.read(first, stop)
-                times_s = np.arange(first, first + len(signal)) / rate_hz
-                curves[shown.heading(unit_of(self._take.pickup))] = times_s, signal
+                frames = self.plot.frames_in_view(drawn.origin.rate_hz, drawn.origin.ready)
+                signal = drawn.origin.read(frames.start, frames.stop)
+                curves[shown.heading(unit)] = np.array(frames) / drawn.origin.rate_hz, signal
         return aligned("time (s)", curves)
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
