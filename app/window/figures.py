@@ -5,7 +5,6 @@ What is saved is taken at the command: a take may grow while a file is chosen.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt
@@ -64,21 +63,20 @@ class Figures(QObject):
         menu = self._parts.get(watched)
         if menu is None or not isinstance(watched, QWidget):
             return False
-        at = None
-        if isinstance(event, QContextMenuEvent):  # by the mouse it may come with the press
-            at = watched.rect().center() if event.reason() == QContextMenuEvent.Reason.Other else None
-        elif isinstance(event, QKeyEvent) and event.type() == Event.KeyPress:
-            at = watched.rect().center() if QKeySequence(event.keyCombination()) in MENU_KEYS else None
-        elif isinstance(event, QMouseEvent) and event.button() == Qt.MouseButton.RightButton:
+        if isinstance(event, QMouseEvent) and event.button() == Qt.MouseButton.RightButton:
             if event.type() == Event.MouseButtonPress:
                 self._pressed = event.position()
             is_click = (event.position() - self._pressed).manhattanLength() < QApplication.startDragDistance()
             if event.type() == Event.MouseButtonRelease and is_click:
                 menu.popup(event.globalPosition().toPoint())
             return False
-        if at is not None:
-            menu.popup(watched.mapToGlobal(at))
-        return at is not None or isinstance(event, QContextMenuEvent)
+        takes = isinstance(event, QContextMenuEvent)
+        if isinstance(event, QKeyEvent) and event.type() == Event.KeyPress:
+            takes = QKeySequence(event.keyCombination()) in MENU_KEYS
+        by_mouse = isinstance(event, QContextMenuEvent) and event.reason() == QContextMenuEvent.Reason.Mouse
+        if takes and not by_mouse:  # by the mouse it may come with the press
+            menu.popup(watched.mapToGlobal(watched.rect().center()))
+        return takes
 
     def _copy_picture(self, figure: QWidget) -> None:
         """Copy both kinds: each program takes the one that it knows."""
@@ -88,29 +86,29 @@ class Figures(QObject):
         clipboard.mimeData().setData("image/svg+xml", picture(figure, ".svg"))
         self._window.say_briefly("Picture copied")
 
-    def _data(self, panel: Panel) -> tuple[str, str]:
-        """The data, "" where there is none, and what is left out, in words."""
+    def _content(self, panel: Panel, suffix: str) -> tuple[bytes, str]:
+        """The file of a picture or of the data, and what is left out of it; b"": there is nothing."""
+        if suffix != ".csv":
+            return picture(panel.figure, suffix), ""
         columns = panel.columns()
         if columns is None or not columns.rows:
             self._window.notices.report(NOTHING.format(panel.title))
-            return "", ""
-        return columns.text, columns.words
+            return b"", ""
+        return columns.text.encode(), columns.words
 
     def _copy_data(self, panel: Panel) -> None:
-        text, words = self._data(panel)
-        if text:
-            QGuiApplication.clipboard().setText(text)
+        data, words = self._content(panel, ".csv")
+        if data:
+            QGuiApplication.clipboard().setText(data.decode())
             self._window.say_briefly(f"Data copied.{words}")
 
     def _save(self, panel: Panel, suffix: str) -> None:
-        """Save a picture or the data in the file that its user chooses."""
-        text, words = self._data(panel) if suffix == ".csv" else ("", "")
-        data = text.encode() if suffix == ".csv" else picture(panel.figure, suffix)
+        """Save in the file that its user chooses."""
+        data, words = self._content(panel, suffix)
         if not data:
             return
         note = heard_note(self._session.choices, self._library, self._session.stage.struck)
-        title = re.sub(r"[^\w .+-]", "-", panel.title.lower())
-        proposed = Path(f"{note.name if note else 'Figure'} {title}{suffix}")
+        proposed = Path(f"{note.name if note else 'Figure'} {panel.title.lower()}{suffix}")
         for path in self._window.places.ask(self._window, "figure", "Save as", "save", FILTERS[suffix], proposed):
             try:
                 with result_file(path) as file:

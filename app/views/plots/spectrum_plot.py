@@ -6,7 +6,6 @@ import math
 from typing import ClassVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent
 
 from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
 from app.views.plots.zoom_plot import ZoomPlot
@@ -16,8 +15,6 @@ TIP = (
     "The wheel zooms, a drag pans, double-click shows all. Arrow keys move the cursor, with Shift finely; "
     "+ and − zoom"
 )
-STEP_SHARE, FINE_SHARE = 1 / 60, 1 / 480  # of the view, for a press of an arrow key
-SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class SpectrumPlot(ZoomPlot):
@@ -48,14 +45,8 @@ class SpectrumPlot(ZoomPlot):
         low, high = self.getPlotItem().vb.viewRange()[0]
         self.getPlotItem().getAxis("bottom").setTicks([frequency_ticks(10**low, 10**high)])
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        side = SIDES.get(Qt.Key(event.key()))
-        if side is None:
-            super().keyPressEvent(event)
-            return
+    def _seek(self, at: float) -> None:
+        """Ask for a place of the cursor, and let the view go with it."""
+        super()._seek(at)
         low, high = self.view_range
-        here = self.line_at if low <= self.line_at <= high else low
-        share = FINE_SHARE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else STEP_SHARE
-        at = min(max(here + side * share * (high - low), self._ends[0]), self._ends[1])
-        self.pan(max(at - high, 0.0) + min(at - low, 0.0))  # where it has left the view
-        self.hovered.emit(at, math.nan)
+        self.pan(max(at - high, 0.0) + min(at - low, 0.0))

@@ -103,9 +103,8 @@ class DrumPanel(StagePanel):
         rows, columns = next(iter(frame.pictures_m.values())).shape
         edge = drum.drum.width_m / drum.drum.length_m
         y, x = map(np.ravel, np.meshgrid(np.linspace(edge, -edge, rows), np.linspace(-1, 1, columns), indexing="ij"))
-        headings = {s.source: s.heading("m") for s in self._sources}
-        pictures_m = {headings[name]: values.ravel() for name, values in frame.pictures_m.items()}
-        return Columns({"x (half-lengths)": x, "y (half-lengths)": y, **pictures_m})
+        pictures_m = {source: values.ravel() for source, values in frame.pictures_m.items()}
+        return Columns({"x (half-lengths)": x, "y (half-lengths)": y, **self.by_heading(pictures_m, "m")})
 
     # Gestures
 

@@ -115,6 +115,7 @@ class SpectrumPanel(CurvesPanel):
         self._rate_hz = 16_000  # the highest of what is drawn
         self._fit()
         self.plot.hovered.connect(lambda height, _: self.point_at(10**height))
+        self.plot.seek_asked.connect(lambda height: self.point_at(10**height))
         lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -182,12 +183,8 @@ class SpectrumPanel(CurvesPanel):
 
     def columns(self) -> Columns:
         """The points of the curves in view."""
-        unit, curves = level_words(self.session.choices.pickup), {}
-        for shown in shown_sources(self.session.choices, self.library):
-            if shown.source in self._levels:
-                analyser, curves_db = self._levels[shown.source]
-                curves[shown.heading(unit)] = analyser.column_hz, curves_db
-        return aligned("frequency (Hz)", curves)
+        curves = {source: (analyser.column_hz, levels_db) for source, (analyser, levels_db) in self._levels.items()}
+        return aligned("frequency (Hz)", self.by_heading(curves, level_words(self.session.choices.pickup)))
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources of which it is not drawn."""

@@ -126,13 +126,11 @@ class WaveformPanel(CurvesPanel):
         """The frames in view."""
         if self._take is None:
             return None
-        curves, unit = {}, unit_of(self._take.pickup)
-        for shown in shown_sources(self.session.choices, self.library):
-            if (drawn := self._drawn.get(shown.source)) is not None:
-                frames = self.plot.frames_in_view(drawn.origin.rate_hz, drawn.origin.ready)
-                signal = drawn.origin.read(frames.start, frames.stop)
-                curves[shown.heading(unit)] = np.array(frames) / drawn.origin.rate_hz, signal
-        return aligned("time (s)", curves)
+        curves = {}
+        for source, origin in ((source, drawn.origin) for source, drawn in self._drawn.items()):
+            frames = self.plot.frames_in_view(origin.rate_hz, origin.ready)
+            curves[source] = np.array(frames) / origin.rate_hz, origin.read(frames.start, frames.stop)
+        return aligned("time (s)", self.by_heading(curves, unit_of(self._take.pickup)))
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
         """Set the vertical axis, from −full to full in `unit`."""
