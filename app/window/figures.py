@@ -1,4 +1,4 @@
-"""Figures, saved and copied: pictures as PNG and SVG, data as CSV. A right click, the menu key or the menu offers it.
+"""Figures, saved and copied: pictures as PNG and SVG, data as CSV. A right click or the menu key offers it.
 
 What is saved is taken at the command: a take may grow while a file is chosen.
 """
@@ -32,15 +32,13 @@ class Figures(QObject):
     def __init__(self, window: MainWindow, session: Session, library: Library) -> None:
         super().__init__(window)
         self._window, self._session, self._library = window, session, library
-        self._menus: dict[Panel, QMenu] = {}
-        self._parts: dict[QObject, QMenu] = {}  # by what the pointer or the keyboard is on
+        self._menus: dict[QObject, QMenu] = {}  # by what the pointer or the keyboard is on
         self._pressed = QPointF()
-        window.menu.aboutToShow.connect(self._offer_shown)
 
     def add(self, panel: Panel) -> None:
         """Offer what a panel shows."""
         figure = panel.figure
-        menu = self._menus[panel] = QMenu(panel.title, figure)
+        menu = QMenu(figure)
         if not isinstance(figure, FiguresTable):
             menu.addAction("Save picture as PNG …", lambda: self._save(panel, ".png"))
             menu.addAction("Save picture as SVG …", lambda: self._save(panel, ".svg"))
@@ -48,19 +46,12 @@ class Figures(QObject):
         menu.addAction("Save data as CSV …", lambda: self._save(panel, ".csv"))
         menu.addAction("Copy data as CSV", lambda: self._copy_data(panel))
         for part in (figure, *([figure.viewport()] if isinstance(figure, QAbstractScrollArea) else [])):
-            self._parts[part] = menu
+            self._menus[part] = menu
             part.installEventFilter(self)
-
-    def _offer_shown(self) -> None:
-        """Show the menus of the figures that can be seen in the window's menu."""
-        self._window.menu.figures.clear()
-        for panel, menu in self._menus.items():
-            if panel.isVisible() and not panel.covered:
-                self._window.menu.figures.addMenu(menu)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Open the menu by a key, or by a right click; a right button that drags pans."""
-        menu = self._parts.get(watched)
+        menu = self._menus.get(watched)
         if menu is None or not isinstance(watched, QWidget):
             return False
         if isinstance(event, QMouseEvent) and event.button() == Qt.MouseButton.RightButton:

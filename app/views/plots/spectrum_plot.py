@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from PySide6.QtCore import Qt
 
-from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
+from app.views.plots.axis_label import frequency_ticks
 from app.views.plots.zoom_plot import ZoomPlot
 
 TIP = (
@@ -31,9 +31,6 @@ class SpectrumPlot(ZoomPlot):
         item.setMouseEnabled(True, False)
         item.vb.sigXRangeChanged.connect(self._label_frequencies)
         self.move_line(math.nan)
-
-    def set_highest(self, highest_hz: float) -> None:
-        self.set_ends(math.log10(LOWEST_HZ), math.log10(highest_hz))
 
     @property
     def view_hz(self) -> tuple[float, float]:

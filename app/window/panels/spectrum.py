@@ -221,7 +221,7 @@ class SpectrumPanel(CurvesPanel):
         return wordings[0]
 
     def _fit(self) -> None:
-        self.plot.set_highest(self._rate_hz / 2)
+        self.plot.set_ends(math.log10(LOWEST_HZ), math.log10(self._rate_hz / 2))
         self.plot.getPlotItem().setYRange(CEILING_DB - self.range_db, CEILING_DB, padding=0)
 
     @property
