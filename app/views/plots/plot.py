@@ -14,6 +14,7 @@ from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.legend import Legend
 
 LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
+_NO_CACHE, _CACHE = pg.GraphicsObject.CacheMode.NoCache, pg.GraphicsObject.CacheMode.DeviceCoordinateCache
 TIP_MS = 3000  # the tooltip covers what is pointed at
 
 
@@ -35,7 +36,7 @@ class Plot(pg.PlotWidget):
         for side in ("left", "bottom"):
             item.getAxis(side).enableAutoSIPrefix(False)
             # painted again only when it changes: axes are most of a painting, and a key that is played waits for it
-            item.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+            item.getAxis(side).setCacheMode(_CACHE)
         item.setLabel("bottom", foot)
         self.label = UprightLabel(item)
         self.ticks = UprightTicks(item.getAxis("left"), item.vb)
@@ -57,9 +58,15 @@ class Plot(pg.PlotWidget):
         things = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if box.isAncestorOf(each)]
         lines = [each for each in things if isinstance(each, pg.InfiniteLine) or _is_curve(each)]
         self.getPlotItem().layout.activate()
-        self._show_for_file(things, lines, True)
-        self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
-        self._show_for_file(things, lines, False)
+        for for_file in (True, False):  # axes and points as vectors, lines not yet; then all as the screen needs it
+            for side in ("left", "bottom"):
+                self.getPlotItem().getAxis(side).setCacheMode(_NO_CACHE if for_file else _CACHE)
+            for line in lines:
+                line.setFlag(line.GraphicsItemFlag.ItemHasNoContents, for_file)
+            for points in (each for each in things if isinstance(each, pg.ScatterPlotItem)):
+                points.setExportMode(for_file)
+            if for_file:
+                self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
         painter.save()
         painter.setClipRect(box.sceneBoundingRect())
         for line in filter(pg.GraphicsObject.isVisible, lines):
@@ -72,17 +79,6 @@ class Plot(pg.PlotWidget):
         painter.restore()
         for legend in self.findChildren(Legend):
             legend.render(painter, legend.pos(), renderFlags=legend.RenderFlag(0))
-
-    def _show_for_file(self, things: list[pg.GraphicsObject], lines: list[pg.GraphicsObject], for_file: bool) -> None:
-        """Let axes and points be vectors, and lines be absent; or all be as the screen needs it."""
-        cache = pg.GraphicsObject.CacheMode
-        for side in ("left", "bottom"):
-            self.getPlotItem().getAxis(side).setCacheMode(cache.NoCache if for_file else cache.DeviceCoordinateCache)
-        for line in lines:
-            line.setFlag(line.GraphicsItemFlag.ItemHasNoContents, for_file)
-        for points in things:
-            if isinstance(points, pg.ScatterPlotItem):
-                points.setExportMode(for_file)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)
