@@ -15,7 +15,6 @@ from app.presets.library import Library
 from app.stage.session import Session
 from app.views.controls.form import FILTERS
 from app.views.figure import picture
-from app.views.plots.figures_table import FiguresTable
 from app.window.exports import heard_note
 from app.window.main_window import MainWindow
 from app.window.panels.base import Panel
@@ -27,7 +26,7 @@ Event = QEvent.Type
 
 
 class Figures(QObject):
-    """The figures of all panels, with a menu each; of a table its data alone."""
+    """The figures of all panels, with a menu each."""
 
     def __init__(self, window: MainWindow, session: Session, library: Library) -> None:
         super().__init__(window)
@@ -39,10 +38,9 @@ class Figures(QObject):
         """Offer what a panel shows."""
         figure = panel.figure
         menu = QMenu(figure)
-        if not isinstance(figure, FiguresTable):
-            menu.addAction("Save picture as PNG …", lambda: self._save(panel, ".png"))
-            menu.addAction("Save picture as SVG …", lambda: self._save(panel, ".svg"))
-            menu.addAction("Copy picture", lambda: self._copy_picture(figure))
+        menu.addAction("Save picture as PNG …", lambda: self._save(panel, ".png"))
+        menu.addAction("Save picture as SVG …", lambda: self._save(panel, ".svg"))
+        menu.addAction("Copy picture", lambda: self._copy_picture(figure))
         menu.addAction("Save data as CSV …", lambda: self._save(panel, ".csv"))
         menu.addAction("Copy data as CSV", lambda: self._copy_data(panel))
         for part in (figure, *([figure.viewport()] if isinstance(figure, QAbstractScrollArea) else [])):

@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.export.columns import Columns
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
@@ -142,11 +141,6 @@ class FiguresTable(QTableWidget):
         lines = [[column.title for column in self._columns]]
         lines += [["" if value is None else f"{value}" for value in row.values] for row in self.rows]
         return "\n".join("\t".join(line) for line in lines) + "\n"
-
-    def columns(self) -> Columns:
-        """The same values by their fields."""
-        fields = enumerate(column.field for column in self._columns)
-        return Columns({field: [row.values[place] for row in self.rows] for place, field in fields})
 
     def copy(self) -> None:
         QGuiApplication.clipboard().setText(self.text())

@@ -100,7 +100,7 @@ class Panel(QWidget):
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     location: Location = "stage"  # above the decks, or in one
     every: ClassVar[int] = 1  # of so many moments one is drawn
-    figure: Any  # the widget that is saved: a `Figure`, or a table
+    figure: Any = None  # what is saved and copied: a `Figure`; None: a table, which copies itself
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -143,8 +143,8 @@ class Panel(QWidget):
         self._cover.setGeometry(self.rect())
 
     def columns(self) -> Columns | None:
-        """The numbers that are shown now; None: nothing is. Those of a table by default."""
-        return self.figure.columns()
+        """The numbers that are shown now; None: nothing is."""
+        raise NotImplementedError
 
     def by_heading(self, values: Mapping[str, V], unit: str) -> dict[str, V]:
         """Values by source, by the headings that they have in files."""

@@ -95,7 +95,7 @@ class ComparePanel(ComputedPanel):
         self._export.clicked.connect(self._ask_export)
         self._stop = tool_button("Stop")
         self._stop.clicked.connect(self._stop_or_go_on)
-        self.table = self.figure = FiguresTable("Presets compared on this pluck", COLUMNS)
+        self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter plays a model; Delete removes it. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._hear)
         self.table.row_entered.connect(self._hear)

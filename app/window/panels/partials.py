@@ -71,7 +71,7 @@ class PartialsPanel(ComputedPanel):
             "The part of the pluck that is measured",
         )
         self._window = combo_box("Window of time", windows, tip=tip, picked=lambda _: self._show())
-        self.table = self.figure = FiguresTable("Partials of this pluck", COLUMNS)
+        self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._choose)
         self.table.row_entered.connect(self._choose)
