@@ -12,8 +12,7 @@ from app.views.plots.zoom_plot import ZoomPlot
 
 TIP = (
     "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
-    "The wheel zooms, a drag pans, double-click shows all. Arrow keys move the cursor, with Shift finely; "
-    "+ and − zoom"
+    "The wheel zooms, a drag pans, double-click shows all. Arrow keys move the cursor, + and − zoom"
 )
 
 

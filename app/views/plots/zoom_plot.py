@@ -1,7 +1,7 @@
 """A plot whose horizontal axis zooms and pans within its ends.
 
 The wheel zooms, a drag pans, a double-click shows all. The keyboard does the same: + and −, 0. Arrow keys ask for
-another place of the line, with Shift a near one.
+another place of the line.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from app.views.plots.kept_plot import KeptPlot
 
 ZOOM_STEP = 1.25
 LINE_STEP = 0.05  # of the view
-FINE = 0.1  # of a step
 
 
 class ZoomPlot(KeptPlot):
@@ -100,8 +99,6 @@ class ZoomPlot(KeptPlot):
         low, high = self.view_range
         here = self.line_at if math.isfinite(self.line_at) else low
         step = min(self.LONGEST_STEP, LINE_STEP * (high - low))
-        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-            step *= FINE
         match event.key():
             case Qt.Key.Key_Left:
                 self._seek(here - step)
