@@ -21,7 +21,6 @@ from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 from training.heard import listen_to
-from training.heard_file import Heard
 from training.heard_words import heard_sentence, heard_word
 
 Floats = NDArray[np.floating]
@@ -30,25 +29,21 @@ FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
 
-class Audible(str):
-    """The difference of a sound from the truth's that an ear finds, in words that sort by the spectra's distance.
+@dataclass(frozen=True, order=True)
+class Audible:
+    """The difference of a sound from the truth's that an ear finds; sorts by the distance of the spectra.
 
     Attributes:
         distance_db: see `AudibleErrors`.
-        sentence: all faults, where the words have the worst.
+        word: the worst fault; `sentence`: all of them.
     """
 
     distance_db: float
+    word: str
     sentence: str
 
-    @classmethod
-    def of(cls, heard: Heard) -> Audible:
-        made = cls(heard_word(heard))
-        made.distance_db, made.sentence = heard.distance_db, heard_sentence(heard, heard.name)
-        return made
-
-    def __lt__(self, other: str) -> bool:
-        return self.distance_db < other.distance_db if isinstance(other, Audible) else super().__lt__(other)
+    def __str__(self) -> str:
+        return self.word
 
 
 @dataclass(frozen=True)
@@ -195,7 +190,7 @@ def _audible(preset: Preset, plucked: NoteSound, before: float, share: float, jo
         heard = listen_to(
             preset, lambda done: job.report(before + share * done), [plucked.pluck], plucked.ear, plucked.seconds
         )
-        return Audible.of(heard)
+        return Audible(heard.distance_db, heard_word(heard), heard_sentence(heard, heard.name))
     return None
 
 

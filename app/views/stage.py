@@ -283,9 +283,6 @@ class StageView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._paint_front(painter, event.rect().bottom() > self.axes.bottom)  # what lies there is painted again
 
-    def figure_size(self) -> QSize:
-        return self.size()
-
     def paint_figure(self, painter: QPainter) -> None:
         """Paint all but the buttons."""
         self._paint_scenery(painter)

@@ -190,7 +190,8 @@ class Controller(QObject):
         panel.strike_asked.connect(self.instruments.strike)
         panel.export_asked.connect(self._export_models)
         panel.reported.connect(self.window.notices.report)
-        self.figures.add(panel)
+        if panel.figure is not None:
+            self.figures.add(panel)
 
     def _fill_decks(self) -> None:
         """Make the views of the Lab when they are first needed. They and their plots take a fifth of a second."""

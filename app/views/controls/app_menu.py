@@ -98,12 +98,7 @@ LONGEST_FILE = 60  # characters of a recent file, and of its folder
 
 
 class AppMenu(QMenu):
-    """The menu of the app: emits `look_asked`, shows `show_look`.
-
-    Attributes:
-        action: each QAction by the name of its entry.
-        figures: has a menu for each figure that is seen.
-    """
+    """The menu of the app: emits `look_asked`, shows `show_look`. `action`: each QAction by the name of its entry."""
 
     look_asked = Signal(str, object)  # a field of `Look` and its new value
     recent_asked = Signal(object)  # the Path of a recent file
@@ -123,7 +118,6 @@ class AppMenu(QMenu):
                     action.setAutoRepeat(False)
             if title == LOOK_MENU:
                 menu.addSeparator()
-                self.figures = menu.addMenu("Pictures and data")
                 self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
                 self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         self._recent = QMenu(self)

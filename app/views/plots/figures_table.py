@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPalette
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -19,7 +18,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.export.columns import Columns, heading_of
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
@@ -143,29 +141,6 @@ class FiguresTable(QTableWidget):
         lines = [[column.title for column in self._columns]]
         lines += [["" if value is None else f"{value}" for value in row.values] for row in self.rows]
         return "\n".join("\t".join(line) for line in lines) + "\n"
-
-    def columns(self) -> Columns:
-        """The same values with the units of their fields in the headings."""
-        rows, fields = self.rows, enumerate(column.field for column in self._columns)
-        return Columns({heading_of(field): [row.values[place] for row in rows] for place, field in fields})
-
-    def figure_size(self) -> QSize:
-        """The size at which all rows and columns are seen."""
-        across, down = self.horizontalHeader(), self.verticalHeader()
-        edges = 2 * self.frameWidth()
-        return QSize(across.length() + edges, across.height() + down.length() + edges)
-
-    def paint_figure(self, painter: QPainter) -> None:
-        """Paint all rows and columns. Cell by cell: `render` would clip them elsewhere in a vector file."""
-        size, model, option = self.size(), self.model(), QStyleOptionViewItem()
-        self.resize(self.figure_size())
-        self.horizontalHeader().render(painter, QPoint())
-        self.initViewItemOption(option)
-        for row, column in itertools.product(range(self.rowCount()), range(self.columnCount())):
-            index = model.index(row, column)
-            option.rect = self.visualRect(index).translated(0, self.horizontalHeader().height())
-            self.itemDelegate().paint(painter, option, index)
-        self.resize(size)
 
     def copy(self) -> None:
         QGuiApplication.clipboard().setText(self.text())

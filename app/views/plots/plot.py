@@ -6,17 +6,15 @@ import math
 from typing import ClassVar
 
 import pyqtgraph as pg
-from pyqtgraph.graphicsItems.ScatterPlotItem import Symbols
-from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPainterPath, QResizeEvent, QTransform
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPainterPath, QResizeEvent
 
 from app.views.controls.parts import keeps_keys
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.legend import Legend
 
-FIGURE_HEIGHT = 240  # pixels, at least, of a picture
 LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
-INK = pg.PlotCurveItem, pg.InfiniteLine, pg.ScatterPlotItem  # what is drawn at data
+_NO_CACHE, _CACHE = pg.GraphicsObject.CacheMode.NoCache, pg.GraphicsObject.CacheMode.DeviceCoordinateCache
 TIP_MS = 3000  # the tooltip covers what is pointed at
 
 
@@ -38,7 +36,7 @@ class Plot(pg.PlotWidget):
         for side in ("left", "bottom"):
             item.getAxis(side).enableAutoSIPrefix(False)
             # painted again only when it changes: axes are most of a painting, and a key that is played waits for it
-            item.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+            item.getAxis(side).setCacheMode(_CACHE)
         item.setLabel("bottom", foot)
         self.label = UprightLabel(item)
         self.ticks = UprightTicks(item.getAxis("left"), item.vb)
@@ -51,39 +49,36 @@ class Plot(pg.PlotWidget):
         """Show the label beneath only where there is room; to be called when it is another one."""
         self.getPlotItem().getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
 
-    def figure_size(self) -> QSize:
-        """The size on the screen; of a low plot higher, so that both axes have their labels."""
-        return self.size().expandedTo(QSize(0, FIGURE_HEIGHT))
-
     def paint_figure(self, painter: QPainter) -> None:
         """Paint the plot and its legend, without the line that moves.
 
-        What is drawn at data is painted last, in pixels: a vector file would scale its pens and round its places.
+        Lines at data are painted last, in pixels: a vector file would scale their pens and round their places.
         """
-        item, no_contents = self.getPlotItem(), pg.QtWidgets.QGraphicsItem.GraphicsItemFlag.ItemHasNoContents
-        axes = [item.getAxis(side) for side in ("left", "bottom")]
-        inks = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if isinstance(each, INK)]
-        size = self.size()
-        self.resize(self.figure_size())
-        item.layout.activate()
-        for axis in axes:
-            axis.setCacheMode(pg.GraphicsObject.CacheMode.NoCache)
-        for ink in inks:
-            ink.setFlag(no_contents, True)
-        self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
-        for axis in axes:
-            axis.setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+        box = self.getPlotItem().vb
+        things = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if box.isAncestorOf(each)]
+        lines = [each for each in things if isinstance(each, pg.InfiniteLine) or _is_curve(each)]
+        self.getPlotItem().layout.activate()
+        for for_file in (True, False):  # axes and points as vectors, lines not yet; then all as the screen needs it
+            for side in ("left", "bottom"):
+                self.getPlotItem().getAxis(side).setCacheMode(_NO_CACHE if for_file else _CACHE)
+            for line in lines:
+                line.setFlag(line.GraphicsItemFlag.ItemHasNoContents, for_file)
+            for points in (each for each in things if isinstance(each, pg.ScatterPlotItem)):
+                points.setExportMode(for_file)
+            if for_file:
+                self.render(painter, QRectF(self.viewport().rect()), self.viewport().rect())
         painter.save()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setClipRect(item.vb.sceneBoundingRect())
-        for ink in inks:
-            ink.setFlag(no_contents, False)
-            if ink.isVisible() and item.vb.isAncestorOf(ink):
-                _paint_ink(painter, ink)
+        painter.setClipRect(box.sceneBoundingRect())
+        for line in filter(pg.GraphicsObject.isVisible, lines):
+            if isinstance(line, pg.InfiniteLine):
+                path, pen = QPainterPath(QPointF(line.boundingRect().left(), 0.0)), line.currentPen
+                path.lineTo(line.boundingRect().right(), 0.0)
+            else:
+                path, pen = line.getPath(), pg.mkPen(line.opts["pen"])
+            painter.strokePath(line.sceneTransform().map(path), pen)
         painter.restore()
         for legend in self.findChildren(Legend):
             legend.render(painter, legend.pos(), renderFlags=legend.RenderFlag(0))
-        self.resize(size)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         super().mouseMoveEvent(event)
@@ -107,27 +102,5 @@ class Plot(pg.PlotWidget):
         return keeps_keys(event, *self.KEPT_KEYS) or bool(super().event(event))
 
 
-def _paint_ink(painter: QPainter, ink: pg.PlotCurveItem | pg.InfiniteLine | pg.ScatterPlotItem) -> None:
-    """Paint a curve with the area below it, a line from end to end, or points, in pixels of the plot."""
-    in_pixels = ink.sceneTransform()
-    if isinstance(ink, pg.InfiniteLine):
-        ends = ink.boundingRect()
-        painter.setPen(ink.currentPen)
-        painter.drawLine(in_pixels.map(QLineF(ends.left(), 0.0, ends.right(), 0.0)))
-        return
-    if isinstance(ink, pg.ScatterPlotItem):
-        for point in ink.points():
-            at, size = in_pixels.map(QPointF(point.pos())), point.size()
-            painter.setPen(point.pen())
-            painter.setBrush(point.brush())
-            painter.drawPath(QTransform(size, 0, 0, size, at.x(), at.y()).map(Symbols[point.symbol()]))
-        return
-    path, level, brush = QPainterPath(ink.getPath()), ink.opts["fillLevel"], ink.opts["brush"]
-    if path.isEmpty():
-        return
-    if level is not None and brush is not None:
-        area, first = QPainterPath(path), path.elementAt(0)
-        area.lineTo(path.currentPosition().x(), level)
-        area.lineTo(first.x, level)
-        painter.fillPath(in_pixels.map(area), pg.mkBrush(brush))
-    painter.strokePath(in_pixels.map(path), pg.mkPen(ink.opts["pen"]))
+def _is_curve(thing: object) -> bool:
+    return isinstance(thing, pg.PlotCurveItem) and thing.opts["fillLevel"] is None

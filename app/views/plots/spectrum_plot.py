@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import Qt
 
-from app.views.plots.axis_label import LOWEST_HZ, frequency_ticks
+from app.views.plots.axis_label import frequency_ticks
 from app.views.plots.zoom_plot import ZoomPlot
 
 TIP = (
     "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names.\n"
-    "The wheel zooms, a drag pans, double-click shows all. Arrow keys read partial after partial, with Shift point\n"
-    "after point; + and − zoom"
+    "The wheel zooms, a drag pans, double-click shows all. Arrow keys move the cursor, + and − zoom"
 )
-_SIDES = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class SpectrumPlot(ZoomPlot):
@@ -24,7 +21,6 @@ class SpectrumPlot(ZoomPlot):
 
     SHORTEST_VIEW = 0.005  # a third of a semitone
     PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton
-    stepped = Signal(int, bool)  # the cursor, to the next partial on this side, or to the next point of the curve
 
     def __init__(self) -> None:
         super().__init__("Spectrum", TIP, "frequency (Hz)")
@@ -34,9 +30,6 @@ class SpectrumPlot(ZoomPlot):
         item.setMouseEnabled(True, False)
         item.vb.sigXRangeChanged.connect(self._label_frequencies)
         self.move_line(math.nan)
-
-    def set_highest(self, highest_hz: float) -> None:
-        self.set_ends(math.log10(LOWEST_HZ), math.log10(highest_hz))
 
     @property
     def view_hz(self) -> tuple[float, float]:
@@ -48,9 +41,8 @@ class SpectrumPlot(ZoomPlot):
         low, high = self.getPlotItem().vb.viewRange()[0]
         self.getPlotItem().getAxis("bottom").setTicks([frequency_ticks(10**low, 10**high)])
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        side = _SIDES.get(Qt.Key(event.key()))
-        if side is None:
-            super().keyPressEvent(event)
-        else:
-            self.stepped.emit(side, bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
+    def _seek(self, at: float) -> None:
+        """Ask for a place of the cursor, and let the view go with it."""
+        super()._seek(at)
+        low, high = self.view_range
+        self.pan(max(at - high, 0.0) + min(at - low, 0.0))

@@ -5,22 +5,21 @@ A click or a drag moves the playhead, and so do arrows and Home. The middle or r
 
 from __future__ import annotations
 
+import math
+
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QMouseEvent
 
 from app.views import theme
 from app.views.plots.zoom_plot import ZoomPlot
-
-SEEK_STEP_S = 0.1
-SEEK_STEP_SHARE = 0.05  # of what is in view, where that is less
 
 
 class TimePlot(ZoomPlot):
     """The owner draws the curves; the line of `KeptPlot` is the playhead, in s."""
 
     SHORTEST_VIEW = 0.002
-    seek_asked = Signal(float)  # a time in s
+    LONGEST_STEP = 0.1
     pointed = Signal(float, float)  # a press with Shift: time in s, place on the vertical axis
 
     def __init__(self, name: str, tip: str, *, shaded: bool = True) -> None:
@@ -72,6 +71,12 @@ class TimePlot(ZoomPlot):
         """The start and the end of the view, within the take."""
         return self.view_range
 
+    def frames_in_view(self, rate_hz: float, ready: int) -> range:
+        """The frames in view, of the first `ready` at a rate."""
+        low_s, high_s = self.times_s
+        first = math.ceil(low_s * rate_hz)
+        return range(first, max(first, min(math.floor(high_s * rate_hz) + 1, ready)))
+
     @property
     def columns(self) -> int:
         """The width of the view in pixels of the screen; 1 at least."""
@@ -87,24 +92,8 @@ class TimePlot(ZoomPlot):
             self._follow(event)
         super().mouseMoveEvent(event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        low, high = self.times_s
-        step_s = min(SEEK_STEP_S, SEEK_STEP_SHARE * (high - low))
-        match event.key():
-            case Qt.Key.Key_Left:
-                self._seek(self.line_at - step_s)
-            case Qt.Key.Key_Right:
-                self._seek(self.line_at + step_s)
-            case Qt.Key.Key_Home:
-                self._seek(0.0)
-            case _:
-                super().keyPressEvent(event)
-
     def _follow(self, event: QMouseEvent) -> None:
         point = self.place_at(event.position())
         if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             self.pointed.emit(point.x(), point.y())
         self._seek(point.x())
-
-    def _seek(self, time_s: float) -> None:
-        self.seek_asked.emit(min(max(time_s, self._ends[0]), self._ends[1]))

@@ -1,25 +1,31 @@
 """A plot whose horizontal axis zooms and pans within its ends.
 
-The wheel zooms, a drag pans, a double-click shows all. The keyboard does the same: + and −, 0.
+The wheel zooms, a drag pans, a double-click shows all. The keyboard does the same: + and −, 0. Arrow keys ask for
+another place of the line.
 """
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
-from PySide6.QtCore import QPointF, Qt
+from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 
 from app.views.plots.kept_plot import KeptPlot
 
 ZOOM_STEP = 1.25
+LINE_STEP = 0.05  # of the view
 
 
 class ZoomPlot(KeptPlot):
     """The view is the part of the axis that is shown."""
 
     SHORTEST_VIEW: ClassVar[float]
+    LONGEST_STEP: ClassVar[float] = math.inf  # of the line, by a key
     PAN_BUTTONS: ClassVar = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
+
+    seek_asked = Signal(float)  # a place for the line
 
     def __init__(self, name: str, tip: str, foot: str = "") -> None:
         super().__init__(name, tip, foot)
@@ -90,7 +96,16 @@ class ZoomPlot(KeptPlot):
         self.show_all()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        low, high = self.view_range
+        here = self.line_at if math.isfinite(self.line_at) else low
+        step = min(self.LONGEST_STEP, LINE_STEP * (high - low))
         match event.key():
+            case Qt.Key.Key_Left:
+                self._seek(here - step)
+            case Qt.Key.Key_Right:
+                self._seek(here + step)
+            case Qt.Key.Key_Home:
+                self._seek(self._ends[0])
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
                 self.zoom(1 / ZOOM_STEP**2)
             case Qt.Key.Key_Minus:
@@ -99,3 +114,6 @@ class ZoomPlot(KeptPlot):
                 self.show_all()
             case _:
                 super().keyPressEvent(event)
+
+    def _seek(self, at: float) -> None:
+        self.seek_asked.emit(min(max(at, self._ends[0]), self._ends[1]))

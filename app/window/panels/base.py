@@ -9,8 +9,9 @@ core at a low priority. They rest while a pluck is rendered and while the panel 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
@@ -35,6 +36,7 @@ from app.views.controls.progress_strip import ProgressStrip
 from app.views.stage import StageView
 
 Location = Literal["stage", "left", "right"]
+V = TypeVar("V")
 LEAST_HEIGHT = 84  # pixels
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
 UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
@@ -98,7 +100,7 @@ class Panel(QWidget):
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     location: Location = "stage"  # above the decks, or in one
     every: ClassVar[int] = 1  # of so many moments one is drawn
-    figure: Any  # the widget that is saved as a picture; a `Figure`
+    figure: Any = None  # what is saved and copied: a `Figure`; None: a table, which copies itself
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -143,6 +145,11 @@ class Panel(QWidget):
     def columns(self) -> Columns | None:
         """The numbers that are shown now; None: nothing is."""
         raise NotImplementedError
+
+    def by_heading(self, values: Mapping[str, V], unit: str) -> dict[str, V]:
+        """Values by source, by the headings that they have in files."""
+        shown = shown_sources(self.session.choices, self.library)
+        return {source.heading(unit): values[source.source] for source in shown if source.source in values}
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Take the fields of `Choices` that have new values; at the start all of them."""

@@ -14,7 +14,6 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import ComparedRow, compare, same_string
-from app.export.columns import Columns
 from app.export.compared import ComparedModels, models_word
 from app.presets import words
 from app.presets.library import Library, PresetEntry
@@ -96,7 +95,7 @@ class ComparePanel(ComputedPanel):
         self._export.clicked.connect(self._ask_export)
         self._stop = tool_button("Stop")
         self._stop.clicked.connect(self._stop_or_go_on)
-        self.table = self.figure = FiguresTable("Presets compared on this pluck", COLUMNS)
+        self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter plays a model; Delete removes it. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._hear)
         self.table.row_entered.connect(self._hear)
@@ -110,9 +109,6 @@ class ComparePanel(ComputedPanel):
         self._fill_menu()
         self._set_computing(None)
         lay_out_table(self, (presets,), self._words, (self._export, self._stop), self.progress, self.table)
-
-    def columns(self) -> Columns:
-        return self.table.columns()
 
     def _draw_moment(self, moment: Moment) -> None:
         super()._draw_moment(moment)

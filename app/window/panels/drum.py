@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.analysis.moment import caption_of
-from app.export.columns import Columns, Values
+from app.export.columns import Columns
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
@@ -102,10 +102,9 @@ class DrumPanel(StagePanel):
             return None
         rows, columns = next(iter(frame.pictures_m.values())).shape
         edge = drum.drum.width_m / drum.drum.length_m
-        y, x = np.meshgrid(np.linspace(edge, -edge, rows), np.linspace(-1, 1, columns), indexing="ij")
-        places: dict[str, Values] = {"x (half-lengths)": x.ravel(), "y (half-lengths)": y.ravel()}
-        shown = {s.source: s.heading("m") for s in self._sources}
-        return Columns({**places, **{shown[name]: values.ravel() for name, values in frame.pictures_m.items()}})
+        y, x = map(np.ravel, np.meshgrid(np.linspace(edge, -edge, rows), np.linspace(-1, 1, columns), indexing="ij"))
+        pictures_m = {source: values.ravel() for source, values in frame.pictures_m.items()}
+        return Columns({"x (half-lengths)": x, "y (half-lengths)": y, **self.by_heading(pictures_m, "m")})
 
     # Gestures
 

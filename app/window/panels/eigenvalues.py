@@ -15,7 +15,7 @@ from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent
 
 from app.analysis.poles import PoleFigure, Poles, pole_figure
-from app.export.columns import Columns, Values, heading_of
+from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject
 from app.session.slots import subject_of
@@ -29,7 +29,6 @@ NEAR_PIXELS = 16  # within which a point is pointed at
 CLOSER_PIXELS = 3  # that a point of the string must be nearer than a learned one
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
-POLE_FIELDS = ("layer", "mode", "folded_hz", "mode_hz", "cents", "t60_s")  # of `Poles`, in files
 AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
 
 Array = NDArray[np.float64]
@@ -98,15 +97,14 @@ class EigenvaluesPanel(ComputedPanel):
 
     def columns(self) -> Columns | None:
         """The shown points, the learned ones first."""
-        figure = self._figure
-        if figure is None:
+        if self._figure is None:
             return None
-        parts = (figure.learned, self._shown), (figure.string, np.arange(len(figure.string)))
-        names = ("log", *POLE_FIELDS)
-        log, *fields = (np.concatenate([getattr(of, name)[shown] for of, shown in parts]) for name in names)
-        kinds = ["learned"] * len(self._shown) + ["string"] * len(figure.string)
-        values: dict[str, Values] = {"kind": kinds, **dict(zip(map(heading_of, POLE_FIELDS), fields, strict=True))}
-        return Columns({**values, "decay (1/sample)": -log.real, "angle (rad/sample)": log.imag})
+        learned, string, shown = self._figure.learned, self._figure.string, self._shown
+        names = ("layer", "mode", "folded_hz", "mode_hz", "cents", "t60_s", "log")
+        points = {name: np.concatenate([getattr(learned, name)[shown], getattr(string, name)]) for name in names}
+        log = points.pop("log")
+        kind = ["learned"] * len(shown) + ["string"] * len(string)
+        return Columns({"kind": kind, **points, "decay (1/sample)": -log.real, "angle (rad/sample)": log.imag})
 
     @property
     def _modes(self) -> NDArray[np.int64]:

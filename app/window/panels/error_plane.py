@@ -14,7 +14,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
-from app.export.columns import Columns, Values
+from app.export.columns import Columns
 from app.presets.library import Library
 from app.presets.words import percent
 from app.rendering.subject import Subject, load_subject, string_of
@@ -121,9 +121,9 @@ class ErrorPlanePanel(ComputedPanel):
     def columns(self) -> Columns | None:
         if self._picture is None:
             return None
-        positions, amplitudes_mm = np.meshgrid(POSITIONS, AMPLITUDES_MM, indexing="ij")
-        places: dict[str, Values] = {"position": positions.ravel(), "amplitude (mm)": amplitudes_mm.ravel()}
-        return Columns({**places, "MAE (of the truth)": self._picture.error.ravel()})
+        positions, amplitudes_mm = map(np.ravel, np.meshgrid(POSITIONS, AMPLITUDES_MM, indexing="ij"))
+        error = self._picture.error.ravel()
+        return Columns({"position": positions, "amplitude (mm)": amplitudes_mm, "MAE (of the truth)": error})
 
     def _show_values(self, position: float, amplitude_mm: float) -> None:
         if self._picture is None or math.isnan(position):

@@ -10,7 +10,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 
-from app.export.columns import Columns, heading_of
+from app.export.columns import Columns
 from app.presets import words
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
@@ -113,13 +113,11 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._fit(list(levels.values()))
 
     def columns(self) -> Columns | None:
-        figures, (low_s, high_s) = self._made, self.plot.times_s
-        if figures is None:
+        if self._made is None:
             return None
-        middle_s = figures.middle_s[: figures.ready]
+        middle_s, (low_s, high_s) = self._made.middle_s[: self._made.ready], self.plot.times_s
         seen = np.flatnonzero((low_s <= middle_s) & (middle_s <= high_s))
-        curves = {heading_of(name): values[seen] for name, values in figures.curves.items()}
-        return Columns({"time (s)": middle_s[seen], **curves})
+        return Columns({"time (s)": middle_s[seen], **{name: all_[seen] for name, all_ in self._made.curves.items()}})
 
     def _words(self, figures: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
         window = int(time_s / figures.window_s)

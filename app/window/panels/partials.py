@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
-from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.stage.session import Session
@@ -72,7 +71,7 @@ class PartialsPanel(ComputedPanel):
             "The part of the pluck that is measured",
         )
         self._window = combo_box("Window of time", windows, tip=tip, picked=lambda _: self._show())
-        self.table = self.figure = FiguresTable("Partials of this pluck", COLUMNS)
+        self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
         self.table.row_clicked.connect(self._choose)
         self.table.row_entered.connect(self._choose)
@@ -82,9 +81,6 @@ class PartialsPanel(ComputedPanel):
         self.background.progressed.connect(self.progress.show_share)
         self.background.finished.connect(self._show_measured)
         lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
-
-    def columns(self) -> Columns:
-        return self.table.columns()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "solo" in names:

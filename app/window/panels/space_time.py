@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -10,7 +9,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 
 from app.analysis.space_time import Envelopes, Picture, motion_of, picture
-from app.export.columns import Columns, most_rows
+from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import SOURCES, BlowTake, Sounding, Take
 from app.session.shown import readable_unit
@@ -130,18 +129,15 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self.readout.rest(*_captions(seen))
 
     def columns(self) -> Columns | None:
-        """The pictures in view, one a row, as many as a file may have."""
-        figures, (low_s, high_s) = self._made, self.plot.times_s
-        if figures is None:
+        """The pictures in view, one a row."""
+        if self._made is None:
             return None
-        take, quantity = figures.take, self.quantities.key
-        first, stop = math.ceil(low_s * take.frames_hz), math.floor(high_s * take.frames_hz) + 1
-        stop = max(min(stop, take.ready_frames), first)
-        last = min(stop, first + most_rows(1 + take.info.grid_points))
-        motion_m = motion_of(take, quantity, first, last)
+        take, quantity = self._made.take, self.quantities.key
+        frames = self.plot.frames_in_view(take.frames_hz, take.ready_frames)
+        motion_m = motion_of(take, quantity, frames.start, frames.stop)
         places = np.linspace(0, 1, motion_m.shape[1])
         shapes = {f"{quantity} at {place:.6g} (m)": there for place, there in zip(places, motion_m.T, strict=True)}
-        return Columns({"time (s)": np.arange(first, last) / take.frames_hz, **shapes}, stop - last)
+        return Columns({"time (s)": np.array(frames) / take.frames_hz, **shapes})
 
     def _words(self, figures: Envelopes, time_s: float, place: float) -> Iterable[str]:
         here_m = self._picture.at(time_s, place) if self._picture is not None else None

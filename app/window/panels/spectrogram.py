@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF
 
 from app.analysis.spectrogram import FrequencyRows, Spectrogram
-from app.export.columns import Columns, most_rows
+from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
 from app.session.shown import level_words
@@ -150,15 +150,14 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def columns(self) -> Columns | None:
         """All levels of the columns in view."""
-        figures, (low_s, high_s) = self._made, self.plot.times_s
+        figures = self._made
         if figures is None:
             return None
-        levels_db = figures.levels_db[self.quantities.key]
-        first, stop = math.ceil(low_s / figures.hop_s), min(math.floor(high_s / figures.hop_s) + 1, figures.ready)
-        last = max(min(stop, first + most_rows(1 + levels_db.shape[1])), first)
-        unit, levels = level_words(figures.take.pickup), enumerate(levels_db[first:last].T)
+        frames = self.plot.frames_in_view(1 / figures.hop_s, figures.ready)
+        unit, levels_db = level_words(figures.take.pickup), figures.levels_db[self.quantities.key]
+        levels = enumerate(levels_db[frames.start : frames.stop].T)
         bins = {f"{number * figures.bin_hz:.10g} Hz ({unit})": level for number, level in levels}
-        return Columns({"time (s)": np.arange(first, last) * figures.hop_s, **bins}, max(stop - last, 0))
+        return Columns({"time (s)": np.array(frames) * figures.hop_s, **bins})
 
     def _words(self, figures: Spectrogram, time_s: float, place: float) -> Iterable[str]:
         frequency_hz = self.frequency_hz(place)

@@ -112,11 +112,10 @@ class SpectrumPanel(CurvesPanel):
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
         self._partials_hz = np.zeros(0)
-        self._described: tuple[object, ...] = ()  # the place of the cursor in the accessible words
         self._rate_hz = 16_000  # the highest of what is drawn
         self._fit()
         self.plot.hovered.connect(lambda height, _: self.point_at(10**height))
-        self.plot.stepped.connect(self._step)
+        self.plot.seek_asked.connect(lambda height: self.point_at(10**height))
         lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -184,12 +183,8 @@ class SpectrumPanel(CurvesPanel):
 
     def columns(self) -> Columns:
         """The points of the curves in view."""
-        take, curves = self._growing, {}
-        for shown in shown_sources(self.session.choices, self.library):
-            if take is not None and shown.source in self._levels:
-                analyser, levels_db = self._levels[shown.source]
-                curves[shown.heading(level_words(take.pickup))] = analyser.column_hz, levels_db
-        return aligned("frequency (Hz)", curves)
+        curves = {source: (analyser.column_hz, levels_db) for source, (analyser, levels_db) in self._levels.items()}
+        return aligned("frequency (Hz)", self.by_heading(curves, level_words(self.session.choices.pickup)))
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources of which it is not drawn."""
@@ -203,47 +198,30 @@ class SpectrumPanel(CurvesPanel):
     def point_at(self, frequency_hz: float) -> None:
         """Move the cursor to a frequency; NaN: there is none."""
         self.plot.move_line(math.log10(frequency_hz))
-        self._show_readout()
+        self.plot.setAccessibleDescription(self._show_readout())  # not again and again while levels fall
 
-    def _step(self, side: int, by_point: bool) -> None:
-        """Move the cursor to the next partial on a side; `by_point`, or where there is none: to the next point."""
-        low_hz, high_hz = self.plot.view_hz
-        here_hz = 10**self.plot.line_at if low_hz <= 10**self.plot.line_at <= high_hz else low_hz
-        partials_hz = self._partials_hz[(self._partials_hz >= LOWEST_HZ) & (self._partials_hz < self._rate_hz / 2)]
-        ahead_hz = partials_hz[side * np.log2(partials_hz / here_hz) > 1e-6]
-        if by_point or not len(ahead_hz):
-            ahead_hz = np.clip([here_hz * (high_hz / low_hz) ** (side / COLUMNS)], LOWEST_HZ, self._rate_hz / 2)
-        self.point_at(float(ahead_hz[np.abs(np.log(ahead_hz / here_hz)).argmin()]))
-        low, high = self.plot.view_range
-        if not low <= (at := self.plot.line_at) <= high:
-            self.plot.show_range(at - (high - low) / 2, at + (high - low) / 2)
-
-    def _show_readout(self) -> None:
-        """Write the frequency at the cursor, its note and levels, and the nearest partial of a quiet pluck."""
+    def _show_readout(self) -> str:
+        """Write the frequency at the cursor, its note, levels and nearest partial of a quiet pluck; return all."""
         frequency_hz, wordings = 10**self.plot.line_at, [""]
-        nearest = None
+        shows_partial = math.isfinite(frequency_hz) and len(self._partials_hz) > 0
         if math.isfinite(frequency_hz):
             levels_db = self.levels_db(frequency_hz)
             seen = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]
-            pitch, note = f"{frequency_hz:.1f} Hz", note_words(frequency_hz)
-            levels = [f"{source.slots} {levels_db[source.source]:.1f} dB" for source in seen]
-            texts = [(pitch, note, *levels), (pitch, *levels), levels or (pitch,)]
-            if len(self._partials_hz):
-                nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
-                partial_hz = float(self._partials_hz[nearest])
-                cents = 1200 * math.log2(frequency_hz / partial_hz)
-                of_partial = f"partial {nearest + 1}: {partial_hz:.1f} Hz ({round(cents):+d} cents)"
-                texts.insert(0, (*texts[0], of_partial))
-                self._partial.setValue(math.log10(partial_hz))
-            wordings = ["   ".join(text) for text in texts]
+            levels = "   ".join(f"{source.slots} {levels_db[source.source]:.1f} dB" for source in seen)
+            pitch = f"{frequency_hz:.1f} Hz   {note_words(frequency_hz)}"
+            wordings = [f"{pitch}   {levels}", levels or pitch]
+        if shows_partial:
+            nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
+            partial_hz = float(self._partials_hz[nearest])
+            cents = round(1200 * math.log2(frequency_hz / partial_hz))
+            wordings.insert(0, f"{wordings[0]}   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+d} cents)")
+            self._partial.setValue(math.log10(partial_hz))
+        self._partial.setVisible(shows_partial)
         self.readout.report(*wordings)
-        if self._described != (place := (self.plot.line_at, self.plot.view_range, *self._levels)):
-            self._described = place  # and not again and again while levels fall
-            self.plot.setAccessibleDescription(wordings[0])
-        self._partial.setVisible(nearest is not None)
+        return wordings[0]
 
     def _fit(self) -> None:
-        self.plot.set_highest(self._rate_hz / 2)
+        self.plot.set_ends(math.log10(LOWEST_HZ), math.log10(self._rate_hz / 2))
         self.plot.getPlotItem().setYRange(CEILING_DB - self.range_db, CEILING_DB, padding=0)
 
     @property

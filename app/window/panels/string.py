@@ -118,9 +118,9 @@ class StringPanel(StagePanel):
 
     def columns(self) -> Columns:
         """The string at the shown moment; at rest, the pluck."""
-        headings = {"": "pluck (mm)", **{shown.source: shown.heading("mm") for shown in self._sources}}
-        shapes = {headings[source]: shape for source, shape in self.view.shapes_mm.items() if source in headings}
-        return aligned("position", {name: (np.linspace(0, 1, len(shape)), shape) for name, shape in shapes.items()})
+        shapes = {name: (np.linspace(0, 1, len(shape)), shape) for name, shape in self.view.shapes_mm.items()}
+        pluck = {"pluck (mm)": shapes[""]} if "" in shapes else {}
+        return aligned("position", pluck | self.by_heading(shapes, "mm"))
 
     # Gestures
 

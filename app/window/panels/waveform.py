@@ -126,15 +126,11 @@ class WaveformPanel(CurvesPanel):
         """The frames in view."""
         if self._take is None:
             return None
-        (low_s, high_s), curves = self.plot.times_s, {}
-        for shown in shown_sources(self.session.choices, self.library):
-            if (drawn := self._drawn.get(shown.source)) is not None:
-                origin, rate_hz = drawn.origin, drawn.origin.rate_hz
-                first, stop = math.ceil(low_s * rate_hz), math.floor(high_s * rate_hz) + 1
-                signal = origin.read(first, stop)
-                times_s = np.arange(first, first + len(signal)) / rate_hz
-                curves[shown.heading(unit_of(self._take.pickup))] = times_s, signal
-        return aligned("time (s)", curves)
+        curves = {}
+        for source, origin in ((source, drawn.origin) for source, drawn in self._drawn.items()):
+            frames = self.plot.frames_in_view(origin.rate_hz, origin.ready)
+            curves[source] = np.array(frames) / origin.rate_hz, origin.read(frames.start, frames.stop)
+        return aligned("time (s)", self.by_heading(curves, unit_of(self._take.pickup)))
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
         """Set the vertical axis, from −full to full in `unit`."""
