@@ -5,6 +5,8 @@ It comes from a file, or gives a duration in words.
 
 from __future__ import annotations
 
+import time
+
 LONGEST_MESSAGE = 500  # characters
 
 
@@ -48,3 +50,10 @@ def duration(seconds: float) -> str:
         return short if seconds < 9.95 else f"{seconds:.0f} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def time_left(began_s: float, share: float, left_s: float | None = None) -> str:
+    """The time left of work that began at a time of `time.monotonic`, as "5 s left"; "" where it is not known."""
+    if left_s is None and share > 0:
+        left_s = (time.monotonic() - began_s) * (1 - share) / share
+    return f"{duration(max(left_s, 1.0))} left" if left_s else ""

@@ -14,7 +14,7 @@ from engine.plain_text import one_line
 from training.cli.console import Failure, say
 
 if TYPE_CHECKING:
-    from app.export.plugin.image import Image
+    pass
 
 ALL = "all"
 BANK = "Learned Strings"
@@ -66,7 +66,9 @@ def plugin(
             if images[-1].left_out:
                 say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
         if dry_run:
-            _print_sizes(images)
+            for image in images:  # beside the code, a third of a megabyte in every plug-in
+                in_a_bank_mb = len(image.content) / 1e6
+                print(f"{one_line(image.name)}: {image.bytes / 1e6:.2f} MB, {in_a_bank_mb:.2f} MB in a bank")
             return
         cache_folder = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
@@ -95,12 +97,6 @@ def _bank_name(names: Sequence[str]) -> str:
     """The name of the file, by what it holds; where two banks have one name, the second is refused."""
     whole = " + ".join(names)
     return whole if len(names) == 1 or len(whole) <= LONGEST_BANK_NAME else f"{names[0]} + {len(names) - 1} others"
-
-
-def _print_sizes(images: Sequence[Image]) -> None:
-    """Print the size that each adds to the code. The code is a third of a megabyte in every plug-in."""
-    for image in images:
-        print(f"{one_line(image.name)}: {image.bytes / 1e6:.2f} MB, {len(image.content) / 1e6:.2f} MB in a bank")
 
 
 class _Steps:

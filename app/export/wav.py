@@ -128,7 +128,9 @@ def write_wav(
         ValueError: a sample is not finite, there are none, or a tag is too long.
         OSError: the file cannot be written.
     """
-    _check_tags(tags)
+    for name, text in tags.items():
+        if len(text.encode()) > LONGEST_TAG_BYTES:
+            raise ValueError(f"the tag {name} is longer than {LONGEST_TAG_BYTES} bytes; shorten it")
     if len(sound) == 0:
         raise ValueError("there are no samples to write; choose a longer duration")
     fade_frames = round(settings.fade_out_s * rate_hz)
@@ -265,12 +267,6 @@ def quantised(
 def _dither(shape: tuple[int, ...], first: int) -> NDArray[np.float64]:
     """Random numbers in 0 … 1, of one fixed sequence from its element `first` on."""
     return np.random.Generator(np.random.PCG64(_DITHER_SEED).advance(first)).random(shape)
-
-
-def _check_tags(tags: Mapping[str, str]) -> None:
-    for name, text in tags.items():
-        if len(text.encode()) > LONGEST_TAG_BYTES:
-            raise ValueError(f"the tag {name} is longer than {LONGEST_TAG_BYTES} bytes; shorten it")
 
 
 def _decibel(ratio: float) -> float:

@@ -8,19 +8,15 @@ from __future__ import annotations
 DRUMS = 9  # channel 10
 KIT = "concert_toms"  # which plays that channel
 _NONE = 8 * ("",)
+_NECK = "electric_guitar_neck_pick_up"
+_BRIDGE = "electric_guitar_bridge_pick_up"
 
 # Of each family, the file of the instrument for each of its eight programs; "": none is like it.
 FAMILIES = {
     "piano": (*6 * ("piano_wires_plucked",), "harpsichord", "clavichord"),
     "chromatic percussion": ("thin_bars", "thin_bars", "toy_wires", *3 * ("thin_bars",), "stiff_rods", "cimbalom"),
     "organ": _NONE,
-    "guitar": (
-        "classical_guitar",
-        "steel_string_acoustic",
-        "jazz_guitar",
-        *2 * ("electric_guitar_neck_pick_up",),
-        *3 * ("electric_guitar_bridge_pick_up",),
-    ),
+    "guitar": ("classical_guitar", "steel_string_acoustic", "jazz_guitar", *2 * (_NECK,), *3 * (_BRIDGE,)),
     "bass": ("upright_bass", "electric_bass", "picked_bass", "fretless_bass", *4 * ("electric_bass",)),
     "strings": (*5 * ("",), "damped_harp", "concert_harp", "timpani"),  # pizzicato, harp and timpani
     "ensemble": _NONE,

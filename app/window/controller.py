@@ -310,8 +310,7 @@ class Controller(QObject):
         """Show the table of all models on this pluck, with the keyboard in it."""
         self.show_face("lab")
         self.session.update(right_view="compare")
-        panel = next(panel for panel in self.panels if panel.key == "compare")
-        panel.setFocus()
+        next(panel for panel in self.panels if panel.key == "compare").setFocus()
 
     def _export_models(self, models: ComparedModels) -> None:
         self.exports.models = models

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, cast
 
 from engine import bounds
@@ -153,7 +153,7 @@ class PresetInfo:
         if trained.position is None or trained.peak_m is None or not trained.width:
             return None
         shape, width = next(iter(trained.width.items()))
-        middle = _geometric_middle if self.initial == "pluck" else _middle
+        middle = partial(_middle, logarithmic=self.initial == "pluck")
         pluck = Pluck(shape=cast(Shape, shape)).nearest(position=_middle(*trained.position), width=middle(*width))
         low_mm, high_mm = self.trained_amplitudes_mm(pluck)
         return pluck.nearest(amplitude_mm=round(middle(low_mm, min(high_mm, self.hardest_mm(pluck))), 3))
@@ -164,12 +164,8 @@ class PresetInfo:
         return "nonlinear" if self.tension_modulated else "linear"
 
 
-def _middle(low: float, high: float) -> float:
-    return round((low + high) / 2, 4)
-
-
-def _geometric_middle(low: float, high: float) -> float:
-    return round(math.sqrt(low * high), 4)
+def _middle(low: float, high: float, logarithmic: bool = False) -> float:
+    return round(math.sqrt(low * high) if logarithmic else (low + high) / 2, 4)
 
 
 def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from engine.plain_text import LineError, duration, one_line
+from engine.plain_text import LineError, one_line, time_left
 
 LINE_EVERY_S = 10.0  # between two lines of progress
 WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
@@ -102,7 +102,7 @@ def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], ProgressRepo
             task, started = bar.add_task(what, total=1.0, left="", text=""), time.monotonic()
 
             def report(share: float, text: str = "", left_s: float | None = None) -> None:
-                left = _left(started, share, left_s)
+                left = time_left(started, share, left_s)
                 bar.update(task, completed=share, text=text, left=left, visible=share < 1)
 
             return report
@@ -128,15 +128,7 @@ class _Lines:
         now = time.monotonic()
         if now - self._last >= self._every_s and share < 1:
             self._last = now
-            say(f"{self._what}: {share:.0%}, {_left(self._started, share, left_s)} {text}")
-
-
-def _left(started: float, share: float, left_s: float | None) -> str:
-    if left_s is None:
-        if share <= 0:
-            return ""
-        left_s = (time.monotonic() - started) * (1 - share) / share
-    return f"{duration(max(left_s, 1.0))} left"
+            say(f"{self._what}: {share:.0%}, {time_left(self._started, share, left_s)} {text}")
 
 
 def number(value: float | None) -> str:

@@ -110,7 +110,8 @@ def write_sf2(
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
     headrooms_db = headroom_db(plan.patch, samples)
     levels_db = {
-        zone: _raised_db(attenuations_cb[zone], zone) + headrooms_db[zone] - stored.gain_db
+        # its hardest velocity's attenuation is made up for
+        zone: attenuations_cb[zone] / 10 * (1 - zone.velocities[1] / 128) + headrooms_db[zone] - stored.gain_db
         for zone, stored in samples.items()
     }
     gain_db = -max(levels_db.values())
@@ -142,11 +143,6 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
             most = (levels_db[-1] - levels_db[hardest] + MOST_RAISED_DB) / (128 - hardest)
             attenuations_cb[zone] = round(10 * 128 * max(0.0, min(step, most)))
     return attenuations_cb
-
-
-def _raised_db(attenuation_cb: int, zone: Zone) -> float:
-    """The dB that a zone is raised by, to make up for the velocity's attenuation at its hardest velocity."""
-    return attenuation_cb / 10 * (1 - zone.velocities[1] / 128)
 
 
 def release_timecents(patch: Patch) -> int:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QDialog, QFormLayout, QProgressBar, QWidget
 from app.shared.worker import Work
 from app.views.background import Background
 from app.views.controls.parts import label
-from engine.plain_text import duration
+from engine.plain_text import time_left
 
 CHANGES = (QEvent.Type.LayoutRequest, QEvent.Type.Resize, QEvent.Type.Show)
 
@@ -69,10 +69,8 @@ class WorkDialog(QDialog):
 
     def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))
-        if left_s is None and share > 0:
-            left_s = (time.monotonic() - self._began_s) * (1 - share) / share
-        left = f"about {duration(max(left_s, 1.0))} left" if left_s else ""
-        self.state.setText(self.progress_words(text, left))
+        left = time_left(self._began_s, share, left_s)
+        self.state.setText(self.progress_words(text, left and f"about {left}"))
 
     def event(self, event: QEvent) -> bool:
         handled = super().event(event)

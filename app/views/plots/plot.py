@@ -56,7 +56,8 @@ class Plot(pg.PlotWidget):
         """
         box = self.getPlotItem().vb
         things = [each for each in self.scene().items(Qt.SortOrder.AscendingOrder) if box.isAncestorOf(each)]
-        lines = [each for each in things if isinstance(each, pg.InfiniteLine) or _is_curve(each)]
+        curves = [each for each in things if isinstance(each, pg.PlotCurveItem) and each.opts["fillLevel"] is None]
+        lines = [*curves, *(each for each in things if isinstance(each, pg.InfiniteLine))]
         self.getPlotItem().layout.activate()
         for for_file in (True, False):  # axes and points as vectors, lines not yet; then all as the screen needs it
             for side in ("left", "bottom"):
@@ -100,7 +101,3 @@ class Plot(pg.PlotWidget):
 
     def event(self, event: QEvent) -> bool:
         return keeps_keys(event, *self.KEPT_KEYS) or bool(super().event(event))
-
-
-def _is_curve(thing: object) -> bool:
-    return isinstance(thing, pg.PlotCurveItem) and thing.opts["fillLevel"] is None

@@ -23,7 +23,7 @@ from app.stage.session import Session
 from app.views.controls.parts import tool_button
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import ComputedPanel, Moment
-from engine.plain_text import duration
+from engine.plain_text import time_left
 
 
 def percent(value: float) -> str:
@@ -200,8 +200,8 @@ class ComparePanel(ComputedPanel):
     def _set_computing(self, share: float | None) -> None:
         """Set the share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
-        left_s = (time.monotonic() - self._began_s) * (1 - share) / share if share else 0.0
-        self._left = f"; about {duration(max(left_s, 1.0))} left" if left_s else ""
+        left = time_left(self._began_s, share or 0.0)
+        self._left = left and f"; about {left}"
         stops = share is not None
         self._stop.setText("Stop" if stops else "Compute again")
         self._stop.setAccessibleName("Stop comparing" if stops else "Compare again")
