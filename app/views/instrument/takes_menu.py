@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
-from app.instrument.events import TEMPOS_BPM, Meter
+from app.instrument.events import Meter
+from app.shared.typed_number import typed_number
+from app.views.dialogs.question import ask_text
 
 CHOICES = (
     ("Count-in", "count_in_bars", {0: "No count-in", 1: "1 bar", 2: "2 bars"}),
@@ -62,7 +64,5 @@ class TakesMenu(QMenu):
             action.setChecked(getattr(self.meter, field) == value)
 
     def _ask_tempo(self) -> None:
-        limits = self.meter.tempo_bpm, *TEMPOS_BPM
-        tempo_bpm, chosen = QInputDialog.getInt(self.parentWidget(), "Tempo", "Beats a minute:", *limits)
-        if chosen:
-            self.choose({"tempo_bpm": tempo_bpm})
+        bar, tempo = self.parentWidget(), str(self.meter.tempo_bpm)
+        ask_text(bar, "Tempo", "Beats a minute:", tempo, lambda text: self.choose({"tempo_bpm": typed_number(text)}))

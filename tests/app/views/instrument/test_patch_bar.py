@@ -65,10 +65,11 @@ def test_the_record_button_shows_its_time_and_the_menu_beside_it_takes_and_setti
         menu.show_takes(())
     assert played == ["a & b", "a & b"]
     actions = {each.text(): each for part in (menu, *menu.findChildren(QMenu)) for each in part.actions()}
-    monkeypatch.setattr(QInputDialog, "getInt", lambda *given: (90, given[3:] == (120, 30, 300)))
+    typed = iter(["1e9", "90 or so", "90"])  # the first two are asked again
+    monkeypatch.setattr(QInputDialog, "getText", lambda *_, text: (next(typed), bool(text)))
     for name in ("Metronome", "2 bars", "Tempo: 120 beats a minute …", "3"):
         actions[name].trigger()
-    assert menu.meter == Meter(count_in_bars=2, metronome=True, tempo_bpm=90, beats=3)
+    assert menu.meter == Meter(count_in_bars=2, metronome=True, tempo_bpm=90, beats=3) and not list(typed)
     assert {name for name, each in actions.items() if each.isChecked()} == {"Metronome", "2 bars", "3"}
     with qtbot.waitSignal(bar.record_asked):
         qtbot.mouseClick(bar.record, LEFT)
