@@ -20,7 +20,6 @@ from engine.plain_text import one_line
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
-from training.heard import listen_to
 from training.heard_words import heard_sentence, heard_word
 
 Floats = NDArray[np.floating]
@@ -186,6 +185,8 @@ def _compare_one(
 
 def _audible(preset: Preset, plucked: NoteSound, before: float, share: float, job: Job) -> Audible | None:
     """The difference that an ear finds; None of a pluck that is too short for it."""
+    from training.heard import listen_to  # and SciPy, 60 MB which a window need not have
+
     with suppress(ValueError):
         heard = listen_to(
             preset, lambda done: job.report(before + share * done), [plucked.pluck], plucked.ear, plucked.seconds

@@ -59,8 +59,7 @@ from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
 if TYPE_CHECKING:
-    from app.export.sound import compared_sounds
-from app.instrument.learned import Kept
+    from app.instrument.learned import Kept
 
 LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
 IDLE_LOOK_MS = 50  # while nothing moves
