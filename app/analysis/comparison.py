@@ -83,7 +83,7 @@ class ComparedRow:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """The figures by the names that files and commands have for them."""
+        """The figures by the names that files have for them."""
         heard = self.heard
         return {
             "preset": self.name,

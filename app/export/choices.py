@@ -38,7 +38,7 @@ class ExportChoices(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _take_old(cls, data: Any) -> Any:
-        """Versions without FLAC had `bits` alone."""
+        """Take the `bits` alone that versions without FLAC had."""
         if isinstance(data, dict) and (old := f"wav {data.get('bits')}") in FORMATS:
             return {"format": old, **data}
         return data

@@ -14,6 +14,7 @@ from app.export.wav import WavSettings
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import Source
 from app.shared.worker import Progress
+from engine.presets import Preset
 from engine.sources import Runaway
 from engine.whole_file import WriteError, explain, whole_folder
 
@@ -78,8 +79,7 @@ class ComparedExport:
     def _write(self, made: Path, sound: NoteSound, progress: Progress) -> dict[str, object]:
         """Write the files of a model; the columns of its names and gains, which are empty where it ran away."""
         preset = sound.load(self.settings.rate_hz)
-        named = partial(_unused, made, sound, preset.name, preset.info.rate_hz, self.ending)
-        paths = {source: named(source) for source in SOURCES}
+        paths = {source: _unused(made, sound, preset, self.ending, source) for source in SOURCES}
         try:
             reports = export_sounds(sound, preset, paths, self.settings, progress)
         except Runaway:
@@ -104,8 +104,9 @@ def _part(progress: Progress, before: float, of: float, text: str, share: float,
     progress(before + of * share, text)
 
 
-def _unused(folder: Path, sound: NoteSound, preset: str, rate_hz: int, ending: str, source: Source) -> Path:
+def _unused(folder: Path, sound: NoteSound, preset: Preset, ending: str, source: Source) -> Path:
     """A file's path that no other preset has, for names of files may differ in what cannot be in them."""
-    while (path := folder / default_file_name(preset, sound.pluck, rate_hz, source, ending)).exists():
-        preset = f"_{preset}"
+    name, rate_hz = preset.name, preset.info.rate_hz
+    while (path := folder / default_file_name(name, sound.pluck, rate_hz, source, ending)).exists():
+        name = f"_{name}"
     return path

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pydantic import TypeAdapter
-from PySide6.QtCore import QFileInfo
 
 from app.export.journal import Journal
 from app.export.played import Played, recorded_files
@@ -81,5 +80,5 @@ def free_path(path: Path) -> Path:
 
 def _mark(file: Path) -> tuple[int, int]:
     """Numbers that another file of the same name does not have, nor one that was changed."""
-    there = QFileInfo(str(file))
-    return there.size(), there.lastModified().toMSecsSinceEpoch()
+    there = file.stat() if file.exists() else None
+    return (there.st_size, there.st_mtime_ns) if there else (0, 0)

@@ -255,18 +255,14 @@ def quantised(
     if depth == 16:
         channels = math.prod(samples.shape[1:])
         whole = len(samples) if total is None else total
-        one, other = (_dither(samples.shape, (start + first) * channels) for start in (0, whole))
+        generators = (np.random.PCG64(_DITHER_SEED).advance((start + first) * channels) for start in (0, whole))
+        one, other = (np.random.Generator(generator).random(samples.shape) for generator in generators)
         steps += one - other
     steps = np.rint(steps)
     largest = 2 ** (depth - 1) - 1
     clipped = int(((steps > largest) | (steps < -largest - 1)).sum())
     rounded = np.clip(steps, -largest - 1, largest).astype(np.int32)
     return rounded << (32 - depth), clipped  # soundfile takes the upper bits of an int32
-
-
-def _dither(shape: tuple[int, ...], first: int) -> NDArray[np.float64]:
-    """Random numbers in 0 … 1, of one fixed sequence from its element `first` on."""
-    return np.random.Generator(np.random.PCG64(_DITHER_SEED).advance(first)).random(shape)
 
 
 def _decibel(ratio: float) -> float:

@@ -14,7 +14,10 @@ from app.playing.playback import AHEAD_S, Beginning
 from engine.voices import Voice, plain_program
 
 CLICKS_AHEAD_S = 1.0  # lead of clicks: so long the window's timer may stand still; another device lacks them
-PITCHES_HZ, DECAY_S, CLICK_S, LEVEL = (1318.5, 1760.0), 0.008, 0.06, 0.25  # of a beat, of the first in a bar
+PITCHES_HZ = (1318.5, 1760.0)  # of a beat, of the first in a bar
+DECAY_S = 0.008
+CLICK_S = 0.06
+LEVEL = 0.25  # of full scale
 STOP_S = 0.005
 
 

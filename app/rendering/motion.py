@@ -36,10 +36,10 @@ class ModelMotion(Pictures):
 
     def render(self, stop: int) -> None:
         """Render up to a frame at least, as far as there are any."""
-        rendered = False
-        while not rendered:
+        stop = min(stop, self.frames)
+        while self.ready_frames < stop:
             with self._lock:  # for a block: who hears the motion must not wait for who draws all of it
-                if not (rendered := self.ready_frames >= min(stop, self.frames)):
+                if self.ready_frames < stop:
                     self._render_block()
 
     def _render_block(self) -> None:

@@ -25,7 +25,7 @@ LARGEST_BYTES = 2**30  # of all files together; the latest are there however lar
 
 
 class DragOut(QObject):
-    """The files are rendered in the background, as an export with its last choices would be, and then given."""
+    """The giving of files, which are rendered before in the background, as an export with its last choices."""
 
     def __init__(self, window: MainWindow, exports: Exports, recordings: Recordings) -> None:
         super().__init__(window)

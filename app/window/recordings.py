@@ -342,7 +342,7 @@ class Recordings(QObject):
         try:
             deed()
         except OSError as error:
-            self._notices.report(explain(Path(error.filename), error))
+            self._notices.report(explain(Path(error.filename or recordings_folder()), error))
         self._show_takes()
 
 

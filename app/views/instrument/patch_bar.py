@@ -249,7 +249,7 @@ class PatchBar(ChoiceBar):
         self._share_width()
 
     def _share_knobs(self) -> None:
-        """Every value has one knob: a mix that is a macro's only target is that macro's while macros are shown.
+        """Give every value one knob: a mix that is a macro's only target is that macro's while macros are shown.
 
         The amplifier's stand with the string's.
         """

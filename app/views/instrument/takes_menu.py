@@ -20,7 +20,7 @@ TakeRow = tuple[str, Mapping[str, Callable[[], object]]]  # a take's words; what
 
 
 class TakesMenu(QMenu):
-    """A row of a take does what it was given; `meter` has what is chosen for the next one."""
+    """A menu with a row for each take; `meter` has what is chosen for the next one."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Takes", parent)

@@ -17,7 +17,7 @@ TIP = (
 
 
 class SpectrumPlot(ZoomPlot):
-    """The line of `KeptPlot` is the cursor, at the log₁₀ of a frequency in Hz; not a number: there is none."""
+    """A plot with a cursor, the line of `KeptPlot`, at the log₁₀ of a frequency in Hz; NaN: there is none."""
 
     SHORTEST_VIEW = 0.005  # a third of a semitone
     PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton

@@ -19,7 +19,7 @@ LINE_STEP = 0.05  # of the view
 
 
 class ZoomPlot(KeptPlot):
-    """The view is the part of the axis that is shown."""
+    """A plot whose view, the part of the axis that is shown, is zoomed and moved."""
 
     SHORTEST_VIEW: ClassVar[float]
     LONGEST_STEP: ClassVar[float] = math.inf  # of the line, by a key

@@ -83,7 +83,7 @@ def analyser_at(rate_hz: int, lowest_hz: float = LOWEST_HZ, highest_hz: float = 
 
 
 class SpectrumPanel(CurvesPanel):
-    """The pointer, or the arrow keys, read a frequency, its note, and the level of each curve."""
+    """The spectra; pointer or arrow keys read a frequency, its note, and the level of each curve."""
 
     faint_alpha = 150
     key = "spectrum"
