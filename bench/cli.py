@@ -192,8 +192,8 @@ def play(
     """
     from bench.play.measure import measure
 
-    instrument = _patch(patch) if preset is None else _single(preset)
-    run("play", partial(measure, seconds, rate, _buffer(buffer), busy, seed, instrument), json)
+    chosen = _patch(patch) if preset is None else _single(preset)
+    run("play", partial(measure, seconds, rate, _buffer(buffer), busy, seed, chosen), json)
 
 
 @bench.command()

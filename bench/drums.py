@@ -13,7 +13,7 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys, tuned
 from app.instrument.events import NoteOn
 from app.patches.drums import Drums
-from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import SHIPPED as FACTORY
 from app.patches.library import read_patch
 from app.patches.patch import Patch
 from bench.machine import RATE_HZ, Shares, shares, times_s
@@ -90,7 +90,7 @@ class ChoiceCost:
 def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure drums of several sizes, struck by a stick and by something small and hard, and kits."""
     costs: list[DrumCost] = []
-    kit, guitar = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", STRING_PATCH))
+    kit, guitar = (read_patch(FACTORY / f"{name}.json") for name in ("concert_toms", STRING_PATCH))
     pads = [drum.note for drum in _drums(kit).drums]
     for number, size in enumerate(SIZES):
         report(number / (len(SIZES) + 1), f"{size} modes")
@@ -127,7 +127,7 @@ def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
 
 
 def _choice(name: str) -> ChoiceCost:
-    patch = read_patch(PATCHES / f"{name}.json")
+    patch = read_patch(FACTORY / f"{name}.json")
     low, high = patch.range
 
     def choose() -> int:
@@ -164,7 +164,7 @@ def _drums(patch: Patch) -> Drums:
 
 def _of_size(modes: int) -> Patch:
     """The tom whose modes below a frequency are so many, about."""
-    patch = read_patch(PATCHES / "tuned_toms.json")
+    patch = read_patch(FACTORY / "tuned_toms.json")
     low, high = 1_000.0, 19_000.0
     for _ in range(8):
         middle = (low + high) / 2

@@ -38,8 +38,8 @@ def _watch(controller: Controller) -> None:
 
     def play(number: int) -> None:
         key = FIRST_KEY + number
-        controller.instruments.play(NoteOn(key, 90))
-        QTimer.singleShot(round(900 * NOTE_S), lambda: controller.instruments.play(NoteOff(key)))
+        controller.inputs.play(NoteOn(key, 90))
+        QTimer.singleShot(round(900 * NOTE_S), lambda: controller.inputs.play(NoteOff(key)))
 
     def lab() -> None:
         _print(f"Play, after {NOTES} notes")

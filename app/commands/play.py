@@ -56,21 +56,21 @@ def play(
     if instrument is None:
         parts, left_out = read_parts(midi)
     else:
-        patch = find_patch(instrument).patch
-        parts, left_out = [(patch, read_song(midi, patch))], ""
-    for patch, part in parts:
+        chosen = find_patch(instrument).patch
+        parts, left_out = [(chosen, read_song(midi, chosen))], ""
+    for chosen, part in parts:
         if part.words:
-            print(f"{part.words}: {patch.name}")
-    for words in (left_out, *(part.left_out for _, part in parts), *(body_problem(patch) for patch, _ in parts)):
+            print(f"{part.words}: {chosen.name}")
+    for words in (left_out, *(part.left_out for _, part in parts), *(body_problem(chosen) for chosen, _ in parts)):
         if words:
             say(words)
-    presets = {name: arguments.open_preset(name) for name in {patch.preset for patch, _ in parts}}
+    presets = {name: arguments.open_preset(name) for name in {chosen.preset for chosen, _ in parts}}
     from app.export.played import Played, write_played
     from app.export.wav import WavSettings
 
     began_s = time.monotonic()
     with progress(midi.name) as report:
-        played = [(Played(patch, part.events, source), presets[patch.preset]) for patch, part in parts]
+        played = [(Played(chosen, part.events, source), presets[chosen.preset]) for chosen, part in parts]
         written = write_played(out, played, midi.name, WavSettings(bits, rate, normalise), seconds, report)
     if written.gain_db < 0 and not normalise:
         say(f"note: made softer by {-written.gain_db:.1f} dB, so that the parts together do not clip")

@@ -57,11 +57,11 @@ def plugin(
         raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
-            patches = [entry.patch for entry in list_patches(SHIPPED)[0]]
+            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
         else:
-            patches = [find_patch(name).patch for name in instruments]
+            chosen = [find_patch(name).patch for name in instruments]
         images = []
-        for patch in patches:
+        for patch in chosen:
             images.append(image_of(patch, open_preset(patch.preset)))
             if images[-1].left_out:
                 say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
@@ -73,7 +73,7 @@ def plugin(
         cache_folder = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
         ids = {image.id for image in images}
-        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in patches])
+        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
         outputs = list[tuple[str, str, Path]]()
         for system in targets:
             for kind in FORMATS if form == ALL else (form,):

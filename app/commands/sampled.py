@@ -63,14 +63,14 @@ def sampled(
         raise typer.BadParameter(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
-    patch = find_patch(instrument).patch
+    chosen = find_patch(instrument).patch
     if dry:
-        patch = patch.with_value("room.mix", 0.0)
-    if problem := body_problem(patch):
+        chosen = chosen.with_value("room.mix", 0.0)
+    if problem := body_problem(chosen):
         say(problem)
-    preset_path = find_preset(patch.preset, usable_files())
+    preset_path = find_preset(chosen.preset, usable_files())
     try:
-        plan = SampledPlan(patch, _keys(keys), every, layers, seconds, rate, form or "flac", bits or "24", source)
+        plan = SampledPlan(chosen, _keys(keys), every, layers, seconds, rate, form or "flac", bits or "24", source)
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

@@ -215,6 +215,7 @@ class _Read:
         else:
             time_s = _number_within(data.pop("t"), (-LONGEST_S, LONGEST_S))
             ((kind, value),) = data.items()
+            kind = "patch" if kind == "patch" else kind  # until 0.2
             self.events.append(TimedEvent(time_s, self._event(kind, value)))
 
     def _event(self, kind: str, value: Any) -> Event:

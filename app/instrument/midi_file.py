@@ -193,18 +193,18 @@ def read_parts(path: Path) -> tuple[list[tuple[Patch, SongPart]], str]:
                 playing[channel] = instrument_of(program) or playing[channel][0], program_words(program)
         (channel,) = channels_in([entry.event])
         if isinstance(entry.event, NoteOn):
-            instrument, words = playing[channel]
-            notes[channel, instrument][len(channels[channel])] = words
+            name, words = playing[channel]
+            notes[channel, name][len(channels[channel])] = words
         channels[channel].append(entry)
     parts = []
-    for (channel, instrument), places in sorted(notes.items()):
+    for (channel, name), places in sorted(notes.items()):
         own = [
             entry
             for place, entry in enumerate(channels[channel])
             if place in places or not isinstance(entry.event, NoteOn)
         ]
         words = ", ".join(filter(None, (f"channel {channel + 1}", *dict.fromkeys(places.values()))))
-        patch = read_patch(SHIPPED / f"{instrument}{SUFFIX}")
+        patch = read_patch(SHIPPED / f"{name}{SUFFIX}")
         parts.append((patch, replace(_part(path, patch, own, [], f", {words},"), words=words)))
     return parts, _left_out_words(path.name, _ignored_messages(messages, follows_programs=True))
 

@@ -53,6 +53,11 @@ def own_patches() -> Path:
     return user_folder() / "patches"
 
 
+def patch_folders() -> tuple[Path, ...]:
+    """The folders of patches: the shipped one, the user's, and the user's of earlier versions."""
+    return SHIPPED, own_patches(), user_folder() / "patches"  # until 0.2
+
+
 def read_patch(path: Path) -> Patch:
     """The patch of a file, checked.
 
@@ -87,7 +92,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     """
     files: list[Path] = []
     unreadable = []
-    for folder in folders or (SHIPPED, own_patches()):
+    for folder in folders or patch_folders():
         try:
             files += sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
         except OSError as error:
@@ -146,7 +151,7 @@ def save_patch(patch: Patch, file: Path | None = None) -> PatchEntry:
     path = file or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
     if path.parent in (SHIPPED, own_patches()) and (SHIPPED / path.name).exists():
         raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
-    if file is None and path.exists():
+    if file is None and any((folder / path.name).exists() for folder in patch_folders()):
         raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     make_folder(path.parent)
     with result_file(path) as output:
@@ -173,7 +178,7 @@ def add_patch(file: Path) -> tuple[PatchEntry, bool]:
         if same or (entry.path.exists() and entry.path.samefile(file)):
             return entry, False
     names = {entry.patch.name.casefold() for entry in entries}
-    stems = {path.stem for folder in (SHIPPED, own_patches()) for path in folder.glob(f"*{SUFFIX}")}
+    stems = {path.stem for folder in patch_folders() for path in folder.glob(f"*{SUFFIX}")}
     name = _free_name(names, patch.name)
     while file_stem(name) in stems:
         names.add(name.casefold())

@@ -71,22 +71,22 @@ class Choices(Monitor, Listener, ShownString):
     @property
     def preset(self) -> str:
         """The name of the preset that is played; "": none."""
-        return self.single or (self.instrument.preset if self.instrument else "")
+        return self.single or (self.played.preset if self.played else "")
 
     @property
-    def instrument(self) -> Patch | None:
-        """The patch, if it is played: keys are pitches. None: they are places along a single string."""
+    def played(self) -> Patch | None:
+        """The instrument, if it is played: keys are pitches. None: they are places along a single string."""
         return self.patch if self.single is None else None
 
     @property
     def plays_patch(self) -> bool:
         """Return True if the patch is played."""
-        return self.instrument is not None
+        return self.played is not None
 
     @property
     def drums(self) -> Drums | None:
         """The drums that are played; None: a string or an instrument of strings is."""
-        return self.instrument.strings if self.instrument and isinstance(self.instrument.strings, Drums) else None
+        return self.played.strings if self.played and isinstance(self.played.strings, Drums) else None
 
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """Copy these choices with other values: the one way to change them.
@@ -95,14 +95,14 @@ class Choices(Monitor, Listener, ShownString):
 
         Args:
             changes: fields. Also `preset`, the name of one whose single string is played from now on, and
-                `instrument`, a patch that is.
+                `played`, an instrument that is.
 
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
         """
         changes = dict(changes)
-        if "instrument" in changes:
-            changes |= {"patch": changes.pop("instrument"), "single": None}
+        if "played" in changes:
+            changes |= {"patch": changes.pop("played"), "single": None}
         if "preset" in changes:
             changes["single"] = changes.pop("preset")
         if {"a", "b", "heard"} & changes.keys():
@@ -123,13 +123,14 @@ OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
     """The fields of these choices, read from those of earlier versions.
 
-    Before there were slots, `heard` named the source itself. `instrument` was a patch, or a preset alone with `kept`
-    as the patch beside it. Before that, `keys_play` said if `patch` was played or the string of `preset`.
+    Until 0.2 instruments were patches. Before there were slots, `heard` named the source itself. Without `single`,
+    `instrument` was a preset alone, too, with the instrument beside it as `kept`. Before that, `keys_play` said if the
+    instrument was played or the string of `preset`.
     """
-    data = dict(data)
+    data = {"patch" if name == "patch" else name: value for name, value in data.items()}  # until 0.2
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
         data |= {"a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
-    if "instrument" in data:
+    if "instrument" in data and "single" not in data:
         instrument, kept = data.pop("instrument"), data.pop("kept", None)
         if isinstance(instrument, dict) and not instrument.keys() - {"preset"}:
             data |= {"patch": kept, "single": instrument.get("preset", "")}
@@ -159,7 +160,7 @@ def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
     Raises:
         ValueError: the patch cannot be heard so.
     """
-    patch = choices.instrument
+    patch = choices.played
     if patch is None:
         return choices
     chosen = "patch" in asked or "single" in asked

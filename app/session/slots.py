@@ -72,7 +72,7 @@ def through_words(choices: Choices) -> tuple[str, ...]:
 
     A string that sounds alone has one empty text.
     """
-    patch = choices.instrument
+    patch = choices.played
     if patch is None:
         return ("",)
     name = f"heard through {patch.name}"

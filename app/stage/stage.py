@@ -152,7 +152,7 @@ class Stage:
 
         It is of the string alone where keys do not play it so: of a single string, and beside another preset.
         """
-        patch, pluck = self.choices.instrument, pluck or self.choices.pluck
+        patch, pluck = self.choices.played, pluck or self.choices.pluck
         beside_another = any(other_preset(voice) for voice in self.choices.voices)
         if patch is None or self.choices.drums is not None or pluck.amplitude_mm == 0 or beside_another:
             return PluckAt(pluck)
@@ -168,7 +168,7 @@ class Stage:
 
         After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
         """
-        patch, note, drum_key = self.choices.instrument, self.note, self.drum_key
+        patch, note, drum_key = self.choices.played, self.note, self.drum_key
         if patch is None:
             return None
         event: NoteOn | PluckAt
@@ -193,7 +193,7 @@ class Stage:
     @property
     def note_played(self) -> Note | None:
         """The latest note, where it is of the instrument that is played."""
-        note, patch = self.note, self.choices.instrument
+        note, patch = self.note, self.choices.played
         if not isinstance(note, KeyNote):
             return note
         return note if patch is not None and not is_another(patch, note.patch) else None
@@ -247,7 +247,7 @@ def _chosen(stage: Stage, values: Mapping[str, Any]) -> Stage:
     if patch is not None and values.get("preset") == patch.preset:
         values = {**{name: value for name, value in values.items() if name != "preset"}, "single": None}
     chosen = replace(stage, choices=stage.choices.changed(values))
-    return _with_own_string(chosen, stage.choices.instrument, values)
+    return _with_own_string(chosen, stage.choices.played, values)
 
 
 def _begun(stage: Stage, note: Note) -> Stage:
@@ -310,7 +310,7 @@ def _with_own_string(stage: Stage, before: Patch | None, asked: Collection[str])
         before: the instrument that was played.
         asked: what was chosen with the instrument, as what undo or a file restores, stays.
     """
-    choices, patch = stage.choices, stage.choices.instrument
+    choices, patch = stage.choices, stage.choices.played
     if patch is None or patch is before or choices.drums is not None:
         return stage
     another = before is not None and is_another(patch, before)

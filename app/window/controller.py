@@ -47,7 +47,7 @@ from app.window.drag_out import DragOut
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.figures import Figures
-from app.window.instruments import Instruments
+from app.window.inputs import Inputs
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Location, Panel, StringPanel
@@ -127,11 +127,11 @@ class Controller(QObject):
             self.session.play(**{slot: "model" if slot == "a" else "truth"})
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self._connect_undo()
-        self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance)
-        self.instruments.begun.connect(self._wake)
-        self.instruments.midi.start()
+        self.inputs = Inputs(window, self.session, self.library, settings.midi, self.performance)
+        self.inputs.begun.connect(self._wake)
+        self.inputs.midi.start()
         self.patches = PatchDesk(
-            window, self.session, self.library, self.performance, self.instruments, settings.patch_favourites
+            window, self.session, self.library, self.performance, self.inputs, settings.patch_favourites
         )
         window.instrument.bar.takes.choose(dict(settings.record))
         window.show_keys(settings.instrument.shown)
@@ -160,7 +160,7 @@ class Controller(QObject):
             Duty(KEYS_EVERY_S, self.patches.tick),
             Duty(FACTS_EVERY_S, self._show_facts),
             Duty(JUDGED_EVERY_S, self.patches.judge),
-            Duty(1.0, self.instruments.midi.look),
+            Duty(1.0, self.inputs.midi.look),
             Duty(1.0, self.keeper.look),
         ]
         self._timer.start()
@@ -186,7 +186,7 @@ class Controller(QObject):
     def _connect_panel(self, panel: Panel) -> None:
         panel.seek_asked.connect(self.performance.seek)
         panel.pluck_asked.connect(self.pluck)
-        panel.strike_asked.connect(self.instruments.strike)
+        panel.strike_asked.connect(self.inputs.strike)
         panel.export_asked.connect(self._export_models)
         panel.reported.connect(self.window.notices.report)
         if panel.figure is not None:
@@ -242,7 +242,7 @@ class Controller(QObject):
             "all_modes": lambda: session.update(solo=0),
             "abx": self.listening_test,
             "audio": self.audio.show_dialog,
-            "midi": lambda: self.instruments.midi.show_dialog(window),
+            "midi": lambda: self.inputs.midi.show_dialog(window),
             "help": self.show_help,
             "about": lambda: self.show_help(ABOUT),
         }
@@ -287,9 +287,9 @@ class Controller(QObject):
         if self._abx is not None:
             return
         if self.session.choices.drums is None:
-            self.instruments.pluck()
+            self.inputs.pluck()
         else:
-            self.instruments.strike(*self.drum.place, self.session.choices.velocity)
+            self.inputs.strike(*self.drum.place, self.session.choices.velocity)
 
     def pluck_as_trained(self) -> None:
         """Choose the pluck in the middle of what the preset was trained on, and pluck."""
@@ -425,7 +425,7 @@ class Controller(QObject):
         self.exports.close()
         self.drag_out.close()
         self.patches.close()
-        self.instruments.close()
+        self.inputs.close()
         for panel in self.panels:
             panel.end()
         self.performance.close()
@@ -443,7 +443,7 @@ class Controller(QObject):
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.window.look,
-                "midi": self.instruments.midi.choices,
+                "midi": self.inputs.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
                 "patch_favourites": tuple(sorted(self.patches.favourites)),
                 "instrument": InstrumentChoice(
@@ -460,7 +460,7 @@ class Controller(QObject):
     def _stage_changed(self, names: frozenset[str]) -> None:
         self.performance.stage_changed(names)
         if not names.isdisjoint(OBSERVED):
-            self.instruments.choices_changed(names)
+            self.inputs.choices_changed(names)
             self._choices_shown(names)
         if names & {"note", "known"} and self.session.stage.known:
             self._show_struck()
@@ -526,7 +526,7 @@ class Controller(QObject):
         location = TURNS[self._ticks % len(TURNS)]
         self._ticks += 1
         elapsed_s, self._shown_s[location] = now_s - self._shown_s[location], now_s
-        self.instruments.look()
+        self.inputs.look()
         if location == "stage":
             self._follow_sound(now_s, elapsed_s)
         moment = self.performance.moment(elapsed_s)

@@ -98,9 +98,7 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
         played: dict[str, Any] = (
-            {"single": name_text(path.stem)}
-            if recipe.struck is None
-            else {"instrument": recipe.struck.found()[0].patch}
+            {"single": name_text(path.stem)} if recipe.struck is None else {"played": recipe.struck.found()[0].patch}
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:

@@ -113,13 +113,13 @@ class Exports(QObject):
         choices, take = self._session.choices, self._recordings.offered
         patch = choices.patch
         player = None if patch is None else self._library.find(patch.preset)
-        instrument = None if patch is None or player is None else HeardInstrument(patch, player)
+        heard = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
             "note": heard_note(choices, self._library, self._session.stage.struck),
             "models": self.models,
             "performance": None if take is None else self._performance(take),
-            "sampler": instrument,
-            "plugin": instrument,
+            "sampler": heard,
+            "plugin": heard,
         }
 
     def _performance(self, take: RecordedTake) -> HeardPerformance:
@@ -166,7 +166,7 @@ def _pluck_name(choices: Choices, entry: PresetEntry) -> str:
     """The name for a file: of the instrument whose key was played, else of the preset."""
     string = choices.string or entry.info.string
     title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
-    if isinstance(choices.instrument, Patch):
-        pluck = choices.instrument.pluck
-        title, amplitudes_mm = choices.instrument.name, (pluck.softest_mm, pluck.hardest_mm)
+    if isinstance(choices.played, Patch):
+        pluck = choices.played.pluck
+        title, amplitudes_mm = choices.played.name, (pluck.softest_mm, pluck.hardest_mm)
     return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)

@@ -45,7 +45,7 @@ def with_patch(settings: Settings) -> Settings:
         return settings
     with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
         patch = read_patch(FIRST)
-        update = {"patch" if settings.choices.preset else "instrument": patch}
+        update = {"patch" if settings.choices.preset else "played": patch}
         return settings.model_copy(update={"choices": settings.choices.changed(update)})
     return settings
 

@@ -50,7 +50,7 @@ from app.views.controls.browser_rows import BrowserRow
 from app.views.dialogs.question import ask_text
 from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.browsing import BrowserDesk
-from app.window.instruments import Instruments
+from app.window.inputs import Inputs
 from app.window.main_window import MainWindow
 from app.window.panels.string import outside_of_shown
 from app.window.performance import Performance
@@ -84,7 +84,7 @@ class PatchDesk(BrowserDesk):
         session: Session,
         library: Library,
         performance: Performance,
-        instruments: Instruments,
+        inputs: Inputs,
         favourites: Iterable[str] = (),
     ) -> None:
         super().__init__(window, window.instrument.bar, patch_browser(window), favourites)
@@ -92,7 +92,7 @@ class PatchDesk(BrowserDesk):
         self._session = session
         self._library = library
         self._performance = performance
-        self._instruments = instruments
+        self._inputs = inputs
         self._panel = window.instrument
         self._entries: list[PatchEntry] = []
         self._sounding: frozenset[int] = frozenset()  # MIDI keys of the patch for which the octave was judged last
@@ -112,7 +112,7 @@ class PatchDesk(BrowserDesk):
         bar = self._panel.bar
         browser = self.browser
         panel.pressed.connect(self._press)
-        panel.released.connect(lambda key, string: self._instruments.play(NoteOff(key, KEYS, string)))
+        panel.released.connect(lambda key, string: self._inputs.play(NoteOff(key, KEYS, string)))
         panel.touch_chosen.connect(self._choose_touch)
         panel.technique_switched.connect(self._switch_technique)
         panel.keys_play_asked.connect(
@@ -183,7 +183,7 @@ class PatchDesk(BrowserDesk):
     def choose(self, name: str) -> None:
         """Make a patch, by the name of its entry, the one that keys play."""
         if (entry := self._find(name)) is not None:
-            self._session.update(instrument=entry.patch)
+            self._session.update(played=entry.patch)
 
     def audition(self, name: str) -> None:
         """Choose a patch, unless it is there already, maybe changed, and play a note in the middle of its range."""
@@ -306,7 +306,7 @@ class PatchDesk(BrowserDesk):
     def revert(self) -> None:
         """Go back to the patch as it was saved."""
         if (entry := self.entry) is not None:
-            self._session.update(instrument=entry.patch)
+            self._session.update(played=entry.patch)
 
     def compare(self, saved: bool) -> None:
         """Let keys play the patch as it was saved, or as it is now. The choices stay; any change of them ends it."""
@@ -331,11 +331,11 @@ class PatchDesk(BrowserDesk):
         try:
             entry, added = add_patch(file)
         except WriteError as error:
-            self._session.update(instrument=read_patch(file))
+            self._session.update(played=read_patch(file))
             self._notices.report(f"{file.name} can be played, but not added to your library: {one_line(str(error))}")
             return
         self.reload()
-        self._session.update(instrument=entry.patch)
+        self._session.update(played=entry.patch)
         self.browser.reveal(entry.name)
         if added:
             self._notices.inform(f"{file.name} was added to your library as {entry.patch.name}.")
@@ -352,7 +352,7 @@ class PatchDesk(BrowserDesk):
         self.stop()
         self._session.play_patch()
         if self.patch != take.played.patch:
-            self._session.update(instrument=take.played.patch)
+            self._session.update(played=take.played.patch)
         self._take = take
 
     def _play_waiting(self) -> None:
@@ -372,7 +372,7 @@ class PatchDesk(BrowserDesk):
         if isinstance(event, PatchTurned):
             self._knob_turned.emit(event.patch)
         else:
-            self._instruments.play(event, due)
+            self._inputs.play(event, due)
 
     def _hear_turned(self, patch: Patch) -> None:
         self._turned = True
@@ -561,18 +561,18 @@ class PatchDesk(BrowserDesk):
     def _press(self, key: int, velocity: int, string: int | None) -> None:
         """Play a key on the screen, which is one of the patch, where there is one."""
         self._session.play_patch()
-        self._instruments.play(NoteOn(key, velocity, KEYS, string=string))
+        self._inputs.play(NoteOn(key, velocity, KEYS, string=string))
 
     def _choose_touch(self, touch: str) -> None:
         """Choose the effect of a key on the screen or of the computer while another is held."""
         for number, down in ((LEGATO, touch != "pluck"), (PORTAMENTO, touch == "slide")):
-            self._instruments.play(ControlChange(number, 127 * down, KEYS))
-        self._instruments.play(ControlChange(SLIDE_TIME, SCREEN_SLIDE, KEYS))
+            self._inputs.play(ControlChange(number, 127 * down, KEYS))
+        self._inputs.play(ControlChange(SLIDE_TIME, SCREEN_SLIDE, KEYS))
 
     def _switch_technique(self, name: str, on: bool) -> None:
         """Switch a technique on or off for keys of the screen and of the computer."""
         number = {"strum": STRUM, "tremolo": TREMOLO, "harmonics": HARMONICS}[name]
-        self._instruments.play(ControlChange(number, 127 * on, KEYS))
+        self._inputs.play(ControlChange(number, 127 * on, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from platformdirs import user_config_path
-from pydantic import ValidationError
+from pydantic import ValidationError, model_validator
 
 from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
@@ -55,9 +55,17 @@ class Settings(Value):
     look: Look = Look()
     midi: MidiChoices = MidiChoices()
     favourites: tuple[str, ...] = FIRST_FAVOURITES  # names of presets
-    patch_favourites: tuple[str, ...] = ()
+    patch_favourites: tuple[str, ...] = ()  # names of their files
     instrument: InstrumentChoice = InstrumentChoice()
     window_geometry: str = ""  # Qt's, in base64
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_old(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "patch_favourites" in data:  # until 0.2
+            data = dict(data)
+            data["patch_favourites"] = data.pop("patch_favourites")  # until 0.2
+        return data
 
 
 def settings_file() -> Path:

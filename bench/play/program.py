@@ -104,7 +104,7 @@ def program(
     need_programs(*PROGRAMS)
     alone = isinstance(instrument, str)
     face, octave = "lab" if alone else "play", hands.octave_of(instrument)
-    choices = Choices().changed({"preset" if alone else "instrument": instrument, "octave": octave, "face": face})
+    choices = Choices().changed({"preset" if alone else "played": instrument, "octave": octave, "face": face})
     settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="play")))

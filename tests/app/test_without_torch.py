@@ -47,7 +47,7 @@ def alive(controller):
             return
         drawn.append(stage.take)
         if keys:
-            controller.instruments.play(NoteOn(keys.pop(), 100))
+            controller.inputs.play(NoteOn(keys.pop(), 100))
             return
         loaded.append("torch" in sys.modules or "scipy.signal" in sys.modules)  # 60 MB each, or more
         controller.window.face_asked.emit("lab")

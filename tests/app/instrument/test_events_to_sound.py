@@ -139,8 +139,8 @@ def read(patch: Patch, guitar: Patch) -> Read:
     own = {"test": patch, "guitar": guitar, "six": strung}
 
     def reading(text: str) -> tuple[Patch, list[Timed]]:
-        instrument, _, score = text.partition(":")
-        name, *fields = instrument.split()
+        words, _, score = text.partition(":")
+        name, *fields = words.split()
         chosen = changed(own.get(name) or read_patch(SHIPPED / f"{name}.json"), **parts_of(" ".join(fields)))
         entries = [entry.strip() for entry in score.split(",") if entry.strip()]
         return chosen, [each for entry in entries for each in events_of(entry, chosen)]

@@ -72,7 +72,7 @@ def test_keys_play_what_was_chosen_last() -> None:
     choices = session.choices
     assert (choices.single, choices.patch, choices.string) == ("one", patch, None)
     session.update(preset="many")
-    assert (session.choices.instrument, session.choices.single) == (patch, None), "it is the preset of the instrument"
+    assert (session.choices.played, session.choices.single) == (patch, None), "it is the preset of the instrument"
     session.update(preset="one")
     session.play_patch()
     assert (session.choices.preset, session.choices.plays_patch) == ("many", True)
@@ -100,9 +100,9 @@ def test_choices_from_before_the_instrument_are_understood(plays: str | None, pr
 def test_choices_of_two_kinds_of_instruments_are_understood() -> None:
     patch = played_patch(0.2).model_dump()
     played = Choices.model_validate({"instrument": patch, "kept": None, "position": 0.4})
-    assert (played.instrument, played.single, played.preset) == (played_patch(0.2), None, "many")
+    assert (played.played, played.single, played.preset) == (played_patch(0.2), None, "many")
     beside = Choices.model_validate({"instrument": {"preset": "one"}, "kept": patch, "string": STRING})
-    assert (beside.instrument, beside.single, beside.patch) == (None, "one", played_patch(0.2))
+    assert (beside.played, beside.single, beside.patch) == (None, "one", played_patch(0.2))
     assert beside.string is not None
     assert Choices.model_validate({"instrument": {"preset": "one"}, "kept": None}).patch is None
 
@@ -121,7 +121,7 @@ def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
 
 def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
     session = Session()
-    session.update(instrument=played_patch(0.2))
+    session.update(played=played_patch(0.2))
     session.update(pickup="velocity")
     session.move_listening_point(0.3)
     assert pickup_of(session) == ((0.3,), "velocity")
@@ -138,7 +138,7 @@ def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
 
 def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:
     session = Session()
-    session.update(instrument=played_patch(0.2))
+    session.update(played=played_patch(0.2))
     session.update(preset="one")
     session.update(listen=0.7, pickup="velocity", stereo=True)
     assert pickup_of(session) == ((0.2,), "displacement")
@@ -154,7 +154,7 @@ def test_a_patch_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
     macro = {"name": "Width", "targets": (target,)}
     patch = Patch.model_validate({**dict(played_patch(0.2, 0.8)), "macros": (macro,)})
     session = Session()
-    session.update(instrument=patch)
+    session.update(played=patch)
     before = session.choices
     with pytest.raises(ValueError, match=r"p stays in stereo: its macro Width"):
         session.update(stereo=False)

@@ -123,7 +123,7 @@ def pickup_of(session: Session) -> tuple[object, ...]:
 
 
 def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -> None:
-    hand.session.update(instrument=guitar)
+    hand.session.update(played=guitar)
     states, words = [pickup_of(hand.session)], []
     for change in ({"pickup": "velocity"}, {"stereo": not hand.session.choices.stereo}, {"listen": 0.11}):
         hand.change(1, **change)
@@ -139,7 +139,7 @@ def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -
 
 def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Patch) -> None:
     session = hand.session
-    session.update(instrument=guitar)
+    session.update(played=guitar)
     own = pickup_of(session)
     hand.now_s += 1
     session.play_string()
@@ -162,7 +162,7 @@ def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand
 def test_each_way_the_next_step_is_named_and_two_knobs_of_a_patch_are_two_however_quick(
     hand: Hand, guitar: Patch
 ) -> None:
-    hand.change(instrument=guitar)
+    hand.change(played=guitar)
     for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
         patch = hand.session.choices.patch
         assert patch is not None

@@ -26,12 +26,12 @@ def note(request: RenderRequest = REQUEST, from_s: float = 0.0) -> Any:
 def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it() -> None:
     stage = first_stage(Choices(single="one"))
     for patch in (HARP, GUITAR):
-        stage = next_stage(stage, Chosen({"instrument": patch}))
+        stage = next_stage(stage, Chosen({"played": patch}))
         string = Strings(patch).of_key(sum(patch.range) // 2)
         assert string is not None and stage.choices.string == string.parameters
     low = Strings(HARP).of_key(43)
     assert low is not None
-    stage = next_stage(stage, Chosen({"instrument": HARP, "string": low.parameters, "position": 0.2}))
+    stage = next_stage(stage, Chosen({"played": HARP, "string": low.parameters, "position": 0.2}))
     assert (stage.choices.string, stage.choices.position, stage.key) == (low.parameters, 0.2, (43, None))
 
 

@@ -96,7 +96,7 @@ def test_pads_keys_and_channel_ten_strike_drums_that_ring_light_and_stop(
         kit.key(KEY.Key_Space)  # strikes the drum that was struck last
         kit.wait(lambda sounding=sounding: bool(kit.keys.sounding()) == sounding)
     assert kit.struck[-1].event.key == 45
-    kit.controller.instruments.strike(0.1, -0.2, 100.0)
+    kit.controller.inputs.strike(0.1, -0.2, 100.0)
     event = kit.struck[-1].event
     assert (event.key, event.velocity, event.place) == (45, 100, (0.1, -0.2))
     count = len(kit.struck)
@@ -174,7 +174,7 @@ def test_the_listening_test_compares_model_and_truth_of_a_blow(opened: Open, spe
     kit.wait_for_keys()
     kit.play(38, 127)
     kit.wait(lambda: kit.struck[-1].known)
-    kit.controller.instruments.strike(0.2, -0.1, 100)
+    kit.controller.inputs.strike(0.2, -0.1, 100)
     kit.controller.listening_test()
     dialog = kit.find(AbxDialog)
     assert any(each.text().startswith("Concert toms, D2 at velocity 100") for each in dialog.findChildren(QLabel))
@@ -289,7 +289,7 @@ def test_keys_choose_the_place_and_each_instrument_has_its_own(toms: Window) -> 
     assert toms.struck[-1].event.key == 36
     toms.wait(lambda: shown(toms) is not None)
     timpani = read_patch(PATCHES / "timpani.json")
-    toms.change(instrument=timpani)
+    toms.change(played=timpani)
     assert shown(toms) is None and drum.place == timpani.strings.drums[0].place  # type: ignore[union-attr]
     toms.wait(lambda: drum.view.frame is None)
 

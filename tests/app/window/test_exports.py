@@ -334,7 +334,7 @@ def test_a_note_is_exported_through_its_instrument_with_turned_knobs_and_comes_b
         np.testing.assert_allclose(written[:-960], heard[:-960], atol=2.0**-22)  # the end is faded
         short.change(preset="first")
         short.drop(file)
-        assert short.choices.instrument == GUITAR
+        assert short.choices.played == GUITAR
         assert ("instrument Classical guitar is not the one" in short.window.notices.text) == (patch != GUITAR)
         file.unlink()
 

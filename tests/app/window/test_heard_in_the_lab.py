@@ -107,10 +107,10 @@ def take(lab: Controller, seconds: float) -> Samples:
 
 def play_instrument(qtbot: QtBot, lab: Controller, patch: Patch) -> None:
     """Plays a key of an instrument, which rings on."""
-    lab.session.update(instrument=patch)
+    lab.session.update(played=patch)
     keys = lab.performance.notes.keys
     qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.name == patch.name)
-    lab.instruments.play(NoteOn(sum(patch.range) // 2, 100))
+    lab.inputs.play(NoteOn(sum(patch.range) // 2, 100))
     take(lab, 0.05)
     qtbot.waitUntil(lambda: isinstance(lab.session.stage.note, KeyNote) and lab.session.stage.known)
 
@@ -236,7 +236,7 @@ def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked
 ) -> None:
     """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
     play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
-    lab.instruments.play(NoteOn(60, 100))
+    lab.inputs.play(NoteOn(60, 100))
     late = lab.performance.notes.latest
     lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
     take(lab, 0.1)

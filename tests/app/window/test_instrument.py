@@ -169,7 +169,7 @@ def test_each_turn_of_a_loop_stays_with_the_instrument_when_pluck_and_string_cha
     guitar.wait(lambda: turns(52))
     guitar.change(position=0.41)
     guitar.wait(lambda: turns(52, 0.41))
-    guitar.controller.instruments.play(NoteOn(57, 80, KEYS))
+    guitar.controller.inputs.play(NoteOn(57, 80, KEYS))
     guitar.wait(lambda: turns(57))
     shape = next(each for each in ("gaussian", "triangular") if each != guitar.patch.pluck.shape)
     turn(guitar, "pluck.shape", shape)
@@ -327,7 +327,7 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_
     changed = guitar.patch
     guitar.session.play_string()
     patches.audition("mandolin")  # it is there already, with its changes
-    assert guitar.choices.instrument == changed
+    assert guitar.choices.played == changed
     patches.audition("concert_harp")
     assert guitar.patch == HARP
 
@@ -453,19 +453,19 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     low = Strings(HARP).of_key(43)
     assert low is not None
     for string in (STEEL, low.parameters):
-        guitar.change(instrument=HARP, string=string, position=0.2, shape=HARP.pluck.shape)
+        guitar.change(played=HARP, string=string, position=0.2, shape=HARP.pluck.shape)
         assert (guitar.choices.string, guitar.choices.position) == (string, 0.2)
-        guitar.change(instrument=patch)
-    guitar.change(instrument=HARP, string=low.parameters)
+        guitar.change(played=patch)
+    guitar.change(played=HARP, string=low.parameters)
     guitar.wait(lambda: guitar.performance.playable)
     assert guitar.pluck().event.key == 43, "the string that was restored"
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder / "another.safetensors")
     guitar.controller.library.refresh()
     other = read_patch(PATCHES / "cimbalom.json").model_copy(update={"preset": "another"})
-    guitar.change(instrument=patch)
+    guitar.change(played=patch)
     guitar.wait(lambda: guitar.choices.shape == patch.pluck.shape != other.pluck.shape)
     before = guitar.choices.string, guitar.choices.shape
-    guitar.change(instrument=other)
+    guitar.change(played=other)
     guitar.wait(lambda: guitar.choices.shape == other.pluck.shape)
     history.undo()
     guitar.wait(lambda: (guitar.choices.string, guitar.choices.shape) == before)
@@ -476,7 +476,7 @@ def test_notes_of_midi_choose_places_and_presets_and_a_pluck_after_them_is_of_th
     backend: FakeBackend, guitar: Window, known: bool
 ) -> None:
     """Also on the string of the key that was struck last."""
-    instruments, session = guitar.controller.instruments, guitar.session
+    instruments, session = guitar.controller.inputs, guitar.session
     guitar.play(52)
     if known:
         guitar.wait_for_string()

@@ -467,7 +467,7 @@ def test_a_note_is_in_the_mixer_before_the_window_knows_and_rings_on_at_another_
     w.wait(lambda: w.performance.ready and w.controller.sound.mixer.voices == [])
     before, mixer = w.choices, w.controller.sound.mixer
     for count, position in enumerate((0.4, 0.6), 1):
-        player = threading.Thread(target=w.controller.instruments.play, args=(PluckAt(Pluck(position, 5.0)),))
+        player = threading.Thread(target=w.controller.inputs.play, args=(PluckAt(Pluck(position, 5.0)),))
         player.start()
         player.join()
         assert len(w.rings) == count

@@ -90,10 +90,10 @@ def test_the_test_keeps_its_pluck_and_volume_and_all_comes_back_as_it_was(
     monkeypatch.setattr(heard.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
     released = [events.NoteOff(52), events.ControlChange(midi.SUSTAIN, 0)]
     for event in (PluckAt(Pluck(0.6, 8.0)), events.NoteOn(60, 90), *released):
-        heard.controller.instruments.play(event)  # a MIDI keyboard
+        heard.controller.inputs.play(event)  # a MIDI keyboard
     heard.key(KEY.Key_Space)
     assert taken == released and heard.choices == before and len(heard.struck) == count and not sounds(heard)
-    heard.controller.instruments.midi.performed.emit({"volume_db": 12.0})
+    heard.controller.inputs.midi.performed.emit({"volume_db": 12.0})
     assert heard.choices.volume_db == 12.0 and volume(heard) == pytest.approx(10 ** (-6 / 20))
     press(dialog, "▶  Hear B")
     heard.wait(lambda: sounds(heard))

@@ -55,7 +55,7 @@ def watch(controller):
 
     def close_when_played():
         if len(struck) == 2 and controller.performance.ready:
-            print(json.dumps({"struck": struck, "instrument": controller.session.choices.instrument.name}))
+            print(json.dumps({"struck": struck, "instrument": controller.session.choices.played.name}))
             controller.window.close()
 
     notes.handle = noted
@@ -80,7 +80,7 @@ def watch(controller):
         if not recorder.recording:
             controller.patches.recordings.record()
         elif left:
-            controller.instruments.play(left.pop(0))
+            controller.inputs.play(left.pop(0))
             if len(left) == 2:
                 controller.patches.change("level_db", -7.5)
         else:

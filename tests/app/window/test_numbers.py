@@ -77,7 +77,7 @@ OPENED: dict[type[QDialog], Callable[[Controller, Path], object]] = {
     LearnDialog: lambda controller, sound: controller.take_file(sound),
     AbxDialog: lambda controller, sound: controller.listening_test(),
     AudioDialog: lambda controller, sound: controller.audio.show_dialog(),
-    MidiDialog: lambda controller, sound: controller.instruments.midi.show_dialog(controller.window),
+    MidiDialog: lambda controller, sound: controller.inputs.midi.show_dialog(controller.window),
     HelpDialog: lambda controller, sound: controller.show_help(),
     NoticeList: lambda controller, sound: controller.window.notices.show_all(),
 }

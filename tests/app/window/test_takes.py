@@ -127,7 +127,7 @@ def test_a_counted_recording_begins_at_the_beat_and_is_sample_equal_to_one_witho
             (1.0, NoteOff(64, KEYS)),
         ):
             now_s = beat_s + after_s
-            guitar.controller.instruments.play(event)
+            guitar.controller.inputs.play(event)
         now_s = beat_s + 1.1
         guitar.key(KEY.Key_R, CONTROL)
         if not counted:

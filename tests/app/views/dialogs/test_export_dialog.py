@@ -50,7 +50,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
 
     def note(heard: dict[str, object]) -> HeardNote | None:
         choices = Choices(single="small", position=0.4).changed(heard)
-        struck = Struck(choices.instrument, NoteOn(59, 100)) if isinstance(choices.instrument, Patch) else None
+        struck = Struck(choices.played, NoteOn(59, 100)) if isinstance(choices.played, Patch) else None
         return heard_note(choices, library, struck)
 
     dialogs = []
@@ -193,7 +193,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot: QtBot, made, tmp_path: Path
 ) -> None:
     """One line says which, with words and not in small print."""
-    dialog = made({}, {"instrument": GUITAR})
+    dialog = made({}, {"played": GUITAR})
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
     words = "Classical guitar with body, room, sympathetic strings and level, as it is heard"
@@ -210,7 +210,7 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices()[0].model_dump(), {"instrument": GUITAR})
+    again = made(dialog.choices()[0].model_dump(), {"played": GUITAR})
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
@@ -231,7 +231,7 @@ def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplica
     sheet, font = qapp.styleSheet(), qapp.font()
     try:
         theme.apply_theme(qapp, "dark", 150)
-        dialog = made(None, {"instrument": read_patch(PATCHES / "concert_harp.json")})
+        dialog = made(None, {"played": read_patch(PATCHES / "concert_harp.json")})
         texts = [dialog.note.what, dialog.note.through_words]
         for long in (False, True):  # as it opens, and as a text changes
             if long:

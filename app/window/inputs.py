@@ -22,7 +22,7 @@ from app.window.performance import Performance
 HIGHEST_KEY = 127
 
 
-class Instruments(QObject):
+class Inputs(QObject):
     """The player of events, at once in the thread of each; session and window follow later."""
 
     begun = Signal()  # a note; emitted in any thread
