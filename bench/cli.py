@@ -19,7 +19,7 @@ from training.cli.console import Failure, ProgressReport, progress, say
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
-    from app.patches.patch import Patch
+    from app.instruments.instrument import Instrument
 
 bench = typer.Typer(
     help="Measure speed, sound and memory on this machine.",
@@ -109,18 +109,22 @@ def train(
 
 @bench.command()
 def tune(
-    patch: Annotated[
+    instrument: Annotated[
         list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
     ] = None,
     every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
     json: Json = False,
 ) -> None:
-    """Pitch and loudness of patches over their range, and the level of a chord."""
-    from app.patches.library import list_patches
+    """Pitch and loudness of instruments over their range, and the level of a chord."""
+    from app.instruments.library import list_instruments
     from bench.tune import measure
     from training.cli.arguments import open_preset
 
-    chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches()[0]]
+    chosen = (
+        [_instrument(name) for name in instrument]
+        if instrument
+        else [entry.instrument for entry in list_instruments()[0]]
+    )
     presets = {name: open_preset(name) for name in {each.preset for each in chosen}}
     run("tune", partial(measure, [(each, presets[each.preset]) for each in chosen], every), json)
 
@@ -178,7 +182,7 @@ def play(
     buffer: BufferName = "medium",
     busy: Annotated[bool, typer.Option("--busy", help="Beside a process that keeps a core busy.")] = False,
     seed: Seed = 0,
-    patch: Annotated[
+    instrument: Annotated[
         str, typer.Option("--instrument", metavar="INSTRUMENT", help="The instrument that is played.")
     ] = "concert_harp",
     preset: Annotated[
@@ -192,7 +196,7 @@ def play(
     """
     from bench.play.measure import measure
 
-    chosen = _patch(patch) if preset is None else _single(preset)
+    chosen = _instrument(instrument) if preset is None else _single(preset)
     run("play", partial(measure, seconds, rate, _buffer(buffer), busy, seed, chosen), json)
 
 
@@ -202,7 +206,7 @@ def soak(
     minutes: Annotated[float, typer.Option(min=0.01, metavar="MIN", help="Duration in minutes.")] = 10.0,
     seed: Seed = 0,
     buffer: BufferName = "medium",
-    patch: Annotated[
+    instrument: Annotated[
         list[str] | None,
         typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: the harp."),
     ] = None,
@@ -212,13 +216,13 @@ def soak(
 
     It needs the same as `play`. Exit status 1 where there are faults.
     """
-    from app.patches.library import SHIPPED, list_patches
+    from app.instruments.library import SHIPPED, list_instruments
     from bench.soak import measure
 
-    patches = [_patch(name) for name in patch or ["concert_harp"]]
+    instruments = [_instrument(name) for name in instrument or ["concert_harp"]]
     if every:
-        patches = [entry.patch for entry in list_patches(SHIPPED)[0]]
-    if run("soak", partial(measure, 60 * minutes, seed, _buffer(buffer), patches), json)["soak"].faults:
+        instruments = [entry.instrument for entry in list_instruments(SHIPPED)[0]]
+    if run("soak", partial(measure, 60 * minutes, seed, _buffer(buffer), instruments), json)["soak"].faults:
         raise typer.Exit(1)
 
 
@@ -252,12 +256,12 @@ def _buffer(text: str) -> Buffer:
         raise typer.BadParameter("low, medium, high, 128, 256, 512, 1024 or 2048", param_hint="--buffer") from None
 
 
-def _patch(name: str) -> Patch:
-    from app.patches.library import PatchError, find_patch
+def _instrument(name: str) -> Instrument:
+    from app.instruments.library import InstrumentError, find_instrument
 
     try:
-        return find_patch(name).patch
-    except PatchError as error:
+        return find_instrument(name).instrument
+    except InstrumentError as error:
         raise Failure(str(error)) from error
 
 

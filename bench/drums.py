@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from app.commands.drums import drum_of, mode_rows
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.drum_keys import DrumKeys, tuned
-from app.instrument.events import NoteOn
-from app.patches.drums import Drums
-from app.patches.library import SHIPPED as FACTORY
-from app.patches.library import read_patch
-from app.patches.patch import Patch
+from app.instruments.drums import Drums
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED as FACTORY
+from app.instruments.library import read_instrument
+from app.player.compiled import InstrumentPlayer
+from app.player.drum_keys import DrumKeys, tuned
+from app.player.events import NoteOn
 from bench.machine import RATE_HZ, Shares, shares, times_s
 from engine.presets import SHIPPED, load_preset
 from engine.resonators import surface
@@ -42,7 +42,7 @@ DRUM_FILES, MODES_COMPARED = Path(__file__).parents[1] / "presets" / "drums", 40
 PUBLISHED_DROPS = {"Tom": (8.0, 9.7), "Floor tom": (8.0, 9.7), "Bass drum": (9.0, 11.0)}
 SIZES = (400, 800, 1500)  # modes
 HARD = Mallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
-STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
+STRINGS, STRING_INSTRUMENT = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ class ChoiceCost:
 def measure(report: ProgressReport) -> dict[str, Any]:
     """Measure drums of several sizes, struck by a stick and by something small and hard, and kits."""
     costs: list[DrumCost] = []
-    kit, guitar = (read_patch(FACTORY / f"{name}.json") for name in ("concert_toms", STRING_PATCH))
+    kit, guitar = (read_instrument(FACTORY / f"{name}.json") for name in ("concert_toms", STRING_INSTRUMENT))
     pads = [drum.note for drum in _drums(kit).drums]
     for number, size in enumerate(SIZES):
         report(number / (len(SIZES) + 1), f"{size} modes")
-        patch = _of_size(size)
-        costs.append(_cost(f"{size} modes, a stick", (patch, (47,))))
-        costs.append(_cost(f"{size} modes, small and hard", (_with_mallet(patch), (47,))))
+        instrument = _of_size(size)
+        costs.append(_cost(f"{size} modes, a stick", (instrument, (47,))))
+        costs.append(_cost(f"{size} modes, small and hard", (_with_mallet(instrument), (47,))))
     report(len(SIZES) / (len(SIZES) + 1), "kit")
     costs.append(_cost("kit", (kit, pads)))
     costs.append(_cost("kit and strings", (kit, pads), (guitar, STRINGS)))
@@ -115,7 +115,7 @@ def measured_modes() -> tuple[MeasuredMode, ...]:
     return tuple(found)
 
 
-def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
+def _drops(kit: Instrument) -> tuple[PitchDrop, ...]:
     keys, found = DrumKeys(kit, Ear((0.5,))), []
     for drum in _drums(kit).drums:
         key = keys.of_key(drum.note)
@@ -127,27 +127,27 @@ def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
 
 
 def _choice(name: str) -> ChoiceCost:
-    patch = read_patch(FACTORY / f"{name}.json")
-    low, high = patch.range
+    instrument = read_instrument(FACTORY / f"{name}.json")
+    low, high = instrument.range
 
     def choose() -> int:
         tuned.cache_clear()
         surface.modes_below.cache_clear()
         surface.air_below.cache_clear()
-        keys = DrumKeys(patch, Ear((0.4, 0.6)))
+        keys = DrumKeys(instrument, Ear((0.4, 0.6)))
         return sum(keys.of_key(key) is not None for key in range(low, high + 1))
 
     return ChoiceCost(name, choose(), min(times_s(choose, 2, time.process_time)))
 
 
-def _cost(what: str, *played: tuple[Patch, Sequence[int]]) -> DrumCost:
+def _cost(what: str, *played: tuple[Instrument, Sequence[int]]) -> DrumCost:
     """The cost of all these keys of each instrument."""
 
     def struck() -> list[Mixer]:
         mixers = []
-        for patch, keys in played:
-            mixer, preset = Mixer(RATE_HZ), load_preset(SHIPPED / f"{patch.preset}.safetensors")
-            player = InstrumentPlayer(patch, preset, RATE_HZ, {"model": 1.0})
+        for instrument, keys in played:
+            mixer, preset = Mixer(RATE_HZ), load_preset(SHIPPED / f"{instrument.preset}.safetensors")
+            player = InstrumentPlayer(instrument, preset, RATE_HZ, {"model": 1.0})
             mixer.set_player(player.compiled)
             for key in keys:
                 player.handle(NoteOn(key, VELOCITY))
@@ -157,27 +157,27 @@ def _cost(what: str, *played: tuple[Patch, Sequence[int]]) -> DrumCost:
     return DrumCost(what, sum(len(keys) for _, keys in played), shares(struck))
 
 
-def _drums(patch: Patch) -> Drums:
-    assert isinstance(patch.strings, Drums)
-    return patch.strings
+def _drums(instrument: Instrument) -> Drums:
+    assert isinstance(instrument.strings, Drums)
+    return instrument.strings
 
 
-def _of_size(modes: int) -> Patch:
+def _of_size(modes: int) -> Instrument:
     """The tom whose modes below a frequency are so many, about."""
-    patch = read_patch(FACTORY / "tuned_toms.json")
+    instrument = read_instrument(FACTORY / "tuned_toms.json")
     low, high = 1_000.0, 19_000.0
     for _ in range(8):
         middle = (low + high) / 2
-        found = DrumKeys(_below(patch, middle), Ear((0.5,))).of_key(47)
+        found = DrumKeys(_below(instrument, middle), Ear((0.5,))).of_key(47)
         assert found is not None
         low, high = (middle, high) if len(found.modes) < modes else (low, middle)
-    return _below(patch, high)
+    return _below(instrument, high)
 
 
-def _below(patch: Patch, highest_hz: float) -> Patch:
-    return patch.model_copy(update={"strings": _drums(patch).model_copy(update={"highest_hz": highest_hz})})
+def _below(instrument: Instrument, highest_hz: float) -> Instrument:
+    return instrument.model_copy(update={"strings": _drums(instrument).model_copy(update={"highest_hz": highest_hz})})
 
 
-def _with_mallet(patch: Patch) -> Patch:
-    drum = _drums(patch).drums[0].model_copy(update={"mallet": HARD})
-    return patch.model_copy(update={"strings": _drums(patch).model_copy(update={"drums": (drum,)})})
+def _with_mallet(instrument: Instrument) -> Instrument:
+    drum = _drums(instrument).drums[0].model_copy(update={"mallet": HARD})
+    return instrument.model_copy(update={"strings": _drums(instrument).model_copy(update={"drums": (drum,)})})

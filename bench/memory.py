@@ -34,7 +34,7 @@ def main() -> int:
 def _watch(controller: Controller) -> None:
     from PySide6.QtCore import QTimer
 
-    from app.instrument.events import NoteOff, NoteOn
+    from app.player.events import NoteOff, NoteOn
 
     def play(number: int) -> None:
         key = FIRST_KEY + number

@@ -17,11 +17,11 @@ import numpy as np
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import image_of
-from app.instrument.events import NoteOn
-from app.instrument.offline import OfflinePlayer
-from app.instrument.strings import Strings
-from app.patches.library import find_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import find_instrument
+from app.player.events import NoteOn
+from app.player.offline import OfflinePlayer
+from app.player.strings import Strings
 from bench.machine import RATE_HZ
 from engine.kernels import cache
 from engine.presets import SHIPPED, Preset, load_preset
@@ -53,23 +53,25 @@ class PluginCost:
 
 def measure(report: ProgressReport) -> dict[str, Any]:
     """Build a plug-in of all INSTRUMENTS, and play each."""
-    patches = [find_patch(name).patch for name in INSTRUMENTS]
-    presets = [load_preset(SHIPPED / f"{patch.preset}.safetensors") for patch in patches]
-    images = [image_of(patch, preset) for patch, preset in zip(patches, presets, strict=True)]
+    instruments = [find_instrument(name).instrument for name in INSTRUMENTS]
+    presets = [load_preset(SHIPPED / f"{instrument.preset}.safetensors") for instrument in instruments]
+    images = [image_of(instrument, preset) for instrument, preset in zip(instruments, presets, strict=True)]
     with tempfile.TemporaryDirectory() as folder:
         path, kept = Path(folder) / "plugin", cache.folder() or Path(folder)
         library = Library(
             build_plugin(images, "clap", this_target(), path, kept, lambda step, share: report(share, step))
         )
-        parts = zip(INSTRUMENTS, patches, presets, images, strict=True)
-        costs = tuple(_cost(name, patch, preset, Instance(library, image.id)) for name, patch, preset, image in parts)
+        parts = zip(INSTRUMENTS, instruments, presets, images, strict=True)
+        costs = tuple(
+            _cost(name, instrument, preset, Instance(library, image.id)) for name, instrument, preset, image in parts
+        )
     return {"plugins": costs}
 
 
-def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> PluginCost:
-    low, high = patch.range
+def _cost(name: str, instrument: Instrument, preset: Preset, instance: Instance) -> PluginCost:
+    low, high = instrument.range
     keys = range(low, min(low + NOTES, high + 1))
-    player = OfflinePlayer(patch, preset, RATE_HZ, {"model": 1.0}, limited=True, varied=True, dry=False)
+    player = OfflinePlayer(instrument, preset, RATE_HZ, {"model": 1.0}, limited=True, varied=True, dry=False)
     instance.activate(RATE_HZ)
     for key in keys:
         player.handle(NoteOn(key, VELOCITY), 0)
@@ -79,7 +81,7 @@ def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> Plugin
     rounds = [(_taken_s(lambda: player.mixer.render(BLOCK_FRAMES)), _taken_s(next_block)) for _ in range(ROUNDS)]
     instance.destroy()
     app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
-    string, sound_s = Strings(patch).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
+    string, sound_s = Strings(instrument).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
     modes = string.modes if string is not None else 0
     return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s, app_s / plugin_s)
 

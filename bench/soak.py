@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from app.audio.choices import Buffer
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.window.settings import load_settings
 from bench.play import analysis, hands
 from bench.play.measure import DECAY_PATIENCE_S, SILENCE_S, STOP
@@ -79,27 +79,27 @@ class Soak:
 class _Played:
     """A part when it was played: its keys, by `time.monotonic`, and the memory after it."""
 
-    patch: Patch
+    instrument: Instrument
     keys_s: list[float]
     memory_mib: float
 
 
 def measure(
-    seconds: float, seed: int, buffer: Buffer, patches: Sequence[Patch], report: ProgressReport
+    seconds: float, seed: int, buffer: Buffer, instruments: Sequence[Instrument], report: ProgressReport
 ) -> dict[str, Any]:
-    """Play for so long; each of several patches for its share of the time."""
-    part_s = min(PART_S, seconds / 2) if len(patches) == 1 else seconds / len(patches)
-    parts = list(patches) if len(patches) > 1 else list(patches) * round(seconds / part_s)
+    """Play for so long; each of several instruments for its share of the time."""
+    part_s = min(PART_S, seconds / 2) if len(instruments) == 1 else seconds / len(instruments)
+    parts = list(instruments) if len(instruments) > 1 else list(instruments) * round(seconds / part_s)
     random, played = Random(seed), []
-    with program(patches[0], buffer, report) as app:
+    with program(instruments[0], buffer, report) as app:
         began_s, before_processor_s = time.monotonic(), app.processor_s()
-        for number, patch in enumerate(parts):
+        for number, instrument in enumerate(parts):
             if not app.alive:
                 break
-            report(number / len(parts), patch.name)
-            if number and patch is not parts[number - 1]:
-                _choose(app, patch)
-            played.append(_play(app, patch, random, part_s))
+            report(number / len(parts), instrument.name)
+            if number and instrument is not parts[number - 1]:
+                _choose(app, instrument)
+            played.append(_play(app, instrument, random, part_s))
         time.sleep(analysis.SOUNDS_S)
         alive, taken_s = app.alive, max(0.0, app.processor_s() - before_processor_s)
         cores = taken_s / (time.monotonic() - began_s)
@@ -120,16 +120,16 @@ def measure(
     return {"parts": found, "soak": soak}
 
 
-def _play(app: Program, patch: Patch, random: Random, seconds: float) -> _Played:
+def _play(app: Program, instrument: Instrument, random: Random, seconds: float) -> _Played:
     keys_s, weights_mib = [], []
     for _ in range(max(1, round(seconds))):
         steps_s = hands.steady(random, RATE_OF_PLAYING_HZ, min(1.0, seconds))
-        keys_s += hands.play(app.screen, random, steps_s, hands.keys_of(patch))
+        keys_s += hands.play(app.screen, random, steps_s, hands.keys_of(instrument))
         weights_mib.append(app.resident_mib())
-    return _Played(patch, keys_s, statistics.median(weights_mib[-WEIGHED_S:]))
+    return _Played(instrument, keys_s, statistics.median(weights_mib[-WEIGHED_S:]))
 
 
-def _choose(app: Program, patch: Patch) -> None:
+def _choose(app: Program, instrument: Instrument) -> None:
     """Choose an instrument in the browser by its name, and the octave in which most of its keys sound."""
     if not app.recorded.wait_for_silence(SILENCE_S, 2 * SILENCE_S):
         hands.tap(app.screen, STOP)  # which in silence would pluck
@@ -138,26 +138,26 @@ def _choose(app: Program, patch: Patch) -> None:
     hands.press(app.screen, "i")
     app.screen.key("Control_L", False)
     time.sleep(0.3)
-    for letter in re.sub(r"[^a-z0-9]+", " ", patch.name.lower()):
+    for letter in re.sub(r"[^a-z0-9]+", " ", instrument.name.lower()):
         hands.press(app.screen, "space" if letter == " " else letter)
     time.sleep(0.2)
     hands.press(app.screen, "Return")
-    octave, wanted = _octave_of_chosen(app, patch), hands.octave_of(patch)
+    octave, wanted = _octave_of_chosen(app, instrument), hands.octave_of(instrument)
     for _ in range(abs(wanted - octave)):
         hands.press(app.screen, hands.OCTAVE_UP if wanted > octave else hands.OCTAVE_DOWN)
-    app.try_keys(hands.keys_of(patch)[0])
+    app.try_keys(hands.keys_of(instrument)[0])
 
 
-def _octave_of_chosen(app: Program, patch: Patch) -> int:
+def _octave_of_chosen(app: Program, instrument: Instrument) -> int:
     """The octave of the computer's keys, as soon as the settings file has the instrument."""
     deadline_s = time.monotonic() + CHOSEN_PATIENCE_S
     while time.monotonic() < deadline_s and app.alive:
         settings = load_settings(app.settings)[0]
-        chosen = None if settings is None else settings.choices.patch
-        if settings is not None and chosen is not None and chosen.name == patch.name:
+        chosen = None if settings is None else settings.choices.instrument
+        if settings is not None and chosen is not None and chosen.name == instrument.name:
             return settings.choices.octave
         time.sleep(0.1)
-    raise RuntimeError(f"{patch.name} could not be chosen in the window's browser")
+    raise RuntimeError(f"{instrument.name} could not be chosen in the window's browser")
 
 
 def _judged(app: Program, played: _Played, clock: CardClock, tone_clock: CardClock) -> Part:
@@ -166,7 +166,7 @@ def _judged(app: Program, played: _Played, clock: CardClock, tone_clock: CardClo
     holes = analysis.holes(sound, analysis.expected_sound(sound, keys, RATE_HZ), RATE_HZ)
     tone = app.control.sound()[tone_clock.frame(played.keys_s[0]) : tone_clock.frame(played.keys_s[-1])]
     return Part(
-        played.patch.name,
+        played.instrument.name,
         len(keys),
         len(holes),
         sum(1000 * hole.frames / RATE_HZ for hole in holes),

@@ -1,4 +1,4 @@
-"""Patches: pitch and loudness of keys, and the level of a chord.
+"""Instruments: pitch and loudness of keys, and the level of a chord.
 
 All is measured on rendered sound. Pitch is that of the first partial of a quiet pluck, without body and room.
 """
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.events import NoteOn, TimedEvent
-from app.instrument.offline import render_events, render_note
-from app.instrument.strings import Strings
-from app.patches.patch import BodyChoice, Patch
+from app.instruments.instrument import BodyChoice, Instrument
+from app.player.events import NoteOn, TimedEvent
+from app.player.offline import render_events, render_note
+from app.player.strings import Strings
 from bench.machine import RATE_HZ
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY
 from engine.kernels.loudness import k_weight
@@ -31,18 +31,18 @@ HARD = 120  # velocity of the chord
 
 
 @dataclass(frozen=True)
-class TunedPatch:
-    """The figures of one patch.
+class TunedInstrument:
+    """The figures of one instrument.
 
     Attributes:
         keys: those measured.
-        cents: the largest deviation from the pitch of the patch's tuning.
+        cents: the largest deviation from the pitch of the instrument's tuning.
         spread_db: from the softest to the loudest key, K-weighted over the first 0.4 s, with body and room.
         level_db: the mean of these levels, relative to full scale.
         chord_peak_db: the peak of six hard keys at once, relative to full scale, before the limiter.
     """
 
-    patch: str
+    instrument: str
     keys: tuple[int, ...]
     cents: float
     spread_db: float
@@ -72,42 +72,42 @@ def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
     return float(10 * np.log10(max(total, 1e-30)))
 
 
-def measure(patches: Sequence[tuple[Patch, Preset]], every: int, report: ProgressReport) -> dict[str, Any]:
-    """Measure one of every so many keys of each patch."""
+def measure(instruments: Sequence[tuple[Instrument, Preset]], every: int, report: ProgressReport) -> dict[str, Any]:
+    """Measure one of every so many keys of each instrument."""
     found = []
-    for number, (patch, preset) in enumerate(patches):
-        report(number / len(patches), patch.name)
-        found.append(_measure(patch, preset, every))
-    return {"patches": tuple(found)}
+    for number, (instrument, preset) in enumerate(instruments):
+        report(number / len(instruments), instrument.name)
+        found.append(_measure(instrument, preset, every))
+    return {"instruments": tuple(found)}
 
 
-def chord_of(patch: Patch) -> list[int]:
-    """The keys of a chord of six in the middle of a patch's range; fewer where it is narrower."""
-    low, high = patch.range
+def chord_of(instrument: Instrument) -> list[int]:
+    """The keys of a chord of six in the middle of an instrument's range; fewer where it is narrower."""
+    low, high = instrument.range
     root = min((low + high) // 2 - 12, high - CHORD[-1]) if high - low > CHORD[-1] else low
     return [root + step for step in CHORD if root + step <= high]
 
 
-def _measure(patch: Patch, preset: Preset, every: int) -> TunedPatch:
-    strings = Strings(patch)
-    low, high = patch.range
+def _measure(instrument: Instrument, preset: Preset, every: int) -> TunedInstrument:
+    strings = Strings(instrument)
+    low, high = instrument.range
     keys = [key for key in sorted({*range(low, high + 1, every), high}) if strings.of_key(key) is not None]
-    pluck = {**dict(patch.pluck), "softest_mm": QUIET_MM}
-    dry = Patch.model_validate({**dict(patch), "pluck": pluck, "body": BodyChoice(), "room": Room()})
+    pluck = {**dict(instrument.pluck), "softest_mm": QUIET_MM}
+    dry = Instrument.model_validate({**dict(instrument), "pluck": pluck, "body": BodyChoice(), "room": Room()})
     cents, levels = [], []
     for key in keys:
         string = strings.of_key(key)
         assert string is not None
         quiet = render_note(dry, preset, key, 1, PITCH_S + 1, PITCH_S, RATE_HZ)[RATE_HZ // 10 :, 0]
         cents.append(abs(1200 * np.log2(pitch_hz(quiet, string.pitch_hz) / string.pitch_hz)))
-        heard = render_note(patch, preset, key, REFERENCE_VELOCITY, 2.0, 2.0, RATE_HZ)
+        heard = render_note(instrument, preset, key, REFERENCE_VELOCITY, 2.0, 2.0, RATE_HZ)
         levels.append(loudness_db(heard[: round(PART_S * RATE_HZ)]))
-    chord = [TimedEvent(0.0, NoteOn(key, HARD, number)) for number, key in enumerate(chord_of(patch))]
+    chord = [TimedEvent(0.0, NoteOn(key, HARD, number)) for number, key in enumerate(chord_of(instrument))]
     peak = max(
-        float(np.abs(block).max()) for block in render_events(patch, preset, chord, RATE_HZ, "model", 1.0, False)
+        float(np.abs(block).max()) for block in render_events(instrument, preset, chord, RATE_HZ, "model", 1.0, False)
     )
-    return TunedPatch(
-        patch.name,
+    return TunedInstrument(
+        instrument.name,
         tuple(keys),
         max(cents),
         max(levels) - min(levels),

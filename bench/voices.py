@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.events import NoteOn
-from app.instrument.strings import Strings
-from app.patches.library import find_patch
-from app.patches.patch import Noise
+from app.instruments.instrument import Noise
+from app.instruments.library import find_instrument
+from app.player.compiled import InstrumentPlayer
+from app.player.events import NoteOn
+from app.player.strings import Strings
 from app.presets.library import STUDIO
 from bench.machine import RATE_HZ, Shares, shares
 from engine.kernels.constants import MOST_NOTES, MOST_PAIRS
@@ -90,16 +90,16 @@ def _voices(path: Path) -> list[VoiceCost]:
 
 
 def _notes(name: str) -> NotesCost:
-    patch = find_patch(name).patch
-    patch = patch.model_copy(update={"sympathy_s_kg": 0.0, "noise": Noise()})
-    preset = load_preset(SHIPPED / f"{patch.preset}.safetensors")
-    low, high = patch.range
+    instrument = find_instrument(name).instrument
+    instrument = instrument.model_copy(update={"sympathy_s_kg": 0.0, "noise": Noise()})
+    preset = load_preset(SHIPPED / f"{instrument.preset}.safetensors")
+    low, high = instrument.range
     keys = range(low, min(high + 1, low + MOST_KEYS))
-    partials = [string.modes for key in keys if (string := Strings(patch).of_key(key)) is not None]
+    partials = [string.modes for key in keys if (string := Strings(instrument).of_key(key)) is not None]
 
     def struck() -> list[Mixer]:
         mixer = Mixer(RATE_HZ)
-        player = InstrumentPlayer(patch, preset, RATE_HZ, {"model": 1.0}, most_notes=MOST_NOTES, varied=False)
+        player = InstrumentPlayer(instrument, preset, RATE_HZ, {"model": 1.0}, most_notes=MOST_NOTES, varied=False)
         mixer.set_player(player.compiled)
         for key in keys:
             player.handle(NoteOn(key, VELOCITY))

@@ -179,11 +179,11 @@ def api() -> str:
 
 def fields() -> str:
     """The table of parameters of an instrument."""
-    from app.shared.parameters import OF_PATCHES
+    from app.shared.parameters import OF_INSTRUMENTS
 
     rows = [
         f"| `{each.id}` | {each.limits[0]:g} … {each.limits[1]:g} | {each.default:g} | {each.tip} |"
-        for each in OF_PATCHES.values()
+        for each in OF_INSTRUMENTS.values()
     ]
     return "\n".join(["| field | range | default | meaning |", "|---|---|---|---|", *rows])
 

@@ -155,20 +155,20 @@ def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
 
 
 def test_the_smallest_instrument_of_the_documents_is_one() -> None:
-    from app.patches.patch import Patch
+    from app.instruments.instrument import Instrument
 
     (example,) = re.findall(r"```json\n(.*?)```", text("docs/instruments.md"), re.DOTALL)
-    assert Patch.model_validate_json(example).strings.kind == "fretted"
+    assert Instrument.model_validate_json(example).strings.kind == "fretted"
 
 
 @pytest.mark.parametrize(
     ("page", "title"), [("instruments", "### Other fields"), ("drums", "## Write a drum by hand")]
 )
 def test_the_fields_that_a_page_names_exist(page: str, title: str) -> None:
-    from app.patches.patch import Patch
+    from app.instruments.instrument import Instrument
 
     section = text(f"docs/{page}.md").partition(title)[2].partition("\n#")[0]
     named = " ".join(line.split("|")[1] for line in section.splitlines() if line.startswith("| `"))
     names = re.findall(r"\w+(?=[`.\[])", named)
-    schema = json.dumps(Patch.model_json_schema())
+    schema = json.dumps(Instrument.model_json_schema())
     assert len(names) > 5 and [name for name in names if f'"{name}"' not in schema] == []

@@ -45,9 +45,11 @@ def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
     run(*pip, "--no-deps", "--no-compile", "--target", installed, source, folder=elsewhere)
     # the installed package alone: without the development install's paths
     command = (sys.executable, "-W", "ignore", "-c", LISTING, installed)
-    presets, patches, others = map(json.loads, run(*command, folder=elsewhere).split("\x1e"))
+    presets, instruments, others = map(json.loads, run(*command, folder=elsewhere).split("\x1e"))
     shipped = sorted(path.stem for path in (ROOT / "presets").glob("*.safetensors"))
     assert sorted(each["name"] for each in presets) == shipped
-    assert {each["name"] for each in patches} == {path.stem for path in (ROOT / "presets/patches").glob("*.json")}
+    assert {each["name"] for each in instruments} == {
+        path.stem for path in (ROOT / "presets/instruments").glob("*.json")
+    }
     assert others == ["koopman_integrated", "lru", True]
     assert list(elsewhere.iterdir()) == []

@@ -21,8 +21,8 @@ from training.cli.console import Failure, ProgressReport, number, print_json, pr
 
 if TYPE_CHECKING:
     from app.commands.arrays import Array
-    from app.instrument.drum_keys import DrumKey
-    from app.patches.patch import Patch
+    from app.instruments.instrument import Instrument
+    from app.player.drum_keys import DrumKey
     from engine.resonators.drum import DrumModes
     from engine.strike import Strike
     from training.family.drums import StruckDrum
@@ -70,9 +70,9 @@ def modes(
     json: Json = False,
 ) -> None:
     """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
-    patch, drum_key = drum_of(drum, key)
+    instrument, drum_key = drum_of(drum, key)
     drum_modes = drum_key.modes
-    drops = {str(velocity): drum_key.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
+    drops = {str(velocity): drum_key.drop_cents(velocity, instrument.pluck.curve) for velocity in (32, 64, 127)}
     facts = {"modes": len(drum_modes), "hardest_m_s": drum_key.played.hardest_m_s, "drop_cents": drops}
     rows = [*mode_rows(drum_modes, min(count, len(drum_modes)))]
     if json:
@@ -156,11 +156,11 @@ def render(
     blow = _blow_of(drum, key, velocity, place, preset)
     from app.export.played import Played, write_played
     from app.export.wav import WavSettings
-    from app.instrument.events import NoteOn, TimedEvent
+    from app.player.events import NoteOn, TimedEvent
 
     events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
-    loaded, played = arguments.open_preset(blow.patch.preset), Played(blow.patch, events, source)
-    with progress(blow.patch.name) as report:
+    loaded, played = arguments.open_preset(blow.instrument.preset), Played(blow.instrument, events, source)
+    with progress(blow.instrument.name) as report:
         written = write_played(out, [(played, loaded)], "", WavSettings(bits, rate), seconds, report)
     print(f"{out}: {written.seconds:.1f} s of {source}, peak {written.peak_db:.1f} dBFS")
 
@@ -189,7 +189,7 @@ def compare(
 
     torch.set_num_threads(1)
     players = {
-        blow.patch.preset: blow.player(),
+        blow.instrument.preset: blow.player(),
         "r = p = 1/12": untrained_player("series"),
         "linear drum": linear_motion,
     }
@@ -218,7 +218,7 @@ def compare(
 class _Blow:
     """A drum of an instrument, and a blow on it."""
 
-    patch: Patch
+    instrument: Instrument
     key: DrumKey
     strike: Strike
 
@@ -233,9 +233,9 @@ class _Blow:
         from training.family.motion import model_player
 
         try:
-            return model_player(arguments.open_preset(self.patch.preset).model)
+            return model_player(arguments.open_preset(self.instrument.preset).model)
         except ValueError as error:
-            raise Failure(f"{self.patch.preset}: {error}") from error
+            raise Failure(f"{self.instrument.preset}: {error}") from error
 
 
 def _blow_of(
@@ -246,56 +246,56 @@ def _blow_of(
 
     from engine.strike import Strike
 
-    patch, drum_key = drum_of(drum, key)
+    instrument, drum_key = drum_of(drum, key)
     if preset is not None:
-        patch = patch.model_copy(update={"preset": preset})
-    own_strike = drum_key.strike(velocity, patch.pluck.curve)
+        instrument = instrument.model_copy(update={"preset": preset})
+    own_strike = drum_key.strike(velocity, instrument.pluck.curve)
     if place is None:
-        return _Blow(patch, drum_key, own_strike)
+        return _Blow(instrument, drum_key, own_strike)
     if not drum_key.modes.surface.inside(np.array([place])):
         raise typer.BadParameter(
             f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
         )
-    return _Blow(patch, drum_key, Strike(place, own_strike.speed_m_s, own_strike.mallet))
+    return _Blow(instrument, drum_key, Strike(place, own_strike.speed_m_s, own_strike.mallet))
 
 
-def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
+def drum_of(name: str, key: int | None) -> tuple[Instrument, DrumKey]:
     """The drum of a file, or of a key of an instrument.
 
     Raises:
-        Failure, PatchError, SchemaError: there is none.
+        Failure, InstrumentError, SchemaError: there is none.
         typer.BadParameter: an instrument is named without a key.
     """
-    from app.instrument.drum_keys import DrumKeys
-    from app.patches.drums import Drums
-    from app.patches.library import find_patch
+    from app.instruments.drums import Drums
+    from app.instruments.library import find_instrument
+    from app.player.drum_keys import DrumKeys
     from engine.values.ear import Ear
 
     if name.endswith(".toml"):
-        patch, key = _with_file(Path(name)), FILE_KEY
+        instrument, key = _with_file(Path(name)), FILE_KEY
     else:
-        patch = find_patch(name).patch
-    if not isinstance(patch.strings, Drums):
-        raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
-    played = ", ".join(str(drum.note) for drum in patch.strings.drums)
+        instrument = find_instrument(name).instrument
+    if not isinstance(instrument.strings, Drums):
+        raise Failure(f"{instrument.name} has no drums; choose one of those that `instruments` lists under drums")
+    played = ", ".join(str(drum.note) for drum in instrument.strings.drums)
     if key is None:
         raise typer.BadParameter(
-            f"is missing; give a MIDI key of {patch.name}: its drums have {played}", param_hint="--key"
+            f"is missing; give a MIDI key of {instrument.name}: its drums have {played}", param_hint="--key"
         )
-    drum_key = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
+    drum_key = DrumKeys(instrument, Ear(tuple(instrument.pickup.points))).of_key(key)
     if drum_key is None:
-        raise Failure(f"{patch.name} has no drum on key {key}; its drums have the keys {played}")
-    return patch, drum_key
+        raise Failure(f"{instrument.name} has no drum on key {key}; its drums have the keys {played}")
+    return instrument, drum_key
 
 
-def _with_file(path: Path) -> Patch:
+def _with_file(path: Path) -> Instrument:
     """An instrument of one drum, struck by a stick."""
-    from app.patches.drums import Drums, PlayedDrum
-    from app.patches.patch import Patch
+    from app.instruments.drums import Drums, PlayedDrum
+    from app.instruments.instrument import Instrument
     from engine.presets.of_string import read_drum
 
     drum = PlayedDrum(note=FILE_KEY, name="Drum", drum=read_drum(path)[0])
-    return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
+    return Instrument(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 
 def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressReport) -> Blocks:

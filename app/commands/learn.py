@@ -36,7 +36,7 @@ def learn(
     Of more files, takes of the same pitch share the partials, all of them the damping. Interrupt it at any time:
     the same command continues there. Preset and instrument are written at the end.
     """
-    from app.instrument.learned import check_name, keep, learn_files
+    from app.player.learned import check_name, keep, learn_files
     from training.recording.learn import require_found
     from training.recording.table import as_data, as_text
 
@@ -58,11 +58,11 @@ def learn(
         require_found(learned)
     kept = keep(name, learned, instrument)
     if json:
-        files = {name: str(getattr(kept, name)) for name in ("preset", "patch", "body", "report")}
+        files = {name: str(getattr(kept, name)) for name in ("preset", "instrument", "body", "report")}
         print_json({**files, "recordings": [as_data(recording) for recording in learned]})
         return
     for recording in learned:
         for line in as_text(recording):
             print(line)
     say(f"note: hear it again by: learned-strings render {kept.preset.stem} out.wav --as-recorded")
-    print(f"{kept.preset}, {kept.patch}")
+    print(f"{kept.preset}, {kept.instrument}")

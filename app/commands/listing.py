@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Container, Iterator
     from pathlib import Path
 
-    from app.patches.patch import Patch
+    from app.instruments.instrument import Instrument
     from training.heard_file import Heard
 
 
@@ -67,30 +67,30 @@ def instruments(
 
     Files that cannot be used are reported on standard error. Plug-ins and files name parameters by the same id.
     """
-    from app.patches.library import find_patch, list_patches
+    from app.instruments.library import find_instrument, list_instruments
 
     if instrument is not None:
-        _show(list(_parameters(find_patch(instrument).patch)), json)
+        _show(list(_parameters(find_instrument(instrument).instrument)), json)
         return
-    entries, problems = list_patches()
+    entries, problems = list_instruments()
     for problem in problems:
         say(problem)
     rows = []
     for entry in entries:
-        patch = entry.patch
-        facts = {"name": entry.name, "title": patch.name, "category": patch.category, "own": entry.own}
-        rows.append({**facts, "description": patch.description, "file": str(entry.path)})
+        instrument = entry.instrument
+        facts = {"name": entry.name, "title": instrument.name, "category": instrument.category, "own": entry.own}
+        rows.append({**facts, "description": instrument.description, "file": str(entry.path)})
     _show(rows, json, but=("own", "file"))
 
 
-def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
+def _parameters(instrument: Instrument) -> Iterator[dict[str, Any]]:
     """The table's rows: the parameters that an instrument has, with its own values."""
-    from app.shared.parameters import OF_PATCHES
+    from app.shared.parameters import OF_INSTRUMENTS
 
-    for id, parameter in OF_PATCHES.items():
-        if patch.has(id):
+    for id, parameter in OF_INSTRUMENTS.items():
+        if instrument.has(id):
             low, high = parameter.limits
-            numbers = {"value": patch.value(id), "lowest": low, "highest": high, "default": parameter.default}
+            numbers = {"value": instrument.value(id), "lowest": low, "highest": high, "default": parameter.default}
             yield {"id": id, "name": parameter.name, "unit": parameter.unit, **numbers}
 
 

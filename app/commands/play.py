@@ -49,14 +49,14 @@ def play(
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     if seconds is not None:
         arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")
-    from app.instrument.effects import body_problem
-    from app.instrument.midi_file import read_parts, read_song
-    from app.patches.library import find_patch
+    from app.instruments.library import find_instrument
+    from app.player.effects import body_problem
+    from app.player.midi_file import read_parts, read_song
 
     if instrument is None:
         parts, left_out = read_parts(midi)
     else:
-        chosen = find_patch(instrument).patch
+        chosen = find_instrument(instrument).instrument
         parts, left_out = [(chosen, read_song(midi, chosen))], ""
     for chosen, part in parts:
         if part.words:

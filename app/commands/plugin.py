@@ -49,7 +49,7 @@ def plugin(
     from app.export.plugin.formats import FORMATS, TARGETS, install_folder, this_target
     from app.export.plugin.identity import check_kept
     from app.export.plugin.image import image_of
-    from app.patches.library import SHIPPED, find_patch, list_patches
+    from app.instruments.library import SHIPPED, find_instrument, list_instruments
     from engine.kernels import cache
     from training.cli.arguments import open_preset
 
@@ -57,14 +57,14 @@ def plugin(
         raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
-            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
+            chosen = [entry.instrument for entry in list_instruments(SHIPPED)[0]]
         else:
-            chosen = [find_patch(name).patch for name in instruments]
+            chosen = [find_instrument(name).instrument for name in instruments]
         images = []
-        for patch in chosen:
-            images.append(image_of(patch, open_preset(patch.preset)))
+        for instrument in chosen:
+            images.append(image_of(instrument, open_preset(instrument.preset)))
             if images[-1].left_out:
-                say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
+                say(f"note: {instrument.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
         if dry_run:
             for image in images:  # beside the code, a third of a megabyte in every plug-in
                 in_a_bank_mb = len(image.content) / 1e6
@@ -73,7 +73,7 @@ def plugin(
         cache_folder = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
         ids = {image.id for image in images}
-        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
+        name = BANK if instruments == [ALL] else _bank_name([instrument.name for instrument in chosen])
         outputs = list[tuple[str, str, Path]]()
         for system in targets:
             for kind in FORMATS if form == ALL else (form,):

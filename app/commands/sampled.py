@@ -53,8 +53,8 @@ def sampled(
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
     from app.export.sampled.words import counted, megabytes, needed_bytes, notes, pitch_words, size_words
-    from app.instrument.effects import body_problem
-    from app.patches.library import find_patch
+    from app.instruments.library import find_instrument
+    from app.player.effects import body_problem
     from engine.folders import usable_files
     from engine.presets import find_preset, load_preset
 
@@ -63,7 +63,7 @@ def sampled(
         raise typer.BadParameter(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
-    chosen = find_patch(instrument).patch
+    chosen = find_instrument(instrument).instrument
     if dry:
         chosen = chosen.with_value("room.mix", 0.0)
     if problem := body_problem(chosen):

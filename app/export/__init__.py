@@ -1,1 +1,1 @@
-"""Sounds as files: WAV and FLAC with their recipes, what was played, and patches for samplers (`sampled`)."""
+"""Sounds as files: WAV and FLAC with their recipes, what was played, and instruments for samplers (`sampled`)."""

@@ -21,19 +21,19 @@ from pydantic import TypeAdapter
 from PySide6.QtCore import QLockFile
 
 from app.export.played import Played
-from app.instrument.events import (
+from app.instruments.instrument import Instrument
+from app.player.events import (
     LONGEST_RECORDING,
     Bend,
     ControlChange,
     Event,
+    InstrumentTurned,
     Meter,
     NoteOff,
     NoteOn,
-    PatchTurned,
     TimedEvent,
     played_from,
 )
-from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PlayedSource
 from engine import bounds
 from engine.plain_text import one_line
@@ -67,7 +67,7 @@ class Journal:
 
     def __init__(self, path: Path, lock: QLockFile) -> None:
         self.path, self._lock = path, lock
-        self._patch: dict[str, Any] | None = None  # as it was written last
+        self._instrument: dict[str, Any] | None = None  # as it was written last
 
     @classmethod
     def begun(cls, folder: Path, recorded: datetime, meter: Meter | None = None) -> Journal:
@@ -127,9 +127,13 @@ class Journal:
 
     def _line(self, entry: TimedEvent) -> dict[str, Any]:
         event, line = entry.event, {"t": entry.time_s}
-        if isinstance(event, PatchTurned):
-            before, self._patch = self._patch, event.patch.model_dump(mode="json")
-            change = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
+        if isinstance(event, InstrumentTurned):
+            before, self._instrument = self._instrument, event.instrument.model_dump(mode="json")
+            change = (
+                {"instrument": self._instrument}
+                if before is None
+                else {"turned": list(_changes(before, self._instrument))}
+            )
             return {**line, **change}
         return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
 
@@ -178,7 +182,7 @@ class _Read:
     difference_gain_db: float = 0.0
     end_s: float | None = None
     meter: Meter | None = None
-    _patch: dict[str, Any] | None = None
+    _instrument: dict[str, Any] | None = None
 
     def take(self, line: bytes) -> bool:
         """Take a line; return False where it is damaged or fills the recording: nothing after it counts.
@@ -215,38 +219,40 @@ class _Read:
         else:
             time_s = _number_within(data.pop("t"), (-LONGEST_S, LONGEST_S))
             ((kind, value),) = data.items()
-            kind = "patch" if kind == "patch" else kind  # until 0.2
+            kind = "instrument" if kind == "instrument" else kind  # until 0.2
             self.events.append(TimedEvent(time_s, self._event(kind, value)))
 
     def _event(self, kind: str, value: Any) -> Event:
-        if kind in ("patch", "turned"):
-            return PatchTurned(Patch.model_validate(self._turn_patch(kind, value)))
+        if kind in ("instrument", "turned"):
+            return InstrumentTurned(Instrument.model_validate(self._turn_instrument(kind, value)))
         return _CHECKED[kind].validate_python(value)
 
-    def _turn_patch(self, kind: str, value: Any) -> dict[str, Any]:
-        if kind == "patch":
-            self._patch = dict(value)
-            return self._patch
+    def _turn_instrument(self, kind: str, value: Any) -> dict[str, Any]:
+        if kind == "instrument":
+            self._instrument = dict(value)
+            return self._instrument
         for path, changed in value:
-            part: Any = self._patch
+            part: Any = self._instrument
             for key in path[:-1]:
                 part = part[key]
             if not isinstance(part, dict) or path[-1] not in part:
                 raise ValueError("turned: no such field")
             part[path[-1]] = changed
-        assert self._patch is not None
-        return self._patch
+        assert self._instrument is not None
+        return self._instrument
 
     def played(self) -> Played | None:
         """The recording, with what is down at its end released."""
         if self.recorded is None:
             raise ValueError(f"{self.where}: no recording of this program (it is empty)")
-        patch = next((entry.event.patch for entry in self.events if isinstance(entry.event, PatchTurned)), None)
+        instrument = next(
+            (entry.event.instrument for entry in self.events if isinstance(entry.event, InstrumentTurned)), None
+        )
         last_s = max((entry.time_s for entry in self.events), default=0.0)
         events = played_from(self.events, last_s if self.end_s is None else self.end_s, self.meter is not None)
-        if patch is None or not events:
+        if instrument is None or not events:
             return None
-        return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded, self.meter)
+        return Played(instrument, tuple(events), self.source, self.difference_gain_db, self.recorded, self.meter)
 
 
 def _number_within(value: Any, limits: tuple[float, float]) -> Any:

@@ -153,7 +153,7 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
 
 def struck_name(struck: Struck) -> str:
     """A name as `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
-    return _file_stem(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
+    return _file_stem(struck.instrument.name, note_name(struck.event.key), struck.event.velocity / 127)
 
 
 def _file_stem(title: str, note: str, share: float) -> str:

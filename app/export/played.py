@@ -1,4 +1,4 @@
-"""The files of what is played through a patch: a sound file rendered from the events, and their MIDI file."""
+"""The files of what is played through an instrument: a sound file rendered from the events, and their MIDI file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pathlib import Path
 from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
 from app.export.wav import WavSettings, WrittenSound, form_of, is_within_full_scale, write_wav
-from app.instrument.events import Meter, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.instrument.offline import channels_played, render_events
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.events import Meter, NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
+from app.player.offline import channels_played, render_events
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, WRITTEN_ENDINGS, PlayedSource
 from app.shared.worker import Progress
@@ -28,18 +28,18 @@ DEFAULT = WavSettings("24", RATE_HZ)
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A performance through a patch that is not yet written to a file.
+    """A performance through an instrument that is not yet written to a file.
 
     Attributes:
-        patch: with which it began.
-        events: `PatchTurned` among them have the pick-up through which it was heard.
+        instrument: with which it began.
+        events: `InstrumentTurned` among them have the pick-up through which it was heard.
         source: that is heard: "model", "truth" or "difference".
         difference_gain_db: the gain of the difference.
         recorded: when it began; None: not known, or it was not played.
         meter: its times are from the first beat; None: it was not counted.
     """
 
-    patch: Patch
+    instrument: Instrument
     events: Sequence[TimedEvent]
     source: PlayedSource = "model"
     difference_gain_db: float = 0.0
@@ -73,7 +73,7 @@ def write_played(
     source, gain_db, recorded = first.source, first.difference_gain_db, first.recorded
     rate_hz = settings.rate_hz or RATE_HZ
     form = form_of(path, settings.bits, rate_hz)
-    names = " + ".join(dict.fromkeys(played.patch.name for played, _ in parts))
+    names = " + ".join(dict.fromkeys(played.instrument.name for played, _ in parts))
     origin = InstrumentSound(
         program=PROGRAM,
         version=program_version(),
@@ -91,11 +91,11 @@ def write_played(
     notes_s = (entry.time_s for entry in events if isinstance(entry.event, NoteOn | NoteOff))
     whole_s = max(notes_s, default=0.0) + TAIL_S if seconds is None else seconds
     with result_file(path) as file:
-        sound = Recording(max(channels_played(played.patch, played.events) for played, _ in parts))
+        sound = Recording(max(channels_played(played.instrument, played.events) for played, _ in parts))
         for place, (played, player) in enumerate(parts):
-            patch, done = played.patch, 0
+            instrument, done = played.instrument, 0
             for block in render_events(
-                patch, player, played.events, rate_hz, source, seconds, difference_gain_db=gain_db
+                instrument, player, played.events, rate_hz, source, seconds, difference_gain_db=gain_db
             ):
                 sound.add(done, block)
                 done += len(block)
@@ -121,7 +121,7 @@ class PlayedExport:
     """The export of a recording to `recorded_files` of `path`. See `ExportJob`.
 
     Attributes:
-        preset: the file of the preset that plays the patch.
+        preset: the file of the preset that plays the instrument.
     """
 
     played: Played
@@ -138,7 +138,7 @@ class PlayedExport:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
         with result_file(midi_file) as file:
-            file.write(midi_bytes(played.events, played.patch, played.meter))
+            file.write(midi_bytes(played.events, played.instrument, played.meter))
         preset = load_preset(self.preset)
         written = write_played(sound_file, [(played, preset)], midi_file.name, self.settings, progress=progress)
         sound = source_words(played.source, played.difference_gain_db)

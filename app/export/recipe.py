@@ -17,11 +17,11 @@ from pydantic import Field, model_validator
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.sound import LONGEST_S, check_sources
 from app.export.wav import RATE_RANGE_HZ, WavSettings
-from app.instrument.bodies import body_digest
-from app.instrument.events import KEYS, NoteOn
-from app.patches.fields import Name, String
-from app.patches.library import list_patches
-from app.patches.patch import Patch
+from app.instruments.fields import Name, String
+from app.instruments.instrument import Instrument
+from app.instruments.library import list_instruments
+from app.player.bodies import body_digest
+from app.player.events import KEYS, NoteOn
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
 from app.shared.value import Value
@@ -54,7 +54,7 @@ class InstrumentSound(Value):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
-        instrument: the name of the patch, of a recording the one with which it began; of several, all.
+        instrument: the name of the instrument, of a recording the one with which it began; of several, all.
         preset: that plays it, of several the first one's.
         source: that is heard.
         difference_gain_db: the gain of the difference.
@@ -110,8 +110,8 @@ class StruckKey(Value):
 
     @classmethod
     def of(cls, struck: Struck) -> StruckKey:
-        patch = struck.patch
-        return cls(instrument=patch.name, instrument_sha256=_digest(patch), **asdict(struck.event))
+        instrument = struck.instrument
+        return cls(instrument=instrument.name, instrument_sha256=_digest(instrument), **asdict(struck.event))
 
     def found(self) -> tuple[Struck, bool]:
         """The instrument of that name with this key, and whether it is the same to the last value.
@@ -119,15 +119,15 @@ class StruckKey(Value):
         Raises:
             ValueError: there is none.
         """
-        for entry in list_patches()[0]:
-            if entry.patch.name == self.instrument:
+        for entry in list_instruments()[0]:
+            if entry.instrument.name == self.instrument:
                 event = NoteOn(**{field.name: getattr(self, field.name) for field in fields(NoteOn)})
-                return Struck(entry.patch, event), _digest(entry.patch) == self.instrument_sha256
+                return Struck(entry.instrument, event), _digest(entry.instrument) == self.instrument_sha256
         raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
 
 
-def _digest(patch: Patch) -> str:
-    content = patch.model_dump_json() + body_digest(patch.body.name)
+def _digest(instrument: Instrument) -> str:
+    content = instrument.model_dump_json() + body_digest(instrument.body.name)
     return hashlib.sha256(content.encode()).hexdigest()
 
 

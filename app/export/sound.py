@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from app.export.recording import BLOCK_FRAMES, Recording, SoundSamples, blocks
 from app.export.wav import WavSettings
-from app.instrument.effects import channels_of
-from app.instrument.events import TimedEvent
-from app.instrument.offline import render_events
+from app.player.effects import channels_of
+from app.player.events import TimedEvent
+from app.player.offline import render_events
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import Source
 from app.shared.worker import Progress
@@ -136,7 +136,7 @@ def render_voices(
         if sound.struck is None:
             channels, rendered = len(sound.ear.points), _plucked_blocks(sound, preset, voice, rate_hz, part, until_db)
         else:
-            channels, dry = channels_of(sound.struck.patch), "difference" in sources
+            channels, dry = channels_of(sound.struck.instrument), "difference" in sources
             rendered = _struck_blocks(sound, preset, voice, rate_hz, part, until_db, dry)
         recording = Recording(channels)
         with suppress(*(() if voice in needed else (Runaway,))):
@@ -217,7 +217,7 @@ def _struck_blocks(
     assert struck is not None
     peak, quiet, done = 0.0, 0, 0
     for block in render_events(
-        struck.patch,
+        struck.instrument,
         preset,
         [TimedEvent(0.0, struck.event)],
         rate_hz,

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from app.export.journal import Journal
 from app.export.played import Played, recorded_files
-from app.patches.fields import Name
+from app.instruments.fields import Name
 
 _NAME = TypeAdapter(Name)
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.events import NoteOn
-from app.patches.drums import Drums
+from app.instruments.drums import Drums
+from app.player.compiled import InstrumentPlayer
+from app.player.events import NoteOn
 from app.playing.note import PluckVoices
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf
@@ -35,7 +35,7 @@ class KeyNote:
         id: of its event, which reports carry.
         path: of the preset.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
-        patch: with which it was struck.
+        instrument: with which it was struck.
         ear: where it was heard then.
         request: the string and how it was plucked, once the player has reported them; None before, and of a drum.
         string: on which of a set it is played, as of `Strings.of_key`; None: the key chooses it.
@@ -62,7 +62,7 @@ class KeyNote:
     from_s = 0.0
 
     def __post_init__(self) -> None:
-        self.patch, self.ear = self.player.patch, self.player.ear
+        self.instrument, self.ear = self.player.instrument, self.player.ear
         self._playing = Playing(0.0, 0, None)
 
     def take(self, report: NoteReport) -> None:
@@ -71,7 +71,7 @@ class KeyNote:
             self._begun, self.gain = report, report.gain
             self.string = report.string if report.string >= 0 else None
             if report.parameters is not None:
-                pluck = self.event.pluck or self.patch.pluck.pluck(self.event.velocity)
+                pluck = self.event.pluck or self.instrument.pluck.pluck(self.event.velocity)
                 width = pluck.width if pluck.shape == "triangular" else report.width
                 pluck = pluck.nearest(position=report.position, amplitude_mm=report.amplitude_mm, width=width)
                 self.request = RenderRequest(StringOf(self.path, report.parameters), pluck, 0.0, self.ear)
@@ -98,7 +98,7 @@ class KeyNote:
     @property
     def of_drum(self) -> bool:
         """Return True if it is a drum's."""
-        return isinstance(self.patch.strings, Drums)
+        return isinstance(self.instrument.strings, Drums)
 
     @property
     def known(self) -> bool:

@@ -1,4 +1,4 @@
-"""The sound of a patch's keys, prepared in the background: the patch's preset, its table, body and room.
+"""The sound of an instrument's keys, prepared in the background: the instrument's preset, its table, body and room.
 
 Events go to the compiled player as numbers, which the device's next quantum takes up; its reports come back.
 """
@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.instrument.compiled import InstrumentPlayer, is_another
-from app.instrument.drum_keys import DrumKeys
-from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import SWITCHES, ControlChange, Event, NoteOff, NoteOn, PatchTurned, moves_effects
-from app.patches.drums import Drums
-from app.patches.patch import Patch
+from app.instruments.drums import Drums
+from app.instruments.instrument import Instrument
+from app.player.compiled import InstrumentPlayer, is_another
+from app.player.drum_keys import DrumKeys
+from app.player.effects import body_problem, effects_of
+from app.player.events import SWITCHES, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn, moves_effects
 from app.playing.key_note import AS_THEY_ARE, KeyNote, drop
 from app.playing.playback import Due
 from app.playing.recorder import EventRecorder
@@ -52,16 +52,16 @@ class SoundingNote:
 
 @dataclass(frozen=True, eq=False)
 class _Wanted:
-    """The patch that keys are to play, and where it is heard."""
+    """The instrument that keys are to play, and where it is heard."""
 
-    patch: Patch
+    instrument: Instrument
     ear: Ear
 
 
 class Keys:
-    """The keys of a patch, and its notes. Every public method may be called from any thread.
+    """The keys of an instrument, and its notes. Every public method may be called from any thread.
 
-    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before.
+    A key waits for no knob. A turned instrument is played at once, as loud as through the body of the instrument before.
     Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
@@ -72,8 +72,8 @@ class Keys:
         set_effects: sets body and room of all that is heard; called in a background thread.
 
     Attributes:
-        recorder: of the events that are played, and of the patch as it is turned.
-        player: of the keys; None: no patch, or its preset is not loaded yet.
+        recorder: of the events that are played, and of the instrument as it is turned.
+        player: of the keys; None: no instrument, or its preset is not loaded yet.
     """
 
     def __init__(
@@ -108,19 +108,19 @@ class Keys:
         self._frames, self._moved_s = -1, 0.0  # of the mixer when it was last seen to move, and when that was
         self._reported_body = ""  # the fault of the body that was reported last
 
-    def set_patch(self, patch: Patch | None, ear: Ear) -> None:
-        """Set the patch that keys play from now on, and where it is heard.
+    def set_instrument(self, instrument: Instrument | None, ear: Ear) -> None:
+        """Set the instrument that keys play from now on, and where it is heard.
 
         Strings that ring follow, if the preset is the same.
 
         Another preset, and drums after strings, are loaded in the background; until then keys are silent. None: no
-        patch.
+        instrument.
         """
         with self._lock:
             player = self.player
-            if patch is None or (player is not None and not _can_play(player, patch)):
+            if instrument is None or (player is not None and not _can_play(player, instrument)):
                 self.player = None
-            self._wanted = None if patch is None else _Wanted(patch, ear)
+            self._wanted = None if instrument is None else _Wanted(instrument, ear)
         self._follow_wish()
 
     def listen(self, ear: Ear) -> None:
@@ -128,7 +128,7 @@ class Keys:
         with self._lock:
             if self._wanted is None:
                 return
-            self._wanted = _Wanted(self._wanted.patch, ear)
+            self._wanted = _Wanted(self._wanted.instrument, ear)
             if self.player is None:  # it is being loaded, or cannot be
                 return
         self._follow_wish()
@@ -164,7 +164,7 @@ class Keys:
                     id = player.handle(event, frame, struck_s)
             except ValueError as error:
                 self._report(str(error), "")
-            if isinstance(event, ControlChange) and moves_effects(event, player.patch):
+            if isinstance(event, ControlChange) and moves_effects(event, player.instrument):
                 self._in_background(self._set_present_effects)
             if note_on is None or not id:
                 return None
@@ -247,11 +247,11 @@ class Keys:
         return now_s - self._moved_s > STANDS_S
 
     @property
-    def heard_through(self) -> Patch | None:
-        """The patch whose body and room are heard, as controllers have turned them."""
+    def heard_through(self) -> Instrument | None:
+        """The instrument whose body and room are heard, as controllers have turned them."""
         if self.player is not None:
             return self.player.heard_through
-        return None if self._wanted is None else self._wanted.patch
+        return None if self._wanted is None else self._wanted.instrument
 
     def begin_recording(self, beat_s: float | None = None) -> None:
         """Record events from now on, wheels and pedals as they stand; arguments as of `EventRecorder.begin`."""
@@ -269,12 +269,12 @@ class Keys:
 
     def _set_present_effects(self) -> None:
         """Body and room of what is played now."""
-        patch = self.heard_through
-        effects = None if self._dry or patch is None else effects_of(patch)
+        instrument = self.heard_through
+        effects = None if self._dry or instrument is None else effects_of(instrument)
         if effects != self._effects:
             self._effects = effects
             self._set_effects(effects)
-        problem, reported_before = body_problem(patch) if patch is not None else "", self._reported_body
+        problem, reported_before = body_problem(instrument) if instrument is not None else "", self._reported_body
         self._reported_body = problem
         if problem and problem != reported_before:
             self._report(problem, "")
@@ -297,7 +297,7 @@ class Keys:
         """Play what is wanted; what takes milliseconds of it, in the background."""
         wanted, player = self._wanted, self.player
         if wanted is not None and player is not None and not player.of_drums:
-            self._load_wanted(player, wanted, nearly=not is_another(wanted.patch, player.patch))
+            self._load_wanted(player, wanted, nearly=not is_another(wanted.instrument, player.instrument))
         self._in_background(self._complete)
 
     def _complete(self) -> None:
@@ -314,28 +314,28 @@ class Keys:
     def _load_wanted(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
         """Let keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
         try:
-            keys = player.keys_of(wanted.patch, wanted.ear, nearly)
+            keys = player.keys_of(wanted.instrument, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
             table = player.table_of(keys)
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
-                    self._wanted = self._completed = _Wanted(player.patch, player.ear)
+                    self._wanted = self._completed = _Wanted(player.instrument, player.ear)
             self._report(str(error), "")
             return
         with self._lock:
             if wanted is self._wanted and player is self.player:
-                is_outdated = (player.patch, player.ear) != (wanted.patch, wanted.ear)
+                is_outdated = (player.instrument, player.ear) != (wanted.instrument, wanted.ear)
                 player.take(keys, table)
                 if is_outdated:
                     self.recorder.take(_turned_event(player))
 
     def _compute_drums(self, keys: DrumKeys) -> bool:
-        """Compute a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
-        low, high = keys.patch.range
+        """Compute an instrument's drums, which takes up to seconds; False: another instrument is wanted by now."""
+        low, high = keys.instrument.range
         for key in range(low, high + 1):
-            if self._wanted is None or self._wanted.patch is not keys.patch:
+            if self._wanted is None or self._wanted.instrument is not keys.instrument:
                 return False
             with contextlib.suppress(ValueError):  # raised again when it is struck
                 keys.of_key(key)
@@ -343,22 +343,22 @@ class Keys:
 
     def _begin(self, wanted: _Wanted) -> None:
         """Load the preset of what is wanted."""
-        patch, entry = wanted.patch, self._find(wanted.patch.preset)
+        instrument, entry = wanted.instrument, self._find(wanted.instrument.preset)
         if entry is None:
-            self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")
+            self._report(f"{instrument.name} is played by the preset {instrument.preset}, which was not found.", "")
             return
         try:
             preset, rate_hz = self._sources.load(entry.path).preset, self._mixer().rate_hz
-            drums = DrumKeys(patch, wanted.ear) if isinstance(patch.strings, Drums) else None
+            drums = DrumKeys(instrument, wanted.ear) if isinstance(instrument.strings, Drums) else None
             if drums is not None and not self._compute_drums(drums):
                 return
-            player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
+            player = InstrumentPlayer(instrument, preset, rate_hz, self._gains, wanted.ear, keys=drums)
         except ValueError as error:
             self._report(str(error), "")
             return
         with self._lock:
             now, mixer = self._wanted, self._mixer()
-            if now is None or now.patch is not patch:
+            if now is None or now.instrument is not instrument:
                 return
             if mixer.rate_hz != rate_hz:  # the device has changed meanwhile
                 player = player.again(mixer.rate_hz)
@@ -371,12 +371,14 @@ class Keys:
             self._load_wanted(player, now)
 
 
-def _can_play(player: InstrumentPlayer, patch: Patch) -> bool:
-    """Return True if a player can play a patch too."""
-    return player.patch.preset == patch.preset and player.of_drums == isinstance(patch.strings, Drums)
+def _can_play(player: InstrumentPlayer, instrument: Instrument) -> bool:
+    """Return True if a player can play an instrument too."""
+    return player.instrument.preset == instrument.preset and player.of_drums == isinstance(instrument.strings, Drums)
 
 
-def _turned_event(player: InstrumentPlayer) -> PatchTurned:
-    """The patch with the pick-up it is heard through. That is not its own where a single string is played."""
+def _turned_event(player: InstrumentPlayer) -> InstrumentTurned:
+    """The instrument with the pick-up it is heard through. That is not its own where a single string is played."""
     pickup = {"points": player.ear.points, "kind": player.ear.pickup}
-    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=pickup)}))
+    return InstrumentTurned(
+        player.instrument.model_copy(update={"pickup": player.instrument.pickup.model_copy(update=pickup)})
+    )

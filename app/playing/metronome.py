@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.events import Meter
+from app.player.events import Meter
 from app.playing.notes import Notes
 from app.playing.playback import AHEAD_S, Beginning
 from engine.voices import Voice, plain_program

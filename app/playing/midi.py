@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
-from app.instrument.events import ControlChange, fixed_function
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.events import ControlChange, fixed_function
 from app.shared.parameters import LEARNABLE, MACROS, OF_CHOICES
 from app.shared.value import Value
 
@@ -55,25 +55,25 @@ class MidiChoices(Value):
         return self.model_copy(update={"controllers": others})
 
 
-def turned(patch: Patch, field: str, value: float) -> Patch:
-    """The patch with a parameter or a macro turned.
+def turned(instrument: Instrument, field: str, value: float) -> Instrument:
+    """The instrument with a parameter or a macro turned.
 
-    Where it has none, or the value is impossible in it, the patch stays as it is.
+    Where it has none, or the value is impossible in it, the instrument stays as it is.
     """
     try:
         if field in MACROS:
             number = list(MACROS).index(field)
-            return patch.turned(number, value) if number < len(patch.macros) else patch
-        return patch.with_knob(field, value)
+            return instrument.turned(number, value) if number < len(instrument.macros) else instrument
+        return instrument.with_knob(field, value)
     except ValueError:
-        return patch
+        return instrument
 
 
-def turns_of(event: ControlChange, choices: MidiChoices, patch: Patch | None) -> dict[str, Any]:
+def turns_of(event: ControlChange, choices: MidiChoices, instrument: Instrument | None) -> dict[str, Any]:
     """New values for `Choices.changed`, of all that a controller is assigned to.
 
     Args:
-        patch: whose parameters and macros it turns; None: it turns none of them.
+        instrument: whose parameters and macros it turns; None: it turns none of them.
     """
     turns: dict[str, Any] = {}
     for field, controller in choices.controllers.items():
@@ -82,6 +82,6 @@ def turns_of(event: ControlChange, choices: MidiChoices, patch: Patch | None) ->
         value = LEARNABLE[field].value(event.value / LARGEST_VALUE)
         if field in OF_CHOICES:
             turns[field] = value
-        elif patch is not None:
-            turns["patch"] = patch = turned(patch, field, value)
+        elif instrument is not None:
+            turns["instrument"] = instrument = turned(instrument, field, value)
     return turns

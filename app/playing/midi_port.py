@@ -6,8 +6,8 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 
-from app.instrument.events import Event, channels_in, release_all
-from app.instrument.midi_file import event_of
+from app.player.events import Event, channels_in, release_all
+from app.player.midi_file import event_of
 from app.playing.midi_backend import MidiUnavailable, RtMidi, RtMidiInput, load_backend
 
 

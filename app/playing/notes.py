@@ -1,7 +1,7 @@
 """The notes that ring: begun by events, switched between sources, heard from other points, and ended.
 
 All that plays is an event: a key, a message of MIDI or of a file, a pluck at a place. `Notes.handle` turns it into a
-note in the thread it comes in, and hands it to the mixer at once, before anything is drawn. Keys of a patch go to the
+note in the thread it comes in, and hands it to the mixer at once, before anything is drawn. Keys of an instrument go to the
 compiled player as numbers. A pluck of a single string has voices that are made here, for models of every kind.
 """
 
@@ -17,8 +17,8 @@ from functools import partial
 from typing import TypeVar
 
 from app.audio.sound import Sound, SoundStatus
-from app.instrument.events import Event, NoteOn, PluckAt
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.events import Event, NoteOn, PluckAt
 from app.playing.ahead import STOLEN_S, Ahead, AheadSamples
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
@@ -67,7 +67,7 @@ class Notes:
         set_effects: sets body and room of all that is heard; called in a background thread.
 
     Attributes:
-        keys: what the keys of a patch sound with.
+        keys: what the keys of an instrument sound with.
         latest: the note that an event began last.
     """
 
@@ -89,7 +89,7 @@ class Notes:
         self._ear: Ear | None = None
         self.latest: PluckVoices | KeyNote | None = None
         self._chosen: RenderRequest | None = None
-        self._reach: PluckRange | None = None  # of a single string, which is played; None: a patch is
+        self._reach: PluckRange | None = None  # of a single string, which is played; None: an instrument is
         self._dry = False
         self._ahead = Ahead(self._hand_over, self._drop)
         self._latencies_s: deque[float] = deque(maxlen=100)
@@ -105,11 +105,11 @@ class Notes:
 
     # What is played
 
-    def set_instrument(self, patch: Patch | None, ear: Ear, single: str | None = None) -> None:
+    def set_instrument(self, instrument: Instrument | None, ear: Ear, single: str | None = None) -> None:
         """Set what events play from now on, and where all notes are heard.
 
         Args:
-            single: the preset whose string is played by itself: notes of the patch fade out. The patch is loaded all
+            single: the preset whose string is played by itself: notes of the instrument fade out. The instrument is loaded all
                 the same, so that its keys sound at once when it is played.
         """
         entry = None if single is None else self._find(single)
@@ -123,7 +123,7 @@ class Notes:
                 self._chosen = replace(request, preset=entry.path)
         if single is not None and not plucked_before:
             self.keys.stop(REPLACED_S)
-        self.keys.set_patch(patch, ear)
+        self.keys.set_instrument(instrument, ear)
         self._hear_effects()
 
     def listen(self, ear: Ear) -> None:

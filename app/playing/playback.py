@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.instrument.events import Event, TimedEvent, channels_in, release_all
+from app.player.events import Event, TimedEvent, channels_in, release_all
 from engine.voices import Mixer
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
-from app.instrument.events import LONGEST_RECORDING, Event, TimedEvent, played_from
+from app.player.events import LONGEST_RECORDING, Event, TimedEvent, played_from
 
 FULL = (
     f"The recording is full ({LONGEST_RECORDING} notes, releases and movements of wheels and knobs): what is played "

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from app.instrument.drum_keys import DrumKeys, on_the_drum
+from app.player.drum_keys import DrumKeys, on_the_drum
 from app.rendering.blow import RATE_HZ, BlowTake, ModalMotion
 from app.rendering.note_sound import RenderRequest, Struck
 from app.rendering.strobe import Strobe
@@ -29,10 +29,10 @@ def begin_blow(request: RenderRequest, struck: Struck, loaded: Loaded) -> tuple[
         PresetError: the preset is of one string.
         ValueError: no drum is on the key.
     """
-    drum_key = DrumKeys(struck.patch, request.ear).of_key(struck.event.key)
+    drum_key = DrumKeys(struck.instrument, request.ear).of_key(struck.event.key)
     if drum_key is None:
-        raise ValueError(f"{struck.patch.name} has no drum on key {struck.event.key}")
-    strike, place = drum_key.strike(struck.event.velocity, struck.patch.pluck.curve), struck.event.place
+        raise ValueError(f"{struck.instrument.name} has no drum on key {struck.event.key}")
+    strike, place = drum_key.strike(struck.event.velocity, struck.instrument.pluck.curve), struck.event.place
     if place is not None:
         strike = replace(strike, place=on_the_drum(drum_key.played, place))
     struck_drum = StruckDrum.by(strike, drum_key.modes)

@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from app.instrument.events import NoteOn
-from app.patches.drums import Drums
-from app.patches.patch import Patch
+from app.instruments.drums import Drums
+from app.instruments.instrument import Instrument
+from app.player.events import NoteOn
 from app.presets.words import shape_word
 from app.rendering.subject import Subject, load_subject, path_of, string_of
 from app.shared.key_names import note_name
@@ -24,14 +24,14 @@ from engine.values.ear import Ear
 class Struck:
     """A key of an instrument, held."""
 
-    patch: Patch
+    instrument: Instrument
     event: NoteOn
 
     @property
     def words(self) -> str:
         """The description for people."""
         stroke = f"at velocity {self.event.velocity}" if self.event.pluck is None else "plucked by hand"
-        return f"{self.patch.name}, {note_name(self.event.key)} {stroke}"
+        return f"{self.instrument.name}, {note_name(self.event.key)} {stroke}"
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class NoteSound:
     @property
     def alone(self) -> NoteSound:
         """The string without its instrument; of a drum, which is no string, the same sound."""
-        if self.struck is None or isinstance(self.struck.patch.strings, Drums):
+        if self.struck is None or isinstance(self.struck.instrument.strings, Drums):
             return self
         return replace(self, struck=None)
 

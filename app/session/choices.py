@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from app.patches.drums import Drums
-from app.patches.fields import String, parameter
-from app.patches.patch import Patch
+from app.instruments.drums import Drums
+from app.instruments.fields import String, parameter
+from app.instruments.instrument import Instrument
 from app.session.listener import Listener, points_of
 from app.session.monitor import Monitor
 from app.shared.value import Value
@@ -42,14 +42,14 @@ class Choices(Monitor, Listener, ShownString):
     """The choices that are restored at the next start.
 
     Attributes:
-        patch: the instrument that is there, played or not; None: there is none.
-        single: the name of the preset whose string is played instead, at places along it; None: the patch is played.
+        instrument: the instrument that is there, played or not; None: there is none.
+        single: the name of the preset whose string is played instead, at places along it; None: the instrument is played.
         seconds: how long the pluck is rendered.
         octave: by how many octaves the computer's keys are transposed.
         velocity: with which the computer's keys are struck, as in MIDI.
     """
 
-    patch: Patch | None = None
+    instrument: Instrument | None = None
     single: str | None = ""
     seconds: float = parameter("seconds")
     loop: bool = False
@@ -74,13 +74,13 @@ class Choices(Monitor, Listener, ShownString):
         return self.single or (self.played.preset if self.played else "")
 
     @property
-    def played(self) -> Patch | None:
+    def played(self) -> Instrument | None:
         """The instrument, if it is played: keys are pitches. None: they are places along a single string."""
-        return self.patch if self.single is None else None
+        return self.instrument if self.single is None else None
 
     @property
-    def plays_patch(self) -> bool:
-        """Return True if the patch is played."""
+    def plays_instrument(self) -> bool:
+        """Return True if the instrument is played."""
         return self.played is not None
 
     @property
@@ -98,11 +98,11 @@ class Choices(Monitor, Listener, ShownString):
                 `played`, an instrument that is.
 
         Raises:
-            ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
+            ValueError: a value is out of its range, a field is unknown, or the instrument cannot be heard so.
         """
         changes = dict(changes)
         if "played" in changes:
-            changes |= {"patch": changes.pop("played"), "single": None}
+            changes |= {"instrument": changes.pop("played"), "single": None}
         if "preset" in changes:
             changes["single"] = changes.pop("preset")
         if {"a", "b", "heard"} & changes.keys():
@@ -123,47 +123,51 @@ OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
     """The fields of these choices, read from those of earlier versions.
 
-    Until 0.2 instruments were patches. Before there were slots, `heard` named the source itself. Without `single`,
+    Until 0.2 instruments were instruments. Before there were slots, `heard` named the source itself. Without `single`,
     `instrument` was a preset alone, too, with the instrument beside it as `kept`. Before that, `keys_play` said if the
     instrument was played or the string of `preset`.
     """
-    data = {"patch" if name == "patch" else name: value for name, value in data.items()}  # until 0.2
+    data = {"instrument" if name == "instrument" else name: value for name, value in data.items()}  # until 0.2
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
         data |= {"a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
     if "instrument" in data and "single" not in data:
         instrument, kept = data.pop("instrument"), data.pop("kept", None)
         if isinstance(instrument, dict) and not instrument.keys() - {"preset"}:
-            data |= {"patch": kept, "single": instrument.get("preset", "")}
+            data |= {"instrument": kept, "single": instrument.get("preset", "")}
         else:
-            data |= {"patch": instrument, "single": None}
-    elif "single" not in data and data.keys() & {"preset", "patch", "keys_play"}:
+            data |= {"instrument": instrument, "single": None}
+    elif "single" not in data and data.keys() & {"preset", "instrument", "keys_play"}:
         preset = data.pop("preset", "")
         place = data.pop("keys_play", "") == "place"
-        patch = data.get("patch")
-        data["single"] = preset if patch is None or place else None
-        model = patch.get("preset", Patch.model_fields["preset"].default) if isinstance(patch, dict) else preset
+        instrument = data.get("instrument")
+        data["single"] = preset if instrument is None or place else None
+        model = (
+            instrument.get("preset", Instrument.model_fields["preset"].default)
+            if isinstance(instrument, dict)
+            else preset
+        )
         if data["single"] is None and preset not in ("", model):
             data["string"] = None  # it is of another preset
     return data
 
 
 def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
-    """The choices in which a patch that is played is heard where its own pick-up says.
+    """The choices in which an instrument that is played is heard where its own pick-up says.
 
     Its pick-up and `listen`, `listen_right`, `stereo` and `pickup` agree: each follows the other. So the sound is
     saved, recorded and exported as it is heard.
 
     Args:
-        asked: the fields that were asked to change. Of these the patch counts before listening points and pick-up,
-            which otherwise become those of the patch.
+        asked: the fields that were asked to change. Of these the instrument counts before listening points and pick-up,
+            which otherwise become those of the instrument.
 
     Raises:
-        ValueError: the patch cannot be heard so.
+        ValueError: the instrument cannot be heard so.
     """
-    patch = choices.played
-    if patch is None:
+    instrument = choices.played
+    if instrument is None:
         return choices
-    chosen = "patch" in asked or "single" in asked
+    chosen = "instrument" in asked or "single" in asked
     if not chosen and any(name in asked for name in Listener.model_fields if name != "solo"):
-        return choices.model_copy(update={"patch": choices.picked_up(patch)})
-    return choices.model_copy(update=points_of(patch.pickup))
+        return choices.model_copy(update={"instrument": choices.picked_up(instrument)})
+    return choices.model_copy(update=points_of(instrument.pickup))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from app.patches.fields import parameter
-from app.patches.patch import Patch, Pickup
+from app.instruments.fields import parameter
+from app.instruments.instrument import Instrument, Pickup
 from app.shared.value import Value
 from engine.values.ear import Ear
 from engine.values.ear import Pickup as PickupKind
 
 HIGHEST_MODE = 9_999  # of any grid that a preset may have
-RIGHT_POINT = "pickup.points.1"  # of a patch in stereo
+RIGHT_POINT = "pickup.points.1"  # of an instrument in stereo
 
 
 class Listener(Value):
@@ -39,24 +39,24 @@ class Listener(Value):
         """The ear as the engine takes it; the first point, in stereo the left, is drawn."""
         return Ear(self.points, self.pickup, self.solo)
 
-    def picked_up(self, patch: Patch) -> Patch:
-        """The patch with this pick-up.
+    def picked_up(self, instrument: Instrument) -> Instrument:
+        """The instrument with this pick-up.
 
         Raises:
             ValueError: in mono one of its macros would have nothing to move.
         """
-        pickup = patch.pickup.model_copy(update={"points": self.points, "kind": self.pickup})
-        if pickup == patch.pickup:
-            return patch
+        pickup = instrument.pickup.model_copy(update={"points": self.points, "kind": self.pickup})
+        if pickup == instrument.pickup:
+            return instrument
         if not self.stereo:
-            for macro in patch.macros:
+            for macro in instrument.macros:
                 if any(target.field == RIGHT_POINT for target in macro.targets):
                     reason = f"its macro {macro.name} moves the right listening point"
-                    raise ValueError(f"{patch.name} stays in stereo: {reason}")
-        return patch.model_copy(update={"pickup": pickup})
+                    raise ValueError(f"{instrument.name} stays in stereo: {reason}")
+        return instrument.model_copy(update={"pickup": pickup})
 
 
 def points_of(pickup: Pickup) -> dict[str, object]:
-    """The fields of `Listener` that a patch's pick-up says."""
+    """The fields of `Listener` that an instrument's pick-up says."""
     right = {"listen_right": pickup.points[1]} if len(pickup.points) > 1 else {}
     return {"listen": pickup.points[0], "stereo": len(pickup.points) > 1, "pickup": pickup.kind, **right}

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.patches.fields import parameter
+from app.instruments.fields import parameter
 from app.shared.value import Value
 from app.shared.vocabulary import DIFFERENCE
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
-from app.instrument.effects import added_words
+from app.player.effects import added_words
 from app.presets.library import Library, PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.note_sound import NoteSound, Struck
@@ -72,12 +72,12 @@ def through_words(choices: Choices) -> tuple[str, ...]:
 
     A string that sounds alone has one empty text.
     """
-    patch = choices.played
-    if patch is None:
+    instrument = choices.played
+    if instrument is None:
         return ("",)
-    name = f"heard through {patch.name}"
+    name = f"heard through {instrument.name}"
     if any(other_preset(voice) for voice in choices.voices):
         return f"keys are {name}, a string plucked by hand alone", f"keys {name}"
     if choices.source_heard == DIFFERENCE:
         return f"{name} without amplifier, body and room", name
-    return f"{name}: {added_words(patch)}", name
+    return f"{name}: {added_words(instrument)}", name

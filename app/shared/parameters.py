@@ -1,6 +1,6 @@
 """The table of parameters: each one's identity, range, unit, words and use, declared once.
 
-Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of patches and of the session's choices read it.
+Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of instruments and of the session's choices read it.
 It needs no engine but the ranges of a pluck, an amplifier, a body and a room.
 """
 
@@ -74,14 +74,14 @@ class Parameter:
     The unit is in the format of `taper`.
 
     Attributes:
-        id: its path, in a patch ("knobs.tension") or in the session's choices ("volume_db"); files hold it.
+        id: its path, in an instrument ("knobs.tension") or in the session's choices ("volume_db"); files hold it.
         label: on a knob.
         limits: the lowest and the highest value.
         group: title of the knobs that it stands with; "": none.
         modulation: what may change it besides its knob: a learned controller, also macros, also the modulation wheel.
         name: in a sentence or a list; empty: the label.
         wheel: its value at the modulation wheel's end; None: `wheel_factor` times its own value.
-        figure_unit: unit of the physical figure that its knob shows, see `app.instrument.facts`; None: none.
+        figure_unit: unit of the physical figure that its knob shows, see `app.player.facts`; None: none.
         whole: whether it is an integer, as one with words.
         words: for the integers from its lowest on; empty: they are shown as numbers.
 
@@ -255,7 +255,7 @@ MULTIPLIER = (0.05, 20.0)
 AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
 STROKES = "down", "up", "both"
 NOISE_DB = (-60.0, 6.0)  # the lowest is off
-_OF_PATCHES = (
+_OF_INSTRUMENTS = (
     Parameter("tuning.a4_hz", "A4", (220, 880), 440, CONCERT_PITCH, PITCH, name="pitch of A4"),
     Parameter(
         "tuning.transpose", "transpose", (-48, 48), 0, Taper(1, "{:+.0f}"), PITCH, name="transposition", whole=True
@@ -326,23 +326,23 @@ _OF_CHOICES = (
     Parameter("volume_db", "volume", (-60, 12), 6.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
     Parameter("difference_gain_db", "difference", DIFFERENCE_GAIN_RANGE_DB, 20.0, Taper(10, "{:+.0f} dB")),
 )
-OF_PATCHES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_PATCHES}
+OF_INSTRUMENTS: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_INSTRUMENTS}
 OF_CHOICES: Mapping[str, Parameter] = {parameter.id: parameter for parameter in _OF_CHOICES}
-MOST_MACROS = 8  # of a patch
+MOST_MACROS = 8  # of an instrument
 MACROS: Mapping[str, Parameter] = {
     id: Parameter(id, label, (0, 1), 0.5, PERCENT, modulation="learn")
     for id, label in ((f"macros.{number}", f"macro {number + 1}") for number in range(MOST_MACROS))
 }
 LEARNABLE: Mapping[str, Parameter] = {  # what a MIDI controller can be assigned to
-    id: parameter for id, parameter in {**OF_CHOICES, **MACROS, **OF_PATCHES}.items() if parameter.allows("learn")
+    id: parameter for id, parameter in {**OF_CHOICES, **MACROS, **OF_INSTRUMENTS}.items() if parameter.allows("learn")
 }
 
 
 def modulated_by(modulation: Modulation) -> Iterator[Parameter]:
-    """The parameters of patches that this kind of modulation may change, in the table's order."""
-    return (parameter for parameter in OF_PATCHES.values() if parameter.allows(modulation))
+    """The parameters of instruments that this kind of modulation may change, in the table's order."""
+    return (parameter for parameter in OF_INSTRUMENTS.values() if parameter.allows(modulation))
 
 
 def in_group(group: str) -> tuple[Parameter, ...]:
-    """The parameters of patches whose knobs stand together."""
-    return tuple(parameter for parameter in OF_PATCHES.values() if parameter.group == group)
+    """The parameters of instruments whose knobs stand together."""
+    return tuple(parameter for parameter in OF_INSTRUMENTS.values() if parameter.group == group)

@@ -22,7 +22,9 @@ from app.stage.stage import Chosen, Event, changed_names, first_stage, next_stag
 from app.stage.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset({"patch", "single", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"})
+RECORDED = frozenset(
+    {"instrument", "single", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"}
+)
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
@@ -94,9 +96,9 @@ class Session:
         """Take the values that a note brings: as `update`, but no step of undo."""
         self.send(Chosen(values, by_user=False))
 
-    def play_patch(self) -> None:
-        """Make the patch that is there the instrument: keys are pitches."""
-        if self.choices.patch is not None:
+    def play_instrument(self) -> None:
+        """Make the instrument that is there the instrument: keys are pitches."""
+        if self.choices.instrument is not None:
             self.update(single=None)
 
     def play_string(self) -> None:
@@ -167,7 +169,7 @@ class Session:
             return
         if self._held and not self._still_held():
             self.release()
-        fields |= {"patch"} if "single" in fields else set()  # for the step's words
+        fields |= {"instrument"} if "single" in fields else set()  # for the step's words
         step = Step(_values(before, fields), _values(self.choices, fields))
         now_s, turned = self._now_s(), turned_fields(step.before, step.after)
         soon = turned == self._turned and now_s - self._turned_s <= GATHER_S

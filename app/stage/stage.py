@@ -11,11 +11,11 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from app.instrument.compiled import is_another
-from app.instrument.drum_keys import DrumKeys
-from app.instrument.events import KEYS, NoteOn, PluckAt
-from app.instrument.strings import KeyString, Strings, on_string
-from app.patches.patch import Patch, StringSet
+from app.instruments.instrument import Instrument, StringSet
+from app.player.compiled import is_another
+from app.player.drum_keys import DrumKeys
+from app.player.events import KEYS, NoteOn, PluckAt
+from app.player.strings import KeyString, Strings, on_string
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering import BlowTake, RenderRequest, Take
@@ -32,7 +32,7 @@ Key = tuple[int, int | None]  # of an instrument, and its string of the set, as 
 
 @dataclass(frozen=True)
 class Chosen:
-    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the patch chooses the patch.
+    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the instrument chooses the instrument.
 
     Attributes:
         by_user: not by a note or by undo, so that undo can take it back.
@@ -130,36 +130,36 @@ class Stage:
     @property
     def drum_key(self) -> int | None:
         """The key of the drum that is shown and struck: the latest, or the lowest; None: no drum is played."""
-        drums, patch = self.choices.drums, self.choices.patch
-        if drums is None or patch is None:
+        drums, instrument = self.choices.drums, self.choices.instrument
+        if drums is None or instrument is None:
             return None
-        (low, high), latest = patch.range, -1 if self.key is None else self.key[0]
+        (low, high), latest = instrument.range, -1 if self.key is None else self.key[0]
         if low <= latest <= high and drums.of_key(latest) is not None:
             return latest
         return min(max(drums.drums[0].note, low), high)
 
-    def shown_key(self, patch: Patch) -> Key:
-        """The key whose string is shown: the one struck last, on its string, or the middle of the patch's range."""
-        (low, high), latest = patch.range, self.key
+    def shown_key(self, instrument: Instrument) -> Key:
+        """The key whose string is shown: the one struck last, on its string, or the middle of the instrument's range."""
+        (low, high), latest = instrument.range, self.key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
-    def shown_string(self, patch: Patch) -> KeyString | None:
+    def shown_string(self, instrument: Instrument) -> KeyString | None:
         """The string of the shown key; None: it has none. Raise ValueError: it is impossible."""
-        return Strings(patch).of_key(*self.shown_key(patch))
+        return Strings(instrument).of_key(*self.shown_key(instrument))
 
     def by_hand(self, pluck: Pluck | None = None) -> NoteOn | PluckAt:
         """A pluck, by default the chosen one, as a note of the key whose string is shown.
 
         It is of the string alone where keys do not play it so: of a single string, and beside another preset.
         """
-        patch, pluck = self.choices.played, pluck or self.choices.pluck
+        instrument, pluck = self.choices.played, pluck or self.choices.pluck
         beside_another = any(other_preset(voice) for voice in self.choices.voices)
-        if patch is None or self.choices.drums is not None or pluck.amplitude_mm == 0 or beside_another:
+        if instrument is None or self.choices.drums is not None or pluck.amplitude_mm == 0 or beside_another:
             return PluckAt(pluck)
         with contextlib.suppress(ValueError):  # reported when its key is struck
-            if (string := self.shown_string(patch)) is not None:
-                velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
-                return NoteOn(string.key, velocity, KEYS, string=self.shown_key(patch)[1], pluck=pluck)
+            if (string := self.shown_string(instrument)) is not None:
+                velocity = instrument.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
+                return NoteOn(string.key, velocity, KEYS, string=self.shown_key(instrument)[1], pluck=pluck)
         return PluckAt(pluck)
 
     @property
@@ -168,35 +168,35 @@ class Stage:
 
         After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
         """
-        patch, note, drum_key = self.choices.played, self.note, self.drum_key
-        if patch is None:
+        instrument, note, drum_key = self.choices.played, self.note, self.drum_key
+        if instrument is None:
             return None
         event: NoteOn | PluckAt
-        if isinstance(note, KeyNote) and note.patch.name == patch.name and note.event.pluck is None:
+        if isinstance(note, KeyNote) and note.instrument.name == instrument.name and note.event.pluck is None:
             event = note.event
         elif drum_key is not None:
             event = NoteOn(drum_key, self.choices.velocity, KEYS)
         else:
             event = self.by_hand()
-        return Struck(patch, event) if isinstance(event, NoteOn) else None
+        return Struck(instrument, event) if isinstance(event, NoteOn) else None
 
     @property
     def blow(self) -> RenderRequest | None:
         """The motion of the latest blow on the drums that are played, as it is heard now; None: there is none."""
-        request, note, patch = self.request, self.note, self.choices.patch
-        if request is None or request.struck is None or not isinstance(note, KeyNote) or patch is None:
+        request, note, instrument = self.request, self.note, self.choices.instrument
+        if request is None or request.struck is None or not isinstance(note, KeyNote) or instrument is None:
             return None
-        if note.patch.name != patch.name:
+        if note.instrument.name != instrument.name:
             return None
         return replace(request, seconds=self.choices.seconds, ear=self.choices.ear)
 
     @property
     def note_played(self) -> Note | None:
         """The latest note, where it is of the instrument that is played."""
-        note, patch = self.note, self.choices.played
+        note, instrument = self.note, self.choices.played
         if not isinstance(note, KeyNote):
             return note
-        return note if patch is not None and not is_another(patch, note.patch) else None
+        return note if instrument is not None and not is_another(instrument, note.instrument) else None
 
 
 NAMES = (*OBSERVED, *(name for name in Stage.__dataclass_fields__ if name != "choices"))
@@ -243,8 +243,8 @@ def changed_names(before: Stage, after: Stage) -> frozenset[str]:
 
 
 def _chosen(stage: Stage, values: Mapping[str, Any]) -> Stage:
-    patch = stage.choices.patch
-    if patch is not None and values.get("preset") == patch.preset:
+    instrument = stage.choices.instrument
+    if instrument is not None and values.get("preset") == instrument.preset:
         values = {**{name: value for name, value in values.items() if name != "preset"}, "single": None}
     chosen = replace(stage, choices=stage.choices.changed(values))
     return _with_own_string(chosen, stage.choices.played, values)
@@ -274,7 +274,7 @@ def _struck(stage: Stage, note: KeyNote) -> Stage:
     keys, choices, event = note.player.keys, stage.choices, note.event
     if not isinstance(keys, DrumKeys) or keys.of_key(event.key) is None:
         return stage
-    struck = Struck(note.patch, event)
+    struck = Struck(note.instrument, event)
     return _asked(stage, RenderRequest(note.path, choices.pluck, choices.seconds, choices.ear, struck=struck))
 
 
@@ -303,40 +303,40 @@ def _is_of(note: Note, request: RenderRequest) -> bool:
     return note.request is not None and (note.request.preset, note.request.pluck) == (request.preset, request.pluck)
 
 
-def _with_own_string(stage: Stage, before: Patch | None, asked: Collection[str]) -> Stage:
+def _with_own_string(stage: Stage, before: Instrument | None, asked: Collection[str]) -> Stage:
     """The stage that shows string and pluck of an instrument before it is played, and its pluck when that is turned.
 
     Args:
         before: the instrument that was played.
         asked: what was chosen with the instrument, as what undo or a file restores, stays.
     """
-    choices, patch = stage.choices, stage.choices.played
-    if patch is None or patch is before or choices.drums is not None:
+    choices, instrument = stage.choices, stage.choices.played
+    if instrument is None or instrument is before or choices.drums is not None:
         return stage
-    another = before is not None and is_another(patch, before)
+    another = before is not None and is_another(instrument, before)
     takes_string = choices.string is None or (another and "string" not in asked)
     if not takes_string:
         if choices.string is not None and (another or before is None):
-            stage = replace(stage, key=_key_of(patch, choices.string) or stage.key)
-        if before is None or patch.pluck == before.pluck:
+            stage = replace(stage, key=_key_of(instrument, choices.string) or stage.key)
+        if before is None or instrument.pluck == before.pluck:
             return stage
     with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
-        if (string := stage.shown_string(patch)) is not None:
-            own = asdict(on_string(string, patch.pluck.pluck(choices.velocity)))
+        if (string := stage.shown_string(instrument)) is not None:
+            own = asdict(on_string(string, instrument.pluck.pluck(choices.velocity)))
             values = {name: value for name, value in own.items() if name not in asked}
             values |= {"string": string.parameters} if takes_string else {}
             return replace(stage, choices=choices.changed(values))
     return stage
 
 
-def _key_of(patch: Patch, string: StringParameters) -> Key | None:
+def _key_of(instrument: Instrument, string: StringParameters) -> Key | None:
     """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
-    strings, pitch_hz = Strings(patch), string.pitch_hz
-    low, high = patch.range
+    strings, pitch_hz = Strings(instrument), string.pitch_hz
+    low, high = instrument.range
     key = next((key for key in range(low, high + 1) if _nearly_equal(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
     if key is None:
         return None
-    for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
+    for number in (None, *range(len(instrument.strings.strings) if isinstance(instrument.strings, StringSet) else 0)):
         with contextlib.suppress(ValueError):  # reported when it is struck
             key_string = strings.of_key(key, number)
             if key_string is not None and _nearly_equal(key_string.parameters.length_m, string.length_m):

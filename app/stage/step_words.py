@@ -1,4 +1,4 @@
-"""The change by a step of undo, in words: fields of pluck or patch, or the chosen patch."""
+"""The change by a step of undo, in words: fields of pluck or instrument, or the chosen instrument."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.session.listener import Listener
-from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from app.shared.value import Value
 
 MOST_NAMED = 2  # fields in one step's name
@@ -23,7 +23,7 @@ CHOICES = {  # fields of `Choices`
     "pickup": "pick-up",
     "string": "string",
 }
-PATCH = {  # other fields of a patch than parameters, by their path; the rest are named by the last part of theirs
+INSTRUMENT = {  # other fields of an instrument than parameters, by their path; the rest are named by the last part of theirs
     "name": "name of the instrument",
     "preset": "model",
     "range": "range of keys",
@@ -36,7 +36,7 @@ PATCH = {  # other fields of a patch than parameters, by their path; the rest ar
     "tuning.keymap": "keyboard mapping",
     "body.name": "body",
 }
-PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are those of `Listener` too
+PICKUP = {"pickup.points", "pickup.kind"}  # fields of an instrument that are those of `Listener` too
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -47,24 +47,26 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     """
     changed = [name for name in after if before[name] != after[name]]
     if "single" in changed:
-        return _patch_words(None, after["patch"]) if after["single"] is None else f"preset {after['single']}"
-    if "patch" in changed:
-        old, new = before["patch"], after["patch"]
+        return (
+            _instrument_words(None, after["instrument"]) if after["single"] is None else f"preset {after['single']}"
+        )
+    if "instrument" in changed:
+        old, new = before["instrument"], after["instrument"]
         heard = [CHOICES[name] for name in changed if name in Listener.model_fields]
         if heard and old is not None and new is not None and set(_changed(old, new)) <= PICKUP:
             return _join_words(heard)
-        return _patch_words(old, new)
+        return _instrument_words(old, new)
     return _join_words([words for name, words in CHOICES.items() if name in changed])
 
 
 def turned_fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """The fields of a step, and of a patch that has kept its name its own as "patch.PATH"."""
-    old, new = before.get("patch"), after.get("patch")
-    is_turned = isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name
-    return frozenset(after) | ({f"patch.{path}" for path in _changed(old, new)} if is_turned else set())
+    """The fields of a step, and of an instrument that has kept its name its own as "instrument.PATH"."""
+    old, new = before.get("instrument"), after.get("instrument")
+    is_turned = isinstance(old, Instrument) and isinstance(new, Instrument) and old.name == new.name
+    return frozenset(after) | ({f"instrument.{path}" for path in _changed(old, new)} if is_turned else set())
 
 
-def _patch_words(before: Patch | None, after: Patch | None) -> str:
+def _instrument_words(before: Instrument | None, after: Instrument | None) -> str:
     if after is None:
         return "no instrument"
     if before is None:
@@ -79,10 +81,10 @@ def _patch_words(before: Patch | None, after: Patch | None) -> str:
 
 
 def field_words(field: str) -> str:
-    """A patch's field, by its path."""
-    if field in OF_PATCHES:
-        return OF_PATCHES[field].name
-    return PATCH.get(field, field.rpartition(".")[2].replace("_", " "))
+    """An instrument's field, by its path."""
+    if field in OF_INSTRUMENTS:
+        return OF_INSTRUMENTS[field].name
+    return INSTRUMENT.get(field, field.rpartition(".")[2].replace("_", " "))
 
 
 def _changed(before: object, after: object, path: str = "") -> Iterator[str]:
@@ -98,7 +100,7 @@ def _changed(before: object, after: object, path: str = "") -> Iterator[str]:
 
 
 def _names(part: object) -> Collection[str]:
-    """The names of the fields of a part of a patch; none where it has no parts."""
+    """The names of the fields of a part of an instrument; none where it has no parts."""
     if isinstance(part, Value):
         return type(part).model_fields
     return [part_field.name for part_field in fields(part)] if is_dataclass(part) else ()

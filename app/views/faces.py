@@ -15,13 +15,13 @@ Area = Literal[
     "slots",  # A and B
     "pluck",  # shape, position, amplitude and width of the drawn pluck
     "time",  # duration and slow motion
-    "patch",  # the instrument's bar, the knobs of its string and of techniques
+    "instrument",  # the instrument's bar, the knobs of its string and of techniques
     "growth",  # header: a sign where the error grew
 ]  # the string, its listening point, the keys and the output are in both
 
 FACES: Mapping[Face, frozenset[Area]] = {
-    "play": frozenset({"patch", "growth"}),
-    "lab": frozenset(get_args(Area)) - {"patch", "growth"},
+    "play": frozenset({"instrument", "growth"}),
+    "lab": frozenset(get_args(Area)) - {"instrument", "growth"},
 }
 TITLES: tuple[tuple[Face, str, str], ...] = (
     ("play", "Play", "Play the instrument (F9)"),

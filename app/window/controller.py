@@ -48,18 +48,18 @@ from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.figures import Figures
 from app.window.inputs import Inputs
+from app.window.instrument_desk import TAKEN_FILES, InstrumentDesk
 from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Location, Panel, StringPanel
 from app.window.panels.drum import DrumPanel
-from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.remembering import SettingsSaver
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
 if TYPE_CHECKING:
-    from app.instrument.learned import Kept
+    from app.player.learned import Kept
 
 LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
 IDLE_LOOK_MS = 50  # while nothing moves
@@ -130,8 +130,8 @@ class Controller(QObject):
         self.inputs = Inputs(window, self.session, self.library, settings.midi, self.performance)
         self.inputs.begun.connect(self._wake)
         self.inputs.midi.start()
-        self.patches = PatchDesk(
-            window, self.session, self.library, self.performance, self.inputs, settings.patch_favourites
+        self.instruments = InstrumentDesk(
+            window, self.session, self.library, self.performance, self.inputs, settings.instrument_favourites
         )
         window.instrument.bar.takes.choose(dict(settings.record))
         window.show_keys(settings.instrument.shown)
@@ -141,12 +141,12 @@ class Controller(QObject):
             window,
             self.session,
             self.library,
-            self.patches.recordings,
+            self.instruments.recordings,
             (settings.export, settings.sampled),
         )
-        self.drag_out = DragOut(window, self.exports, self.patches.recordings)
+        self.drag_out = DragOut(window, self.exports, self.instruments.recordings)
         self.figures = Figures(window, self.session, self.library)
-        self.leaving = Leaving(window, self.patches.recordings, self.exports)
+        self.leaving = Leaving(window, self.instruments.recordings, self.exports)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect()
         self._connect_actions()
@@ -157,9 +157,9 @@ class Controller(QObject):
         self.session.changed.connect(self._stage_changed)
         self._stage_changed(frozenset(OBSERVED))
         self._duties = [
-            Duty(KEYS_EVERY_S, self.patches.tick),
+            Duty(KEYS_EVERY_S, self.instruments.tick),
             Duty(FACTS_EVERY_S, self._show_facts),
-            Duty(JUDGED_EVERY_S, self.patches.judge),
+            Duty(JUDGED_EVERY_S, self.instruments.judge),
             Duty(1.0, self.inputs.midi.look),
             Duty(1.0, self.keeper.look),
         ]
@@ -210,14 +210,14 @@ class Controller(QObject):
         """Play returns to the instrument, which a preset of the Lab may have replaced."""
         self.session.update(face=face)
         if face == "play":
-            self.session.play_patch()
+            self.session.play_instrument()
 
     def _connect_actions(self) -> None:
         """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
         window = self.window
         session = self.session
         does: dict[str, Callable[[], object]] = {
-            "record": self.patches.recordings.record,
+            "record": self.instruments.recordings.record,
             "takes": window.instrument.bar.popup_takes,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
@@ -225,15 +225,15 @@ class Controller(QObject):
             "models": self._compare_models,
             "undo": lambda: self._step(session.undo, session.undo_words, "Undone", "Nothing to undo"),
             "redo": lambda: self._step(session.redo, session.redo_words, "Redone", "Nothing to redo"),
-            "save": self.patches.save,
+            "save": self.instruments.save,
             "copy": lambda: self.drag_out.ask("note", "copy"),
-            "save_as": self.patches.save_as,
-            "revert": self.patches.revert,
+            "save_as": self.instruments.save_as,
+            "revert": self.instruments.revert,
             "compare": window.instrument.bar.compare.click,
             "play": self.play_or_stop,
             "trained": self.pluck_as_trained,
             **{field: partial(self._toggle, field) for field in ("loop", "motion", "envelope")},
-            "instruments": self.patches.toggle,
+            "instruments": self.instruments.toggle,
             "browse": self.presets.toggle,
             "previous": lambda: self.presets.step(-1),
             "next": lambda: self.presets.step(1),
@@ -317,8 +317,8 @@ class Controller(QObject):
 
     def play_or_stop(self) -> None:
         if self._abx is None:
-            was_playing = self.patches.playing
-            self.patches.stop()
+            was_playing = self.instruments.playing
+            self.instruments.stop()
             if self.performance.playing:
                 self.performance.stop()
             elif not was_playing:  # in a rest of a file nothing rings
@@ -366,11 +366,11 @@ class Controller(QObject):
     def take_file(self, file: Path) -> None:
         """Take a dropped file: install and choose a preset, restore an export's recipe; ask what other sounds are.
 
-        Patches, scales and MIDI files go to `patches`.
+        Instruments, scales and MIDI files go to `instruments`.
         """
         self.window.places.opened(file)
         if file.suffix.lower() in TAKEN_FILES:
-            self.patches.take_file(file)
+            self.instruments.take_file(file)
             return
         dropped = receive(file, self.library)
         if dropped.sound:
@@ -384,7 +384,7 @@ class Controller(QObject):
         except ValueError as error:  # a recipe that was edited, or of another version
             notice = f"{file}: its choices cannot be restored here ({error})."
         if dropped.body:
-            self.patches.take_body(dropped.body)
+            self.instruments.take_body(dropped.body)
         if notice:
             self.window.notices.report(notice)
 
@@ -410,9 +410,11 @@ class Controller(QObject):
     def _play_learned(self, kept: Kept) -> None:
         """Choose an instrument that was just learned."""
         self.library.refresh()
-        self.patches.reload()
-        self.patches.take_file(kept.patch)
-        self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}", file=kept.patch)
+        self.instruments.reload()
+        self.instruments.take_file(kept.instrument)
+        self.window.notices.inform(
+            f"{kept.instrument.stem}: learned. Its report: {kept.report}", file=kept.instrument
+        )
 
     def close(self) -> None:
         """Save the settings and end every thread."""
@@ -424,7 +426,7 @@ class Controller(QObject):
         self.keeper.close()
         self.exports.close()
         self.drag_out.close()
-        self.patches.close()
+        self.instruments.close()
         self.inputs.close()
         for panel in self.panels:
             panel.end()
@@ -445,7 +447,7 @@ class Controller(QObject):
                 "look": self.window.look,
                 "midi": self.inputs.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
-                "patch_favourites": tuple(sorted(self.patches.favourites)),
+                "instrument_favourites": tuple(sorted(self.instruments.favourites)),
                 "instrument": InstrumentChoice(
                     shown=self.window.shows_keys,
                     surface=self.window.instrument.surface,
@@ -479,12 +481,12 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
-        if names & {"patch", "single"}:
+        if names & {"instrument", "single"}:
             self._show_kind()
             self._show_trained()
         window.show_solo(choices.solo)
         window.show_through(*through_words(choices))
-        self.patches.choices_changed(names)
+        self.instruments.choices_changed(names)
         self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)

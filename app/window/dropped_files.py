@@ -13,7 +13,7 @@ from app.audio.impulse_file import LONGEST_FILE_S, ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, RecipeError, SoundRecipe, changed_notices, preset_of, read_recipe
-from app.instrument.bodies import ENDINGS, install_body
+from app.player.bodies import ENDINGS, install_body
 from app.presets.install import SUFFIX, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
@@ -28,7 +28,7 @@ SOUNDS = (*ENDINGS, ".ogg", ".oga", ".opus")
 
 @dataclass(frozen=True)
 class Dropped:
-    """The results of a dropped file: new values of `Choices`, a notice for the user, a body for the patch.
+    """The results of a dropped file: new values of `Choices`, a notice for the user, a body for the instrument.
 
     Attributes:
         notice: "" for none.
@@ -75,7 +75,7 @@ def _other_sound(file: Path) -> Dropped:
 
 
 def receive_body(file: Path) -> Dropped:
-    """Install an impulse response as a body, which the patch then has. Errors become notices."""
+    """Install an impulse response as a body, which the instrument then has. Errors become notices."""
     try:
         return Dropped(body=install_body(file), notice=cut_words(file))
     except (ImpulseError, WriteError) as error:
@@ -98,7 +98,9 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
         played: dict[str, Any] = (
-            {"single": name_text(path.stem)} if recipe.struck is None else {"played": recipe.struck.found()[0].patch}
+            {"single": name_text(path.stem)}
+            if recipe.struck is None
+            else {"played": recipe.struck.found()[0].instrument}
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
@@ -115,7 +117,7 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
 def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
     """The fields of `Choices` that a recipe sets, without the instrument. Of a key, no pluck and no pick-up.
 
-    Of a single string, the patch that is there and its pick-up stay as they are.
+    Of a single string, the instrument that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
     fields: dict[str, Any] = {

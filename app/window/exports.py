@@ -13,7 +13,7 @@ from app.export.job import ExportJob
 from app.export.note import HeardNote, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.export.takes import RecordedTake
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
 from app.rendering.note_sound import Struck
@@ -26,7 +26,7 @@ from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerforma
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
-PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
+PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "instrument"}
 ESCAPE = Qt.Key.Key_Escape
 HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", *Monitor.model_fields} - {"level_match"}
 
@@ -111,9 +111,9 @@ class Exports(QObject):
     def subjects(self) -> dict[Kind, Any]:
         """The subjects that can be exported now, by kind; None: nothing."""
         choices, take = self._session.choices, self._recordings.offered
-        patch = choices.patch
-        player = None if patch is None else self._library.find(patch.preset)
-        heard = None if patch is None or player is None else HeardInstrument(patch, player)
+        instrument = choices.instrument
+        player = None if instrument is None else self._library.find(instrument.preset)
+        heard = None if instrument is None or player is None else HeardInstrument(instrument, player)
         return {
             "note": heard_note(choices, self._library, self._session.stage.struck),
             "models": self.models,
@@ -123,7 +123,7 @@ class Exports(QObject):
         }
 
     def _performance(self, take: RecordedTake) -> HeardPerformance:
-        preset = self._library.find(take.played.patch.preset)
+        preset = self._library.find(take.played.instrument.preset)
         return HeardPerformance(take.played, None if preset is None else preset.path, take.name)
 
     def _exported(self, job: ExportJob) -> None:
@@ -166,7 +166,7 @@ def _pluck_name(choices: Choices, entry: PresetEntry) -> str:
     """The name for a file: of the instrument whose key was played, else of the preset."""
     string = choices.string or entry.info.string
     title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
-    if isinstance(choices.played, Patch):
+    if isinstance(choices.played, Instrument):
         pluck = choices.played.pluck
         title, amplitudes_mm = choices.played.name, (pluck.softest_mm, pluck.hardest_mm)
     return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)

@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
+from app.player.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.playing.playback import Due
@@ -61,8 +61,8 @@ class Inputs(QObject):
         return PluckRange.of(entry.info if entry else None)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        self._keys.piano = self._session.choices.plays_patch
-        self.midi.show_patch(self._session.choices.patch)
+        self._keys.piano = self._session.choices.plays_instrument
+        self.midi.show_instrument(self._session.choices.instrument)
 
     def play(self, event: Event, due: Due | None = None) -> None:
         """Play an event, at once or when it is due. Any thread."""
@@ -105,7 +105,7 @@ class Inputs(QObject):
 
     def _press(self, press: KeyPress) -> None:
         choices = self._session.choices
-        if choices.plays_patch:
+        if choices.plays_instrument:
             self._press_piano(press)
             return
         if (place := place_of(press)) is not None:

@@ -18,7 +18,7 @@ if sys.platform == "win32":
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
-from app.patches.library import FIRST, PatchError, read_patch
+from app.instruments.library import FIRST, InstrumentError, read_instrument
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.shared.thread_priority import leave_a_core
@@ -35,17 +35,17 @@ if TYPE_CHECKING:
 Alive = Callable[["Controller"], None]
 CANNOT_START = "The models cannot be loaded, so the program cannot be used."
 UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do not, restart the program."
-PATIENCE_S = 5.0  # for the sound device and the patch's preset, before a file is taken
+PATIENCE_S = 5.0  # for the sound device and the instrument's preset, before a file is taken
 LOOK_MS = 20
 
 
-def with_patch(settings: Settings) -> Settings:
-    """The settings, with the patch FIRST where no patch was ever chosen: keys play from the first start on."""
-    if settings.choices.patch is not None:
+def with_instrument(settings: Settings) -> Settings:
+    """The settings, with the instrument FIRST where no instrument was ever chosen: keys play from the first start on."""
+    if settings.choices.instrument is not None:
         return settings
-    with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
-        patch = read_patch(FIRST)
-        update = {"patch" if settings.choices.preset else "played": patch}
+    with contextlib.suppress(InstrumentError):  # without an instrument, keys pluck at ten places
+        instrument = read_instrument(FIRST)
+        update = {"instrument" if settings.choices.preset else "played": instrument}
         return settings.model_copy(update={"choices": settings.choices.changed(update)})
     return settings
 
@@ -105,7 +105,7 @@ class _Start(QObject):
         if self._notice:
             self._window.notices.report(self._notice)
         self._alive(self._controller)
-        QTimer.singleShot(0, self._controller.patches.recordings.offer_left)
+        QTimer.singleShot(0, self._controller.instruments.recordings.offer_left)
         self._patience_s = time.monotonic() + PATIENCE_S
         self._window.face_asked.connect(self._prepare)
         self._follow_up()
@@ -179,7 +179,7 @@ def run(
     leave_a_core()
     path = settings_file()
     settings, notice = load_settings(path)
-    settings = with_patch(settings)
+    settings = with_instrument(settings)
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("Learned Strings")

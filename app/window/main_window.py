@@ -204,7 +204,7 @@ class MainWindow(QMainWindow):
         self.transport.add_group(self.instrument.knobs.technique)
         self._areas: dict[Area, tuple[QWidget, ...]] = {
             "preset": (self.presets,),
-            "patch": (self.instrument.knobs.technique,),
+            "instrument": (self.instrument.knobs.technique,),
             **self.transport.areas,
         }
         self._column = column = filled(QVBoxLayout(), head, self._facts)
@@ -315,7 +315,7 @@ class MainWindow(QMainWindow):
         for area, widgets in self._areas.items():
             for widget in widgets:
                 widget.setVisible(self._shows(area))
-        self.instrument.show_patch_area(self._shows("patch"))
+        self.instrument.show_instrument_area(self._shows("instrument"))
         self.action["keys"].setEnabled(face == "lab")
         self._column.setStretchFactor(self.instrument, int(face == "play"))
         self._show_growth()

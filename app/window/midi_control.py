@@ -11,8 +11,8 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
-from app.instrument.events import ControlChange, Event, NoteOn, fixed_function
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.events import ControlChange, Event, NoteOn, fixed_function
 from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
@@ -48,7 +48,7 @@ class MidiControl(QObject):
         self._handle, self._play_note = handle, play_note
         self._learning: str | None = None  # the field to which the next controller is assigned
         self._dialog: MidiDialog | None = None
-        self._patch: Patch | None = None
+        self._instrument: Instrument | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load, handle)
 
@@ -77,7 +77,7 @@ class MidiControl(QObject):
         """Open the dialog, which does not block the window, or bring it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(window)
-            dialog.patch_turned.connect(self._turn_patch)
+            dialog.instrument_turned.connect(self._turn_instrument)
             dialog.port_chosen.connect(self._choose_port)
             dialog.notes_chosen.connect(self._choose_notes)
             dialog.learn_asked.connect(self._learn)
@@ -85,7 +85,7 @@ class MidiControl(QObject):
             dialog.finished.connect(lambda _: self._learn(""))
         self._show_inputs()
         self._show_choices()
-        self.show_patch(self._patch)
+        self.show_instrument(self._instrument)
         self._dialog.show()
         self._dialog.raise_()
 
@@ -100,15 +100,15 @@ class MidiControl(QObject):
         if self._dialog is not None:
             self._dialog.show_choices(self.choices, self._learning)
 
-    def show_patch(self, patch: Patch | None) -> None:
-        """Show the patch that is played; None for none."""
-        self._patch = patch
+    def show_instrument(self, instrument: Instrument | None) -> None:
+        """Show the instrument that is played; None for none."""
+        self._instrument = instrument
         if self._dialog is not None:
-            self._dialog.show_patch(patch)
+            self._dialog.show_instrument(instrument)
 
-    def _turn_patch(self, field: str, value: object) -> None:
-        if self._patch is not None:
-            self.performed.emit({"patch": Patch.model_validate({**dict(self._patch), field: value})})
+    def _turn_instrument(self, field: str, value: object) -> None:
+        if self._instrument is not None:
+            self.performed.emit({"instrument": Instrument.model_validate({**dict(self._instrument), field: value})})
 
     def _choose_port(self, name: str) -> None:
         assert self._dialog is not None
@@ -172,5 +172,5 @@ class MidiControl(QObject):
             if self._dialog is not None:
                 self._dialog.show_problem("")
             self.input.release_all()  # it may be the modulation wheel, whose way back would no longer be played
-        if changes := turns_of(event, self.choices, self._patch):
+        if changes := turns_of(event, self.choices, self._instrument):
             self.performed.emit(changes)

@@ -13,8 +13,8 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from app.audio.sound import Sound
-from app.instrument.events import Event, NoteOn, PluckAt
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.events import Event, NoteOn, PluckAt
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
@@ -96,10 +96,10 @@ class Performance(QObject):
 
     @property
     def playable(self) -> bool:
-        """Return True if a pluck and the patch's key, if any, would sound at once; of drums a key alone."""
+        """Return True if a pluck and the instrument's key, if any, would sound at once; of drums a key alone."""
         if self._plays_drums:
             return self._sound.status().changes_done > 0 and self.notes.keys.player is not None
-        return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)
+        return self.at_hand and (self._session.choices.instrument is None or self.notes.keys.player is not None)
 
     @property
     def playing(self) -> bool:
@@ -126,7 +126,7 @@ class Performance(QObject):
     def match(self) -> Mapping[str, float] | None:
         """The factor by source that brings what is chosen to the level of the truth; None: not known yet."""
         note = self._session.stage.note
-        keys = isinstance(note, KeyNote) and self._session.choices.plays_patch
+        keys = isinstance(note, KeyNote) and self._session.choices.plays_instrument
         return note.match if note is not None and keys else self.notes.match
 
     def moment(self, elapsed_s: float) -> Moment:
@@ -176,8 +176,8 @@ class Performance(QObject):
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
             self._hear_dry()
-        if names & {"patch", "single"}:  # ends a comparison
-            self.notes.set_instrument(choices.patch, choices.ear, choices.single)
+        if names & {"instrument", "single"}:  # ends a comparison
+            self.notes.set_instrument(choices.instrument, choices.ear, choices.single)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         stage = self._session.stage
@@ -203,7 +203,7 @@ class Performance(QObject):
     def play_preset(self, name: str) -> None:
         """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
         choices = self._session.choices
-        self.notes.set_instrument(choices.patch, choices.ear, name)
+        self.notes.set_instrument(choices.instrument, choices.ear, name)
 
     def handle(self, event: Event, due: Due | None = None) -> PluckVoices | KeyNote | None:
         """Play an event; the note that it began, or None. Any thread."""
@@ -220,12 +220,12 @@ class Performance(QObject):
         """Leave body and room out in a blind test, and while the difference is heard."""
         self.notes.hear_dry(self.compared or self._session.choices.source_heard == DIFFERENCE)
 
-    def hear_patch(self, patch: Patch | None) -> None:
-        """Let keys play this patch until another is chosen; None: the chosen one. The choices stay."""
+    def hear_instrument(self, instrument: Instrument | None) -> None:
+        """Let keys play this instrument until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
-        if patch is not None:
-            choices = choices.changed({"patch": patch})
-        self.notes.set_instrument(choices.patch, choices.ear, choices.single)
+        if instrument is not None:
+            choices = choices.changed({"instrument": instrument})
+        self.notes.set_instrument(choices.instrument, choices.ear, choices.single)
 
     def close(self) -> None:
         """End the threads; may be called again."""

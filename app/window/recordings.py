@@ -1,4 +1,4 @@
-"""Recordings of what is played through the patch: the takes of a session, of which unsaved ones are kept on disk."""
+"""Recordings of what is played through the instrument: the takes of a session, of which unsaved ones are kept on disk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from app.export.journal import Journal, left_journals, recordings_folder
 from app.export.played import Played, PlayedExport
 from app.export.takes import RecordedTake, free_path
 from app.export.wav import WavSettings
-from app.instrument.events import Meter, NoteOn, PatchTurned
+from app.player.events import InstrumentTurned, Meter, NoteOn
 from app.playing.metronome import Metronome
 from app.playing.notes import Notes
 from app.playing.recorder import EventRecorder
@@ -179,7 +179,7 @@ class Recordings(QObject):
             self.end()
             self.save()
             return
-        if not self._session.choices.plays_patch:
+        if not self._session.choices.plays_instrument:
             self._notices.inform("Keys of an instrument are recorded; plucks of a single string are not.")
         meter = self._bar.takes.meter
         self._meter = meter if meter.metronome or meter.count_in_bars else None
@@ -194,7 +194,7 @@ class Recordings(QObject):
         if not self._unsaved or self._writing.busy:
             return
         take = self._unsaved[-1]
-        entry = self._library.find(take.played.patch.preset)
+        entry = self._library.find(take.played.instrument.preset)
         if self._place is None or entry is None:
             self._export(take)
             return
@@ -267,7 +267,7 @@ class Recordings(QObject):
             self._notices.inform("An earlier recording is not saved yet; the next start offers it.")
             answer = LATER
         else:
-            lines = "\n".join(_words(played, played.patch.name) for played in journals)
+            lines = "\n".join(_words(played, played.instrument.name) for played in journals)
             were = "These recordings were" if len(journals) > 1 else "This recording was"
             question = f"{were} not saved when the app ended.\n\n{lines}"
             answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
@@ -295,15 +295,17 @@ class Recordings(QObject):
         events = self._keys.recorder.end()
         journal = self._journaling.end()
         self._bar.show_recording(None)
-        patches = [timed_event.event.patch for timed_event in events if isinstance(timed_event.event, PatchTurned)]
-        patch = patches[0] if patches else self._session.choices.patch
-        if not events or patch is None:
+        instruments = [
+            timed_event.event.instrument for timed_event in events if isinstance(timed_event.event, InstrumentTurned)
+        ]
+        instrument = instruments[0] if instruments else self._session.choices.instrument
+        if not events or instrument is None:
             if journal is not None:
                 journal.delete()
             self._notices.inform("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
-        self._add(Played(patch, tuple(events), *_heard(choices), self._began, self._meter), journal)
+        self._add(Played(instrument, tuple(events), *_heard(choices), self._began, self._meter), journal)
         if choices.solo:
             self._notices.inform(f"The recording has all modes, although mode {choices.solo} is soloed.")
 
@@ -311,7 +313,7 @@ class Recordings(QObject):
         self._journaling.hear(*_heard(self._session.choices))
 
     def _add(self, played: Played, journal: Journal | None) -> None:
-        self._asked = RecordedTake(played, journal, played.patch.name)
+        self._asked = RecordedTake(played, journal, played.instrument.name)
         self._takes.append(self._asked)
         self._show_takes()
 

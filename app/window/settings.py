@@ -16,7 +16,7 @@ from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
-from app.instrument.events import Meter
+from app.player.events import Meter
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
 from app.shared.value import Value
@@ -55,16 +55,16 @@ class Settings(Value):
     look: Look = Look()
     midi: MidiChoices = MidiChoices()
     favourites: tuple[str, ...] = FIRST_FAVOURITES  # names of presets
-    patch_favourites: tuple[str, ...] = ()  # names of their files
+    instrument_favourites: tuple[str, ...] = ()  # names of their files
     instrument: InstrumentChoice = InstrumentChoice()
     window_geometry: str = ""  # Qt's, in base64
 
     @model_validator(mode="before")
     @classmethod
     def _take_old(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "patch_favourites" in data:  # until 0.2
+        if isinstance(data, dict) and "instrument_favourites" in data:  # until 0.2
             data = dict(data)
-            data["patch_favourites"] = data.pop("patch_favourites")  # until 0.2
+            data["instrument_favourites"] = data.pop("instrument_favourites")  # until 0.2
         return data
 
 

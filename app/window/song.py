@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QObject
 
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.player.events import NoteOff, NoteOn, TimedEvent
 from app.playing.playback import Playback
 from app.views.controls.song_strip import SongStrip
 

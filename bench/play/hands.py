@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 from random import Random
 
-from app.patches.drums import Drums
-from app.patches.patch import Patch
+from app.instruments.drums import Drums
+from app.instruments.instrument import Instrument
 from bench.play.screen import Screen
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
@@ -18,22 +18,22 @@ HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
-def octave_of(instrument: Patch | str) -> int:
+def octave_of(instrument: Instrument | str) -> int:
     """The octave of the computer's keys in which most of them sound, the nearest to 0; of a preset's string 0."""
     if isinstance(instrument, str):
         return 0
     return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(instrument, octave)), -abs(octave)))
 
 
-def keys_of(instrument: Patch | str) -> tuple[str, ...]:
+def keys_of(instrument: Instrument | str) -> tuple[str, ...]:
     """The computer's keys that sound in that octave."""
     if isinstance(instrument, str):
         return ROW
     return tuple(KEYS[place] for place in _sounding(instrument, octave_of(instrument)))
 
 
-def _sounding(patch: Patch, octave: int) -> list[int]:
-    (low, high), drums = patch.range, patch.strings if isinstance(patch.strings, Drums) else None
+def _sounding(instrument: Instrument, octave: int) -> list[int]:
+    (low, high), drums = instrument.range, instrument.strings if isinstance(instrument.strings, Drums) else None
     midi = [(place, LOWEST + 12 * octave + place) for place in range(len(KEYS))]
     return [place for place, key in midi if low <= key <= high and (drums is None or drums.of_key(key) is not None)]
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.audio.choices import Buffer
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from bench.play import analysis, hands
 from bench.play.calibration import Holding, transit
 from bench.play.children import child
@@ -128,7 +128,7 @@ def measure(
     buffer: Buffer,
     busy: bool,
     seed: int,
-    instrument: Patch | str,
+    instrument: Instrument | str,
     report: ProgressReport,
 ) -> dict[str, Any]:
     """Play single plucks of an instrument, or of a preset's string, then for `seconds` so many notes per second."""

@@ -17,7 +17,7 @@ from pathlib import Path
 import psutil
 
 from app.audio.choices import Buffer, SoundChoice
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.session.choices import Choices
 from app.window.settings import Settings, save_settings
 from bench.play import hands
@@ -90,7 +90,7 @@ class Program:
 
 @contextlib.contextmanager
 def program(
-    instrument: Patch | str, buffer: Buffer, report: ProgressReport, *, calibrated: bool = False
+    instrument: Instrument | str, buffer: Buffer, report: ProgressReport, *, calibrated: bool = False
 ) -> Iterator[Program]:
     """Start the program with an instrument, and wait until its first key is heard. A single string is in the Lab.
 

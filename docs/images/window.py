@@ -90,7 +90,7 @@ def _play(controller: Controller) -> Iterator[None]:
     """Switches to Play, waits for the guitar and plays a chord."""
     window = controller.window
     controller.session.update(face="play", speed=0.004, seconds=4.0)
-    controller.patches.choose("classical_guitar")
+    controller.instruments.choose("classical_guitar")
     window.instrument.show_surface("neck")
     window.resize(1280, 800)
     while controller.performance.notes.keys.player is None:

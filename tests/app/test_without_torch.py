@@ -13,15 +13,15 @@ ROOT = Path(__file__).parents[2]
 
 OFFLINE = """
 import sys
-from app.instrument.events import (NoteOn, TimedEvent)
-from app.instrument.offline import render_events
-from app.patches.library import SHIPPED, read_patch
+from app.player.events import (NoteOn, TimedEvent)
+from app.player.offline import render_events
+from app.instruments.library import SHIPPED, read_instrument
 from engine.presets import find_preset, load_preset
 
-patch = read_patch(SHIPPED / "classical_guitar.json")
-preset = load_preset(find_preset(patch.preset))
+instrument = read_instrument(SHIPPED / "classical_guitar.json")
+preset = load_preset(find_preset(instrument.preset))
 for source in ("model", "truth", "difference"):
-    blocks = list(render_events(patch, preset, [TimedEvent(0.0, NoteOn(52, 100))], 48_000, source, seconds=0.2))
+    blocks = list(render_events(instrument, preset, [TimedEvent(0.0, NoteOn(52, 100))], 48_000, source, seconds=0.2))
     assert source == "difference" or max(abs(block).max() for block in blocks) > 0.01
 assert "torch" not in sys.modules
 """
@@ -29,7 +29,7 @@ assert "torch" not in sys.modules
 WINDOW = """
 import sys, threading
 from PySide6.QtCore import QTimer
-from app.instrument.events import (NoteOn)
+from app.player.events import (NoteOn)
 from app.window import main
 
 keys, drawn, loaded, timer = [45, 64], [], [], QTimer(interval=20)

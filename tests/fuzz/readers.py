@@ -16,8 +16,11 @@ import torch
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import InstrumentSound, RecipeError, SoundRecipe, read_recipe
 from app.export.wav import WavSettings
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import (
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import InstrumentError, read_instrument
+from app.instruments.tuning import Tuning, TuningChoice, read_scala
+from app.player.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import (
     LONGEST_S,
     MOST_EVENTS,
     MidiFileError,
@@ -26,9 +29,6 @@ from app.instrument.midi_file import (
     read_parts,
     read_song,
 )
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import PatchError, read_patch
-from app.patches.tuning import Tuning, TuningChoice, read_scala
 from app.rendering.note_sound import NoteSound
 from app.window.settings import Settings, load_settings
 from engine.effects import Body, Effects
@@ -215,7 +215,7 @@ def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
     return "\n".join(lines).encode()
 
 
-MPE = read_patch(PATCHES / "long_wire.json").model_copy(update={"mode": "mpe"})
+MPE = read_instrument(INSTRUMENTS / "long_wire.json").model_copy(update={"mode": "mpe"})
 
 
 def song(path: Path) -> None:
@@ -240,7 +240,7 @@ SONG = midi_bytes(
         TimedEvent(0.2, ControlChange(64, 127)),
     ]
 )
-PATCH = min(PATCHES.glob("*.json"))
+INSTRUMENT = min(INSTRUMENTS.glob("*.json"))
 SCALE = b"! a.scl\n!\nfifths and thirds\n 5\n!\n 9/8\n 386.3\n 3/2\n 5/3\n 2/1\n"
 KEYMAP = b"7\n0\n127\n60\n69\n440.0\n12\n0\n2\n4\n5\n7\n9\n11\n"
 PLAN = b"""description = "a plan"
@@ -306,7 +306,7 @@ TARGETS = (
     Target("rows.csv", row_file, read_results, (SchemaError,)),
     Target("heard.csv", lambda p: HEARD, heard, ()),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
-    Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
+    Target("instrument.json", lambda p: INSTRUMENT.read_bytes(), read_instrument, (InstrumentError,), json_or_bytes),
     Target("song.mid", lambda p: SONG, song, (MidiFileError,)),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),

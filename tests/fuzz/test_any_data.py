@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from app.export.recipe import SoundRecipe
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
 from engine import bounds
@@ -49,7 +49,7 @@ def test_any_data_is_read_or_refused(kind: type, data: st.DataObject) -> None:
         assert read(kind, write(value), "there") == value
 
 
-@given(facts=fields_of(Settings), choices=fields_of(Choices, "preset", "patch", "keys_play"))
+@given(facts=fields_of(Settings), choices=fields_of(Choices, "preset", "instrument", "keys_play"))
 def test_any_settings_file_lets_the_app_start(
     tmp_path_factory: pytest.TempPathFactory, facts: dict[str, Any], choices: dict[str, Any]
 ) -> None:
@@ -59,9 +59,9 @@ def test_any_settings_file_lets_the_app_start(
     assert isinstance(settings, Settings) and notice.isprintable() and len(notice) <= LONGEST_MESSAGE
 
 
-@pytest.mark.parametrize("kind", [Patch, SoundRecipe])
+@pytest.mark.parametrize("kind", [Instrument, SoundRecipe])
 @given(data=st.data())
-def test_any_document_is_checked(kind: type[Patch | SoundRecipe], data: st.DataObject) -> None:
+def test_any_document_is_checked(kind: type[Instrument | SoundRecipe], data: st.DataObject) -> None:
     facts = data.draw(fields_of(kind))
     try:
         value = kind.model_validate(facts)

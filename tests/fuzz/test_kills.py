@@ -23,7 +23,7 @@ KILLS = {  # 200 in all with `run.py test --fuzz`
     "train": (1, 20),
     "train_lru": (0, 15),
     "sweep": (0, 10),  # its workers load torch again each time
-    "save_patches": (2, 20),
+    "save_instruments": (2, 20),
     "save_many_settings": (2, 25),
 }
 

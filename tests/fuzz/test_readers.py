@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.export.recipe import SoundRecipe
-from app.instrument.bodies import own_bodies
-from app.instrument.midi_file import MOST_EVENTS, read_midi
-from app.patches.library import list_patches
-from app.patches.tuning import Tuning, TuningChoice
+from app.instruments.library import list_instruments
+from app.instruments.tuning import Tuning, TuningChoice
+from app.player.bodies import own_bodies
+from app.player.midi_file import MOST_EVENTS, read_midi
 from app.presets.library import Library, list_presets
 from app.window.dropped_files import receive
 from app.window.settings import Settings, load_settings
@@ -30,8 +30,8 @@ from engine.whole_file import UnusableFile, read_bounded
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import attacked, damaged_preset
 from tests.fuzz.readers import (
+    INSTRUMENT,
     KEYMAP,
-    PATCH,
     SCALE,
     TARGETS,
     Target,
@@ -173,7 +173,7 @@ def test_ordinary_dots_and_the_largest_song_are_read(folder: Path) -> None:
 
 SETTINGS: dict[str, dict[str, object]] = {
     "favourites": {"favourites": [1] * 150_000},
-    "favourites of instruments": {"patch_favourites": [{}] * 150_000},
+    "favourites of instruments": {"instrument_favourites": [{}] * 150_000},
     "choices": {"choices": {f"{n}": 1 for n in range(80_000)}},
     "some": {"favourites": [1] * 30_000, "window_geometry": "kept"},
 }
@@ -210,12 +210,12 @@ def lists_good(lister: Callable[[Path], tuple[list, list[str]]], folder: Path, p
         in_one_line(ValueError(problem), path)
 
 
-@pytest.mark.parametrize("kind", ["presets", "patches"])
+@pytest.mark.parametrize("kind", ["presets", "instruments"])
 def test_a_strangers_file_hides_no_other(kind: str, folder: Path, small_preset: Path, rounds: int, seed: int) -> None:
-    facts = {**json.loads(PATCH.read_bytes()), "tuning": {"scale": SCALE.decode(), "keymap": KEYMAP.decode()}}
+    facts = {**json.loads(INSTRUMENT.read_bytes()), "tuning": {"scale": SCALE.decode(), "keymap": KEYMAP.decode()}}
     whole, damage, lister, ending = {
         "presets": (small_preset.read_bytes(), damaged_preset, list_presets, "safetensors"),
-        "patches": (json.dumps(facts).encode(), json_or_bytes, list_patches, "json"),
+        "instruments": (json.dumps(facts).encode(), json_or_bytes, list_instruments, "json"),
     }[kind]
     (folder / f"good.{ending}").write_bytes(whole)
     path, costs = folder / f"stranger.{ending}", Costs()

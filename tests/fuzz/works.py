@@ -15,9 +15,9 @@ import torch
 from safetensors.torch import save
 
 from app.commands.cli import main
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import own_patches, read_patch, save_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import own_instruments, read_instrument, save_instrument
 from app.window.settings import Settings, save_settings
 from engine import warm
 from engine.presets import SHIPPED, load_preset
@@ -56,7 +56,7 @@ rates_hz = [4000]
 horizons = [60]
 """
 MANY = 100  # times that a small file is saved
-WORKS = ("render", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
+WORKS = ("render", "dataset", "train", "train_lru", "sweep", "save_instruments", "save_many_settings")
 # of two runs, however equal; a developer may commit meanwhile
 UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
@@ -87,10 +87,10 @@ def sweep(folder: Path) -> None:
     _done(main(["sweep", str(plan), *words, "--workers", "1", "--threads", "1"]))
 
 
-def save_patches(folder: Path) -> None:
+def save_instruments(folder: Path) -> None:
     os.environ["LEARNED_STRINGS_PRESETS"] = str(folder)
     for number in range(MANY, -1, -1):
-        save_patch(patch_of(number), own_patches() / "mine.json")
+        save_instrument(instrument_of(number), own_instruments() / "mine.json")
 
 
 def save_many_settings(folder: Path) -> None:
@@ -98,9 +98,11 @@ def save_many_settings(folder: Path) -> None:
         save_settings(folder / "settings.json", settings_of(number))
 
 
-def patch_of(number: int) -> Patch:
-    patch = read_patch(min(PATCHES.glob("*.json")))
-    return Patch.model_validate({**dict(patch), "name": "Mine", "description": f"{number} " * (1 + number % 9)})
+def instrument_of(number: int) -> Instrument:
+    instrument = read_instrument(min(INSTRUMENTS.glob("*.json")))
+    return Instrument.model_validate(
+        {**dict(instrument), "name": "Mine", "description": f"{number} " * (1 + number % 9)}
+    )
 
 
 def settings_of(number: int) -> Settings:

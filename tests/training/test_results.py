@@ -156,8 +156,8 @@ def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.M
         def writerows(self, lines: Any) -> None:
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
-    with monkeypatch.context() as patched:
-        patched.setattr("engine.table.csv.writer", FullDisk)
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr("engine.table.csv.writer", FullDisk)
         with pytest.raises(OSError, match="No space left"):
             add_rows(path, [row("b")])
     assert path.read_bytes() == before

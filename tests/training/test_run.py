@@ -112,8 +112,8 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     row = run_row(configuration(), tmp_path)
-    with monkeypatch.context() as patched:
-        patched.setattr("training.run.fit_seeds", lambda *_, **__: pytest.fail("trained again"))
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr("training.run.fit_seeds", lambda *_, **__: pytest.fail("trained again"))
         assert run_row(configuration(), tmp_path) == row
     with pytest.raises(ValueError, match="was trained with other settings"):
         run_row(configuration(epochs=3), tmp_path)

@@ -229,8 +229,8 @@ def _lv2_version(version: str) -> tuple[int, int]:
     match = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
     if match is None:
         return 1, 1
-    major, minor, patch, rest = match.groups()
-    return 2 * (1000 * int(major) + int(minor)), 2 * int(patch or 0) + bool(rest)
+    major, minor, instrument, rest = match.groups()
+    return 2 * (1000 * int(major) + int(minor)), 2 * int(instrument or 0) + bool(rest)
 
 
 def _escape_quotes(text: str) -> str:

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from app.export.plugin.formats import PluginError
-from app.patches.library import SHIPPED, list_patches
+from app.instruments.library import SHIPPED, list_instruments
 
 PREFIX = "org.learned-strings."
 MOST_BYTES = 127  # of the shell's field; hosts of CLAP and LV2 have no more room either
@@ -89,4 +89,4 @@ def _default_spelling(folded: str) -> str:
 
 @cache
 def _factory_names() -> dict[str, str]:
-    return {_folded_name(entry.patch.name): entry.patch.name for entry in list_patches(SHIPPED)[0]}
+    return {_folded_name(entry.instrument.name): entry.instrument.name for entry in list_instruments(SHIPPED)[0]}

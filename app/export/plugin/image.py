@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from app.export.plugin.identity import identifier
 from app.export.plugin.layout import IMAGE, KINDS, MACRO, MOST_PARAMETERS, PARAMETER, SOURCES
 from app.export.plugin.parts import AMP, EFFECTS, body_of, kit_of
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.drum_keys import DrumKeys
-from app.instrument.strings import StringKeys
-from app.instrument.table import WHEELED, wheel_goal
-from app.patches.drums import Drums
-from app.patches.patch import ASSIGNABLE, Patch
-from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, PLACE, Parameter
+from app.instruments.drums import Drums
+from app.instruments.instrument import ASSIGNABLE, Instrument
+from app.player.compiled import InstrumentPlayer
+from app.player.drum_keys import DrumKeys
+from app.player.strings import StringKeys
+from app.player.table import WHEELED, wheel_goal
+from app.shared.parameters import MACROS, OF_CHOICES, OF_INSTRUMENTS, PLACE, Parameter
 from engine.effects.room import NOISE_FRAMES
 from engine.kernels import constants as of
 from engine.kernels.fields import record_of
@@ -85,17 +85,17 @@ class Image:
         return len(self.content) + NOISE_FRAMES * NOISE_BYTES
 
 
-def image_of(patch: Patch, preset: Preset) -> Image:
+def image_of(instrument: Instrument, preset: Preset) -> Image:
     """The image of an instrument.
 
     Raises:
         ValueError: its model learned one string only, its tuning is impossible, or no key sounds.
     """
-    player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
+    player = InstrumentPlayer(instrument, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     table = player.table
     assert table is not None
     if not any(_sounds(player.keys, key) for key in range(of.KEYS)):
-        raise ValueError(f"{patch.name}: no key sounds with {preset.path}; choose another pick-up")
+        raise ValueError(f"{instrument.name}: no key sounds with {preset.path}; choose another pick-up")
     header = np.zeros((), IMAGE)
     header["modes"] = min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS
     header["most_notes"] = MOST_NOTES
@@ -116,32 +116,32 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         header[name], header[f"{name}_slots"] = put(part.tobytes()) // 8, len(part)
     taps = differentiator_taps(1) * (FULL_SCALE_M / FULL_SCALE_M_S)
     header["taps"] = put(taps.tobytes()) // 8
-    parameters = dict(_parameters(patch))
+    parameters = dict(_parameters(instrument))
     assert len(parameters) <= MOST_PARAMETERS
     header["parameters"] = put(b"".join(knob.tobytes() for knob in parameters.values()))
     header["parameter_count"] = len(parameters)
-    macros, left_out = _macros(patch, tuple(parameters))
+    macros, left_out = _macros(instrument, tuple(parameters))
     header["macros"], header["macro_count"] = put(macros.tobytes()), len(macros)
-    header["wheel_effect"] = EFFECTS.index(patch.mod_wheel) if patch.mod_wheel in EFFECTS else -1
-    header["wheel_goal"] = wheel_goal(patch) or 0.0
-    header["level_db"] = patch.level_db
+    header["wheel_effect"] = EFFECTS.index(instrument.mod_wheel) if instrument.mod_wheel in EFFECTS else -1
+    header["wheel_goal"] = wheel_goal(instrument) or 0.0
+    header["level_db"] = instrument.level_db
     if kit is not None:
         header["kit"], header["kit_slots"] = put(kit.memory.tobytes()) // 8, len(kit.memory)
         header["kit_room"] = kit.room
         header["table_room"] = kit.table_room
         header["modes"] = kit.modes
-    header["body"] = put(body_of(patch).tobytes()) // 8
+    header["body"] = put(body_of(instrument).tobytes()) // 8
     header["longest_s"] = MOST_LOUD_S
-    id = identifier(patch.name)
+    id = identifier(instrument.name)
     header["id"] = id.encode()
-    header["name"] = _bytes(patch.name, 63)
+    header["name"] = _bytes(instrument.name, 63)
     header["maker"] = MAKER.encode()
     header["uid"] = np.frombuffer(uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes, np.uint8)
-    header["description"] = _bytes(patch.description, 511)
-    header["category"] = patch.category.encode()
+    header["description"] = _bytes(instrument.description, 511)
+    header["category"] = instrument.category.encode()
     whole[: IMAGE.itemsize] = header.tobytes()
     controls = tuple(_control(name, knob) for name, knob in parameters.items())
-    return Image(id, patch.name, bytes(whole), controls, left_out)
+    return Image(id, instrument.name, bytes(whole), controls, left_out)
 
 
 def _control(id: str, knob: np.void) -> Control:
@@ -183,34 +183,34 @@ def _record(
     return parameter.id, record
 
 
-def _parameters(patch: Patch) -> Iterable[tuple[str, np.void]]:
-    for number, macro in enumerate(patch.macros):
+def _parameters(instrument: Instrument) -> Iterable[tuple[str, np.void]]:
+    for number, macro in enumerate(instrument.macros):
         yield _record("macro", number, macro.value, MACROS[f"macros.{number}"], "Macros", macro.name)
     yield _record("source", 0, 0.0, SOURCE)
     yield _record("volume", 0, 0.0, OF_CHOICES["volume_db"])
-    drums = isinstance(patch.strings, Drums)
-    fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else of.PLAYED[of.POINT :][: len(patch.pickup.points)]
+    drums = isinstance(instrument.strings, Drums)
+    fixed = not drums and instrument.pickup.kind == "bridge"  # at the bridge there is no place to choose
+    points = () if fixed else of.PLAYED[of.POINT :][: len(instrument.pickup.points)]
     followed = [id for id in (*WHEELED, *points) if id in (DRUM_PARAMETERS if drums else ASSIGNABLE)]
-    heard = [id for id in EFFECTS if patch.body.name or not id.startswith("body.")]
+    heard = [id for id in EFFECTS if instrument.body.name or not id.startswith("body.")]
     for kind, ids, order in (
         ("value", followed, of.PLAYED),
         ("effect", heard, EFFECTS),
         ("amp", AMP, AMP),
     ):
         for id in ids:
-            parameter = OF_PATCHES[id]
+            parameter = OF_INSTRUMENTS[id]
             module = "Amplifier" if kind == "amp" else parameter.group.capitalize()
-            yield _record(kind, order.index(id), patch.value(id), parameter, module)
+            yield _record(kind, order.index(id), instrument.value(id), parameter, module)
 
 
-def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[NDArray[np.void], tuple[str, ...]]:
+def _macros(instrument: Instrument, ids: tuple[str, ...]) -> tuple[NDArray[np.void], tuple[str, ...]]:
     """The shell's macros, and the targets that it cannot move."""
-    macros = np.zeros(len(patch.macros), MACRO)
-    for record, macro in zip(macros, patch.macros, strict=True):
+    macros = np.zeros(len(instrument.macros), MACRO)
+    for record, macro in zip(macros, instrument.macros, strict=True):
         targets = [target for target in macro.targets if target.field in ids]
         record["count"] = len(targets)
         for place, target in enumerate(targets):
             record["targets"][place] = ids.index(target.field), 0, target.low, target.high
-    left_out = (target.field for macro in patch.macros for target in macro.targets if target.field not in ids)
+    left_out = (target.field for macro in instrument.macros for target in macro.targets if target.field not in ids)
     return macros, tuple(dict.fromkeys(left_out))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.export.plugin.formats import check_compiler, install_folder, this_target
 from app.export.plugin.identity import holding, identifier, lost_with
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.shared.worker import Progress
 
 
@@ -21,7 +21,7 @@ class PluginExport:
         path: with the ending of the format.
     """
 
-    patch: Patch
+    instrument: Instrument
     preset: Path
     form: str
     target: str
@@ -36,7 +36,7 @@ class PluginExport:
         """The plug-in that would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
         if not self.path.exists():
             return ""
-        lost = lost_with(self.path, {identifier(self.patch.name)})
+        lost = lost_with(self.path, {identifier(self.instrument.name)})
         return f"The plug-in that is there {holding(lost)}: replaced." if lost else "Replaces the one before."
 
     def run(self, progress: Progress) -> str:
@@ -48,7 +48,7 @@ class PluginExport:
         from engine.presets import load_preset
 
         progress(0.0, "Reading the instrument")
-        image = image_of(self.patch, load_preset(self.preset))
+        image = image_of(self.instrument, load_preset(self.preset))
 
         def advanced(step: str, share: float) -> None:
             progress(share, step.capitalize())

@@ -9,10 +9,10 @@ from itertools import product
 
 import numpy as np
 
-from app.instrument.drum_keys import DrumKeys, struck_drum
-from app.instrument.effects import effects_of
-from app.patches.patch import Patch
-from app.shared.parameters import OF_PATCHES
+from app.instruments.instrument import Instrument
+from app.player.drum_keys import DrumKeys, struck_drum
+from app.player.effects import effects_of
+from app.shared.parameters import OF_INSTRUMENTS
 from engine.effects.body import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
@@ -27,9 +27,9 @@ MORE = 1.05  # of modes than the keys need
 AMP = ("amp.drive_db", "amp.tone_db")
 
 
-def body_of(patch: Patch) -> Array:
-    """The body of a patch as a plug-in reads it."""
-    effects = effects_of(patch.with_value("body.mix", 1.0))
+def body_of(instrument: Instrument) -> Array:
+    """The body of an instrument as a plug-in reads it."""
+    effects = effects_of(instrument.with_value("body.mix", 1.0))
     return body_memory(None if effects is None else effects.body)
 
 
@@ -54,11 +54,13 @@ class Kit:
 
 def kit_of(keys: DrumKeys) -> Kit:
     """The kit of an instrument of drums; keys that are silent at any modulus have no drum in it."""
-    patch = keys.patch
+    instrument = keys.instrument
     drums = keys.drums.drums
     highest_hz = keys.drums.highest_hz
     most = kernel.LOW_MODES
-    slack = DrumKeys(patch.with_value("knobs.modulus", OF_PATCHES["knobs.modulus"].limits[0]), keys.ear, keys)
+    slack = DrumKeys(
+        instrument.with_value("knobs.modulus", OF_INSTRUMENTS["knobs.modulus"].limits[0]), keys.ear, keys
+    )
     possible = [played.drum for played in drums]
     for variant, key in product((slack, keys), range(of.KEYS)):  # the softer, the more modes are below a frequency
         with contextlib.suppress(ValueError):

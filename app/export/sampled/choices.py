@@ -7,14 +7,14 @@ from typing import Literal
 from pydantic import ConfigDict, Field
 
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
-from app.patches.patch import Key
+from app.instruments.instrument import Key
 from app.shared.value import Value
 
 SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
 
 
 class SampledChoices(Value):
-    """The last settings. `keys`: the lowest and the highest; None: all of the patch's range."""
+    """The last settings. `keys`: the lowest and the highest; None: all of the instrument's range."""
 
     model_config = ConfigDict(extra="ignore")  # earlier versions have more fields
 

@@ -1,4 +1,4 @@
-"""The export of a patch as SFZ or SoundFont 2: samples, then the file that plays them."""
+"""The export of an instrument as SFZ or SoundFont 2: samples, then the file that plays them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SampledReport:
         samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: of the whole over the patch. An SFZ is softer where a note would clip; a SoundFont is raised to full
+        gain_db: of the whole over the instrument. An SFZ is softer where a note would clip; a SoundFont is raised to full
             level.
         peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
@@ -57,7 +57,7 @@ class SampledReport:
 
 def plain_stem(text: str) -> str:
     """The text with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
-    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text[:LONGEST_STEM]).strip("._-") or "instrument"
 
 
 def sample_folder(out: Path) -> Path:
@@ -87,7 +87,7 @@ def export_sampled(
     Until all samples are rendered, nothing else is changed.
 
     Args:
-        render: is called with patch, key, velocity, the time held, duration and rate, and `advanced`, a function of
+        render: is called with instrument, key, velocity, the time held, duration and rate, and `advanced`, a function of
             the seconds rendered that may raise. Returns float32 (frames, channels), ±1 being full scale.
 
     Raises:
@@ -117,13 +117,13 @@ def export_sampled(
                     if folder.exists():
                         shutil.rmtree(folder)
                     samples_folder.replace(folder)
-                gain_db = sfz_gain_db(plan.patch, samples)
+                gain_db = sfz_gain_db(plan.instrument, samples)
     except OSError as error:
         raise WriteError(explain(out, error)) from error
     except UnreadableSound as error:
         raise WriteError(f"{out}: a sample cannot be read ({error}); try again") from error
     cut = sum(sample.cut for sample in samples.values())
-    headrooms_db = headroom_db(plan.patch, samples)
+    headrooms_db = headroom_db(plan.instrument, samples)
     loudest_db = max(sample.peak_db + headrooms_db[zone] for zone, sample in samples.items())
     return SampledReport(out, len(samples), size, cut, gain_db, loudest_db + gain_db)
 
@@ -154,7 +154,7 @@ def _write_samples(
         report = partial(progress, share, text, left_s)
         report()
         path = folder / plan.file_name(zone)
-        note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
+        note = (plan.instrument, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
         try:
             sound, stored = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)
         except ValueError as error:
@@ -165,11 +165,11 @@ def _write_samples(
 
 
 def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
-    """Render notes of a patch by its model, or by the solved string of the same keys."""
-    from app.instrument.offline import render_note  # compiled code, and torch
+    """Render notes of an instrument by its model, or by the solved string of the same keys."""
+    from app.player.offline import render_note  # compiled code, and torch
 
-    return lambda patch, key, velocity, held_s, seconds, rate_hz, *, advanced: render_note(
-        patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced
+    return lambda instrument, key, velocity, held_s, seconds, rate_hz, *, advanced: render_note(
+        instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced
     )
 
 
@@ -178,7 +178,7 @@ class SampledExport:
     """The export of an instrument for samplers. See `ExportJob`.
 
     Attributes:
-        preset: the file of the preset that plays the patch.
+        preset: the file of the preset that plays the instrument.
     """
 
     plan: SampledPlan

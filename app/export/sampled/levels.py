@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.export.sampled.plan import Zone
 from app.export.sampled.sample import INAUDIBLE_DBFS, StoredSample
-from app.patches.patch import VELOCITIES, Patch
+from app.instruments.instrument import VELOCITIES, Instrument
 
 Levels = NDArray[np.float64]  # in dB, (128,), by velocity; 0 is as 1
 
@@ -21,13 +21,13 @@ def by_key(samples: Mapping[Zone, StoredSample]) -> Iterator[tuple[list[Zone], l
         yield layers, [samples[zone] for zone in layers]
 
 
-def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]) -> Levels:
+def velocity_levels(instrument: Instrument, layers: list[Zone], stored: list[StoredSample]) -> Levels:
     """The levels of one key; outside the rendered velocities with the slope between the nearest two.
 
     Where a layer is silent, or there is only one, they follow the amplitudes of the plucks.
     """
     velocities = range(VELOCITIES[1] + 1)
-    plucks_db = 20 * np.log10([patch.pluck.pluck(velocity).amplitude_mm for velocity in velocities])
+    plucks_db = 20 * np.log10([instrument.pluck.pluck(velocity).amplitude_mm for velocity in velocities])
     rendered = [zone.velocity for zone in layers]
     measured_db = np.array([sample.level_db for sample in stored])
     if len(layers) < 2 or measured_db.min() <= INAUDIBLE_DBFS:
@@ -43,11 +43,11 @@ def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]
     return levels_db
 
 
-def headroom_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, float]:
+def headroom_db(instrument: Instrument, samples: Mapping[Zone, StoredSample]) -> dict[Zone, float]:
     """The headroom by zone, in dB: the level of its loudest velocity above that of the rendered one."""
     headrooms_db = {}
     for layers, stored in by_key(samples):
-        levels_db = velocity_levels(patch, layers, stored)
+        levels_db = velocity_levels(instrument, layers, stored)
         for zone in layers:
             softest, hardest = zone.velocities
             headrooms_db[zone] = float(levels_db[softest : hardest + 1].max() - levels_db[zone.velocity])

@@ -1,4 +1,4 @@
-"""The plan of the samples of a patch: which keys, at which velocities, for how long, and what that takes."""
+"""The plan of the samples of an instrument: which keys, at which velocities, for how long, and what that takes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.effects import channels_of
-from app.patches.patch import VELOCITIES, Patch
-from app.patches.tuning import Tuning
+from app.instruments.instrument import VELOCITIES, Instrument
+from app.instruments.tuning import Tuning
+from app.player.effects import channels_of
 from engine import bounds
 
 SampleFormat = Literal["flac", "wav"]
@@ -43,7 +43,7 @@ class Zone:
 
     @property
     def stem(self) -> str:
-        """The name of its file without suffix: from numbers alone, so that no patch's name becomes part of a path."""
+        """The name of its file without suffix: from numbers alone, so that no instrument's name becomes part of a path."""
         return f"key{self.key:03d}_vel{self.velocity:03d}"
 
 
@@ -52,7 +52,7 @@ class SampledPlan:
     """The plan of what is rendered.
 
     Attributes:
-        keys: the lowest and the highest MIDI key; None: all of the patch's range.
+        keys: the lowest and the highest MIDI key; None: all of the instrument's range.
         every: one of so many keys is sampled; the others transpose its samples. 1 transposes none.
         layers: velocity layers, of equal widths; each is rendered at the velocity whose pitch glide is nearest to the
             middle of all that it sounds for.
@@ -62,7 +62,7 @@ class SampledPlan:
         ValueError: a value is out of its range; the message names it.
     """
 
-    patch: Patch
+    instrument: Instrument
     keys: tuple[int, int] | None = None
     every: int = 1
     layers: int = 4
@@ -76,12 +76,12 @@ class SampledPlan:
         bounds.check_choice("format", self.format, FORMATS)
         bounds.check_choice("bits", self.bits, SAMPLE_BITS)
         bounds.check_all(self, RANGES)
-        (low, high), (lowest, highest) = self.key_range, self.patch.range
+        (low, high), (lowest, highest) = self.key_range, self.instrument.range
         if not lowest <= low <= high <= highest:
             raise ValueError(
                 f"keys must be a range within the instrument's own, {lowest}-{highest}, not {low}-{high}"
             )
-        if self.every > 1 and (self.patch.tuning.scale or self.patch.tuning.keymap):
+        if self.every > 1 and (self.instrument.tuning.scale or self.instrument.tuning.keymap):
             raise ValueError(
                 "every must be 1: transposed by semitones, samples would leave the instrument's own tuning; "
                 "sample every key, or remove the scale"
@@ -91,11 +91,11 @@ class SampledPlan:
 
     @property
     def key_range(self) -> tuple[int, int]:
-        return self.keys or self.patch.range
+        return self.keys or self.instrument.range
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """The zones by key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
+        """The zones by key, then by velocity. Keys that the instrument's tuning leaves out are silent, and have none."""
         return tuple(self._zone(keys, velocities) for keys in self._key_spans() for velocities in self._layers())
 
     @property
@@ -105,7 +105,7 @@ class SampledPlan:
 
     @property
     def channels(self) -> int:
-        return channels_of(self.patch)
+        return channels_of(self.instrument)
 
     @property
     def largest_bytes(self) -> int:
@@ -137,16 +137,16 @@ class SampledPlan:
 
     @cached_property
     def _glides_cents(self) -> NDArray[np.float64]:
-        from app.instrument.glide import glides_cents  # brings torch
+        from app.player.glide import glides_cents  # brings torch
 
-        return glides_cents(self.patch)
+        return glides_cents(self.instrument)
 
     def _key_spans(self) -> list[tuple[int, int]]:
         low, high = self.key_range
         spans = [(first, min(first + self.every - 1, high)) for first in range(low, high + 1, self.every)]
         if self.every > 1:  # of an equal tuning, which has all keys
             return spans
-        tuning = Tuning(self.patch.tuning)
+        tuning = Tuning(self.instrument.tuning)
         return [span for span in spans if tuning.mapped(span[0])]
 
     def _layers(self) -> list[tuple[int, int]]:

@@ -20,7 +20,7 @@ from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.sample import StoredSample
 from app.export.wav import quantised
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.shared.version import PROGRAM, program_version
 from app.shared.worker import Progress
 from engine.plain_text import one_line
@@ -45,7 +45,7 @@ ATTENUATION = 48
 SAMPLE_ID = 53
 EXCLUSIVE_CLASS = 57
 # Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
-# attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
+# attenuation, which is not the instrument's; velocity to the filter, in the forms of 2.01 and of 2.04.
 SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
 MOST_RAISED_DB = 6.0  # of a layer above the hardest: a bit of resolution
 FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
@@ -101,14 +101,14 @@ def write_sf2(
         OSError, UnreadableSound: the file cannot be written, or a sample not read.
     """
     channels = _channels(samples)
-    attenuations_cb = _attenuations_cb(plan.patch, samples)
+    attenuations_cb = _attenuations_cb(plan.instrument, samples)
     tables = _tables(plan, channels, attenuations_cb)
     size = 2 * sum(channel.frames + ZEROS_BEHIND for channel in channels)
     info = _list(b"INFO", _information(plan))
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
-    headrooms_db = headroom_db(plan.patch, samples)
+    headrooms_db = headroom_db(plan.instrument, samples)
     levels_db = {
         # its hardest velocity's attenuation is made up for
         zone: attenuations_cb[zone] / 10 * (1 - zone.velocities[1] / 128) + headrooms_db[zone] - stored.gain_db
@@ -127,7 +127,7 @@ def write_sf2(
     return gain_db
 
 
-def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
+def _attenuations_cb(instrument: Instrument, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
     """The attenuation by zone, in cB, that a velocity of 0 would have against one of 128.
 
     So the level continues within a layer as it does from layer to layer. A soft layer has to be raised for it; the
@@ -135,7 +135,7 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
     """
     attenuations_cb = {}
     for layers, stored in by_key(samples):
-        levels_db = velocity_levels(patch, layers, stored)
+        levels_db = velocity_levels(instrument, layers, stored)
         for zone in layers:
             hardest = zone.velocities[1]
             below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
@@ -145,11 +145,11 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
     return attenuations_cb
 
 
-def release_timecents(patch: Patch) -> int:
+def release_timecents(instrument: Instrument) -> int:
     """The release of the volume envelope: 60 dB in the damping time; of strings that ring on, the longest."""
-    if patch.damping.let_ring:
+    if instrument.damping.let_ring:
         return TIMECENTS_RANGE[1]
-    seconds = patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
+    seconds = instrument.damping.release_t60_s * RELEASE_SPAN_DB / 60
     low, high = TIMECENTS_RANGE
     return max(low, min(high, round(1200 * math.log2(seconds))))
 
@@ -172,14 +172,14 @@ def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
 def _information(plan: SampledPlan) -> bytes:
     """The chunks of information, of which version, engine and name are compulsory (5)."""
     made_by = f"{PROGRAM} {program_version()}"
-    lines = [one_line(plan.patch.description)] if plan.patch.description else []
+    lines = [one_line(plan.instrument.description)] if plan.instrument.description else []
     if plan.every > 1:
         lines.append(f"A sample for every {plan.every} keys; those between are transposed.")
     return b"".join(
         [
             _chunk(b"ifil", struct.pack("<HH", 2, 1)),
             _chunk(b"isng", _text("EMU8000")),
-            _chunk(b"INAM", _text(plan.patch.name)),
+            _chunk(b"INAM", _text(plan.instrument.name)),
             _chunk(b"ICMT", _text(" ".join(lines))) if lines else b"",
             _chunk(b"ISFT", _text(made_by)),
         ]
@@ -188,15 +188,17 @@ def _information(plan: SampledPlan) -> bytes:
 
 def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Mapping[Zone, int]) -> bytes:
     """The nine tables (7.1); each ends with a row of its own that closes it."""
-    patch = plan.patch
-    name = _name(patch.name)
-    zones: list[list[Generator]] = [[(RELEASE_VOL_ENV, release_timecents(patch) & 0xFFFF)]]  # of all others (7.7)
+    instrument = plan.instrument
+    name = _name(instrument.name)
+    zones: list[list[Generator]] = [
+        [(RELEASE_VOL_ENV, release_timecents(instrument) & 0xFFFF)]
+    ]  # of all others (7.7)
     for number, channel in enumerate(channels):
         # key range first, velocity range next, the sample last (8.1.2)
         zone = [(KEY_RANGE, _span(channel.zone.keys)), (VEL_RANGE, _span(channel.zone.velocities))]
         if channel.pan:
             zone.append((PAN, channel.pan & 0xFFFF))
-        if patch.damping.let_ring and channel.zone.keys[0] == channel.zone.keys[1] > 0:
+        if instrument.damping.let_ring and channel.zone.keys[0] == channel.zone.keys[1] > 0:
             zone.append((EXCLUSIVE_CLASS, channel.zone.key))  # else a key's tails would pile up
         zones.append([*zone, (SAMPLE_ID, number)])
     modulators = [struct.pack("<HHhHH", source, to, 0, by, 0) for source, to, by in SWITCHED_OFF]

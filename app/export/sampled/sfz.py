@@ -13,7 +13,7 @@ import numpy as np
 from app.export.sampled.levels import Levels, by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.sample import StoredSample
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.shared.version import PROGRAM, program_version
 from engine.plain_text import one_line
 
@@ -25,22 +25,22 @@ def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: st
     return "\n".join(_lines(plan, samples, folder)) + "\n"
 
 
-def sfz_gain_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> float:
+def sfz_gain_db(instrument: Instrument, samples: Mapping[Zone, StoredSample]) -> float:
     """The dB that the whole is raised by: 0, or less where a note would clip. No volume is above 0 dB."""
-    headrooms_db = headroom_db(patch, samples)
+    headrooms_db = headroom_db(instrument, samples)
     return min(0.0, *(sample.gain_db - headrooms_db[zone] for zone, sample in samples.items()))
 
 
-def release_s(patch: Patch) -> float:
-    """The `ampeg_release` that lets a note fall by 60 dB in the patch's damping time."""
-    return patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
+def release_s(instrument: Instrument) -> float:
+    """The `ampeg_release` that lets a note fall by 60 dB in the instrument's damping time."""
+    return instrument.damping.release_t60_s * RELEASE_SPAN_DB / 60
 
 
 def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> Iterator[str]:
-    patch, gain_db = plan.patch, sfz_gain_db(plan.patch, samples)
-    headrooms_db = headroom_db(patch, samples)
-    yield f"// {one_line(patch.name)}, by {PROGRAM} {program_version()}"
-    yield f"// {one_line(patch.description)}" if patch.description else "//"
+    instrument, gain_db = plan.instrument, sfz_gain_db(plan.instrument, samples)
+    headrooms_db = headroom_db(instrument, samples)
+    yield f"// {one_line(instrument.name)}, by {PROGRAM} {program_version()}"
+    yield f"// {one_line(instrument.description)}" if instrument.description else "//"
     if plan.every > 1:
         yield f"// A sample for every {plan.every} keys; those between are transposed."
     if gain_db:
@@ -50,14 +50,14 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
     yield ""  # sfzlint reads a value that ends with a slash on into the next line
     yield "<global>"
     # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
-    yield f"loop_mode={'one_shot' if patch.damping.let_ring else 'no_loop'}"
-    yield f"ampeg_release={release_s(patch):.4f}"  # below 100, the format's longest
+    yield f"loop_mode={'one_shot' if instrument.damping.let_ring else 'no_loop'}"
+    yield f"ampeg_release={release_s(instrument):.4f}"  # below 100, the format's longest
     # a string that is plucked again ends the former note: by `off_by` in players of SFZ 1, where a key may end
     # itself, by `note_polyphony` in the others, with `note_selfmask=off` so that a soft note ends a loud one as well
     yield "off_mode=normal"
     yield "note_polyphony=1"
     yield "note_selfmask=off"
-    bend = round(100 * patch.bend_semitones)
+    bend = round(100 * instrument.bend_semitones)
     yield f"bend_up={bend}"
     yield f"bend_down={-bend}"
     for layers, stored in by_key(samples):
@@ -66,7 +66,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
         yield f"lokey={low} hikey={high} pitch_keycenter={layers[0].key}"
         if low == high:
             yield f"group={low + 1} off_by={low + 1}"
-        levels_db = velocity_levels(patch, layers, stored)
+        levels_db = velocity_levels(instrument, layers, stored)
         for zone, sample in zip(layers, stored, strict=True):
             softest, hardest = zone.velocities
             yield (

@@ -62,7 +62,7 @@ def megabytes(size: int) -> str:
 def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
     """Notes for a musician on what was written. `dry`: what takes the room out, as in "--dry leaves"."""
     lines = []
-    if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
+    if plan.instrument.room.mix > 0 and not plan.instrument.damping.let_ring:
         lines.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
     if report.cut:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "

@@ -23,7 +23,7 @@ from engine.pluck import SHAPES
 
 KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
 TRAINED_TIP = "Pluck in the middle of what the preset was trained on: shape, place, height and width (Ctrl+Shift+P)"
-OF_THE_PATCH = "While keys play the instrument, it is the instrument's own and is saved with it"
+OF_THE_INSTRUMENT = "While keys play the instrument, it is the instrument's own and is saved with it"
 
 
 class TransportBar(QFrame):
@@ -141,14 +141,14 @@ class TransportBar(QFrame):
         self.play_asked.emit()
 
     def _build_pickup(self) -> QVBoxLayout:
-        tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}"
+        tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_INSTRUMENT}"
         self._stereo = tool_button("Stereo", tip=tip, checkable=True)
         self._stereo.toggled.connect(partial(self.change_asked.emit, "stereo"))
         self._pickup = pickup_box(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
             f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
-            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}",
+            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_INSTRUMENT}",
             partial(self.change_asked.emit, "pickup"),
         )
         self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)

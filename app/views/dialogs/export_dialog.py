@@ -32,7 +32,7 @@ from app.views.file_places import FilePlaces
 from engine.whole_file import WriteError
 
 KINDS = tuple(PAGES)
-SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
+SETTLE_MS = 150  # after the last change: a knob that is turned changes the instrument at each step
 MEANWHILE = "You can play on meanwhile."
 REPLACE = "Replace"  # the button's word where a file of this name is there
 CONTINUE, CANCEL = "Continue", "Cancel export"

@@ -23,9 +23,9 @@ from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, Sam
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
 from app.export.sound import LONGEST_S
 from app.export.wav import DECAY_RANGE_DB
-from app.instrument.effects import added_words, body_problem
-from app.instrument.events import NoteOn
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.player.effects import added_words, body_problem
+from app.player.events import NoteOn
 from app.presets.library import PresetEntry
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, FORMATS, WRITTEN_ENDINGS, Format, Source
@@ -68,7 +68,7 @@ MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 
 @dataclass(frozen=True)
 class HeardPerformance:
-    """A performance, the file of the preset that plays its patch (None: that is gone), and the take's name."""
+    """A performance, the file of the preset that plays its instrument (None: that is gone), and the take's name."""
 
     played: Played
     preset: Path | None
@@ -77,16 +77,18 @@ class HeardPerformance:
     def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
         """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
         if self.preset is None:
-            raise ValueError(f"The preset {self.played.patch.preset}, which plays the instrument, was not found.")
+            raise ValueError(
+                f"The preset {self.played.instrument.preset}, which plays the instrument, was not found."
+            )
         name = name or f"{self.name}{choices.ending}"
         return PlayedExport(self.played, self.preset, folder / name, choices.wav)
 
 
 @dataclass(frozen=True)
 class HeardInstrument:
-    """A patch and the preset that plays it."""
+    """An instrument and the preset that plays it."""
 
-    patch: Patch
+    instrument: Instrument
     preset: PresetEntry
 
 
@@ -268,7 +270,7 @@ class PerformancePage(ExportPage):
             notes = number_of(sum(isinstance(timed_event.event, NoteOn) for timed_event in played.events), "note")
             source_title = source_words(played.source, played.difference_gain_db)
             self.what.setText(
-                f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
+                f"{played.instrument.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
             )
             self._wav.follow(self.file)
             self.file.suggest(subject.name + self.file.suffix)
@@ -326,7 +328,7 @@ class ModelsPage(ExportPage):
 
 
 class SamplerPage(ExportPage):
-    """A patch as an instrument for samplers: format, keys, layers, length, source, place."""
+    """An instrument as an instrument for samplers: format, keys, layers, length, source, place."""
 
     title = "Sampler"
     missing = "There is no instrument to export: choose one first."
@@ -372,28 +374,28 @@ class SamplerPage(ExportPage):
             box.valueChanged.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
-        """Show another patch, or the same that was turned: chosen keys stay as far as it has them."""
+        """Show another instrument, or the same that was turned: chosen keys stay as far as it has them."""
         keys, self._subject = self.keys(), subject
         if subject is None:
             return
-        patch, preset = subject.patch, subject.preset
-        low, high = patch.range
-        keys_range = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
+        instrument, preset = subject.instrument, subject.preset
+        low, high = instrument.range
+        keys_range = keys if keys and low <= keys[0] <= keys[1] <= high else instrument.range
         for box, key in zip((self.lowest, self.highest), keys_range, strict=True):
             with QSignalBlocker(box):
                 box.setRange(low, high)
                 box.setValue(key)
-        self["dry"].setEnabled(patch.room.mix > 0)
-        problem = body_problem(patch)
-        self.what.setText(f"{patch.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
+        self["dry"].setEnabled(instrument.room.mix > 0)
+        problem = body_problem(instrument)
+        self.what.setText(f"{instrument.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
         self._suggest_name()
 
     def keys(self) -> tuple[int, int] | None:
-        """The chosen keys; None for all of the patch."""
+        """The chosen keys; None for all of the instrument."""
         if self._subject is None:
             return self._chosen_keys
         keys = self.lowest.value(), self.highest.value()
-        return None if keys == self._subject.patch.range else keys
+        return None if keys == self._subject.instrument.range else keys
 
     def choices(self) -> SampledChoices:
         return SampledChoices(keys=self.keys(), **self.values())
@@ -403,9 +405,9 @@ class SamplerPage(ExportPage):
             raise ValueError(self.missing)
         if self.lowest.value() > self.highest.value():
             raise ValueError("keys: the lowest is above the highest; exchange them")
-        patch, choices = self._subject.patch, self.choices()
+        instrument, choices = self._subject.instrument, self.choices()
         plan = SampledPlan(
-            patch.with_value("room.mix", 0.0) if choices.dry else patch,
+            instrument.with_value("room.mix", 0.0) if choices.dry else instrument,
             choices.keys,
             choices.every,
             choices.layers,
@@ -438,11 +440,11 @@ class SamplerPage(ExportPage):
         self["bits"].setVisible(not soundfont)
         self.file.suffix = ".sf2" if soundfont else ".sfz"
         if self._subject is not None:
-            self.file.suggest(plain_stem(self._subject.patch.name) + self.file.suffix)
+            self.file.suggest(plain_stem(self._subject.instrument.name) + self.file.suffix)
 
 
 class PluginPage(ExportPage):
-    """A patch as a plug-in for a DAW: format, system, place."""
+    """An instrument as a plug-in for a DAW: format, system, place."""
 
     title = "Plug-in"
     missing = "There is no instrument to export: choose one first."
@@ -470,15 +472,17 @@ class PluginPage(ExportPage):
     def show_subject(self, subject: HeardInstrument | None) -> None:
         self._subject = subject
         if subject is not None:
-            self.what.setText(f"{subject.patch.name}, played by {subject.preset.title}")
+            self.what.setText(f"{subject.instrument.name}, played by {subject.preset.title}")
             self._suggest_name()
 
     def job(self) -> PluginExport:
         if self._subject is None:
             raise ValueError(self.missing)
         check_compiler()
-        patch, preset = self._subject.patch, self._subject.preset.path
-        return PluginExport(patch, preset, self["form"].currentData(), self["system"].currentData(), self.file.path)
+        instrument, preset = self._subject.instrument, self._subject.preset.path
+        return PluginExport(
+            instrument, preset, self["form"].currentData(), self["system"].currentData(), self.file.path
+        )
 
     def offer(self) -> tuple[str, str]:
         replaces = self.job().replaces()
@@ -488,7 +492,7 @@ class PluginPage(ExportPage):
         form, system = self["form"].currentData(), self["system"].currentData()
         self.file.suffix = f".{form}"
         if self._subject is not None:
-            name = self._subject.patch.name + self.file.suffix
+            name = self._subject.instrument.name + self.file.suffix
             own = system == _this_system()
             self.file.suggest(str(install_folder(form, system) / name) if own else name)
 
@@ -514,9 +518,9 @@ def _through_words(sound: NoteSound, alone: bool, source: Chosen) -> str:
     """The parts of an instrument that are in the file."""
     if sound.struck is None:
         return "None: the string alone, as it is heard"
-    patch = sound.struck.patch
+    instrument = sound.struck.instrument
     if alone:
-        return f"The string alone, without {patch.name}"
+        return f"The string alone, without {instrument.name}"
     if source == "difference":
-        return f"{patch.name}, without amplifier, body and room, as a difference is heard"
-    return f"{patch.name} with {added_words(patch)}, as it is heard"
+        return f"{instrument.name}, without amplifier, body and room, as a difference is heard"
+    return f"{instrument.name} with {added_words(instrument)}, as it is heard"

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QRadioButton, QStackedWidg
 
 from app.audio.note_file import NoteFileError
 from app.audio.sound import Sound
-from app.patches.library import PatchError
+from app.instruments.library import InstrumentError
 from app.playing.pair import Pair
 from app.shared.worker import Job, Work
 from app.views.controls.form import Form
@@ -24,10 +24,10 @@ from engine.presets import PresetError
 from engine.whole_file import WriteError
 
 if TYPE_CHECKING:
-    from app.instrument.learned import Reasons
+    from app.player.learned import Reasons
     from training.recording.learn import Learned
 
-EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
+EXPECTED = (NoteFileError, InstrumentError, PresetError, WriteError, ValueError)
 KINDS = (("Guitar", "guitar"), ("Bass", "bass"), ("Harp", "harp"), ("Piano", "piano"))
 CONTINUE, STOP = "Continue", "Stop learning"
 BACK, DISCARD = "Back", "Discard"
@@ -111,7 +111,7 @@ class LearnDialog(WorkDialog):
         self.start.setEnabled(False)
 
         def work(job: Job) -> Reasons:
-            from app.instrument.learned import reasons_against
+            from app.player.learned import reasons_against
 
             return reasons_against(self._file)
 
@@ -159,7 +159,7 @@ class LearnDialog(WorkDialog):
         name, rate_hz = self.name.text(), self._output.rate_hz
 
         def work(job: Job) -> tuple[Any, Any]:
-            from app.instrument.learned import both_sounds, check_name, learn_files
+            from app.player.learned import both_sounds, check_name, learn_files
 
             check_name(name)
             (learned,) = learn_files([self._file], progress=job.progress, **choices)
@@ -205,7 +205,7 @@ class LearnDialog(WorkDialog):
         kind = self.kind.currentData()
 
         def work(job: Job) -> Any:
-            from app.instrument.learned import keep
+            from app.player.learned import keep
 
             assert learned is not None
             return keep(name, [learned], kind)
@@ -222,7 +222,7 @@ class LearnDialog(WorkDialog):
         self.accept()
 
     def show_failure(self, message: str) -> None:
-        from app.instrument.learned import Reasons
+        from app.player.learned import Reasons
 
         if self._against is None:  # not even examined: it can only be a body
             self.string.setEnabled(False)

@@ -8,9 +8,9 @@ from functools import partial
 from PySide6.QtCore import QMargins, Signal
 from PySide6.QtWidgets import QComboBox, QDialog, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.playing.midi import MidiChoices
-from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
+from app.shared.parameters import LEARNABLE, OF_INSTRUMENTS, modulated_by
 from app.views.controls.form import Form
 from app.views.controls.parts import combo_box, faint, filled, label, push_button, refill, scrolled, show_kind
 from app.views.controls.plain import Label
@@ -32,7 +32,7 @@ BEND_TIP = (
 )
 CHANNELS_TIP = "Whether the MIDI channel of a note says on which string it is played"
 WHEEL_TIP = "What the modulation wheel changes while you play"
-OF_THE_PATCH = "It belongs to the instrument and is saved with it"
+OF_THE_INSTRUMENT = "It belongs to the instrument and is saved with it"
 
 
 class MidiDialog(QDialog):
@@ -42,7 +42,7 @@ class MidiDialog(QDialog):
     notes_chosen = Signal(str)
     learn_asked = Signal(str)  # a field
     forget_asked = Signal(str)
-    patch_turned = Signal(str, object)  # a field of the patch, and its value
+    instrument_turned = Signal(str, object)  # a field of the instrument, and its value
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -53,19 +53,19 @@ class MidiDialog(QDialog):
         tip = "Velocity always sets how hard the string is plucked"
         self._notes = combo_box("MIDI notes control", NOTE_MODES, tip=tip, picked=self.notes_chosen.emit)
         turnable = [(_capital(knob.name), knob.id) for knob in modulated_by("wheel")]
-        self._of_patch: dict[str, QComboBox] = {}
+        self._of_instrument: dict[str, QComboBox] = {}
         for field, name, entries, tip in (
             ("mode", "Channels", CHANNELS, CHANNELS_TIP),
-            ("bend_semitones", "Bend range", map(_bend, BENDS), OF_PATCHES["bend_semitones"].tip),
+            ("bend_semitones", "Bend range", map(_bend, BENDS), OF_INSTRUMENTS["bend_semitones"].tip),
             ("bend_by", "Pitch bend changes", BENDS_BY, BEND_TIP),
             ("mod_wheel", "Modulation wheel", (("Nothing", "none"), *turnable), WHEEL_TIP),
         ):
-            picked = partial(self.patch_turned.emit, field)
-            self._of_patch[field] = combo_box(name, entries, tip=f"{tip}.\n{OF_THE_PATCH}", picked=picked)
+            picked = partial(self.instrument_turned.emit, field)
+            self._of_instrument[field] = combo_box(name, entries, tip=f"{tip}.\n{OF_THE_INSTRUMENT}", picked=picked)
         self._problem = label("warning", selectable=True)
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = Form()
-        for box in (self._inputs, self._notes, *self._of_patch.values()):
+        for box in (self._inputs, self._notes, *self._of_instrument.values()):
             form.row("Input" if box is self._inputs else box.accessibleName(), box)
         rows = QWidget()
         rows.setLayout(self._build_rows())
@@ -102,12 +102,12 @@ class MidiDialog(QDialog):
             learn.setEnabled(not problem)
             learn.setToolTip(problem or f"Click, then move a control to assign it to {_learnable_name(field)}")
 
-    def show_patch(self, patch: Patch | None) -> None:
-        """Show the use that the played patch makes of channels and wheels; None: there is no patch."""
-        for field, box in self._of_patch.items():
-            box.setEnabled(patch is not None)
-            if patch is not None:
-                value = getattr(patch, field)
+    def show_instrument(self, instrument: Instrument | None) -> None:
+        """Show the use that the played instrument makes of channels and wheels; None: there is no instrument."""
+        for field, box in self._of_instrument.items():
+            box.setEnabled(instrument is not None)
+            if instrument is not None:
+                value = getattr(instrument, field)
                 if field == "bend_semitones" and box.findData(value) < 0:
                     box.addItem(*_bend(value))
                 box.setCurrentIndex(max(0, box.findData(value)))
@@ -133,7 +133,7 @@ def _bend(semitones: float) -> tuple[str, float]:
 
 def _learnable_name(field: str) -> str:
     name = LEARNABLE[field].name
-    return f"instrument: {name}" if field in OF_PATCHES else name
+    return f"instrument: {name}" if field in OF_INSTRUMENTS else name
 
 
 def _capital(name: str) -> str:

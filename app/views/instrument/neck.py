@@ -1,4 +1,4 @@
-"""The strings of a patch: a neck with frets, or a fan of many strings. What sounds is lit where it is stopped.
+"""The strings of an instrument: a neck with frets, or a fan of many strings. What sounds is lit where it is stopped.
 
 A few strings are rows, the highest on top, with fret n at 1 - 2^(-n/12) of the length from the nut. Many strings, or
 one that is shortened for every key, stand side by side, each as long as its key leaves it. The square root of the
@@ -55,7 +55,7 @@ def fret_share(fret: float, frets: int) -> float:
 class Neck(Playable):
     """A neck, or a fan of strings.
 
-    A click plays the string that was clicked. Keys of others play the highest string at or below them, as patches do.
+    A click plays the string that was clicked. Keys of others play the highest string at or below them, as instruments do.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked. So chords can be strummed with one mouse.

@@ -1,4 +1,4 @@
-"""The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play.
+"""The instrument's strip: the instrument bar, the string's knobs (if shown), the keys or the neck, and what keys play.
 
 In a low window the string's knobs take the place of the keys and the switches of techniques. So the strip is no
 higher with them.
@@ -27,8 +27,8 @@ from app.views.controls.parts import filled, tool_button
 from app.views.controls.plain import Label
 from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
+from app.views.instrument.instrument_bar import InstrumentBar
 from app.views.instrument.neck import Neck
-from app.views.instrument.patch_bar import PatchBar
 from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
@@ -95,7 +95,7 @@ class InstrumentPanel(QFrame):
         super().__init__(parent)
         self.setObjectName("panel")
         self.setAccessibleName("Instrument")
-        self.bar, self.knobs = PatchBar(), StringKnobs()
+        self.bar, self.knobs = InstrumentBar(), StringKnobs()
         self.keys, self.neck = PianoKeys(), Neck()
         self._surfaces = self.keys, self.neck
         for surface in self._surfaces:
@@ -120,7 +120,7 @@ class InstrumentPanel(QFrame):
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._low = False
         self._hinted = False
-        self._patch_area = True
+        self._instrument_area = True
         self._stack = QStackedWidget()
         self._hint = Label(HINTS["keys"], self._stack, objectName="hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -191,9 +191,9 @@ class InstrumentPanel(QFrame):
         self._fold.setChecked(unfolded)
         self._share_room()
 
-    def show_patch_area(self, shown: bool) -> None:
+    def show_instrument_area(self, shown: bool) -> None:
         """Show the bar and the knobs of the string, or only what is played on."""
-        self._patch_area = shown
+        self._instrument_area = shown
         self._bar_row.setVisible(shown)
         self._fold.setVisible(shown)
         self._share_room()
@@ -221,7 +221,7 @@ class InstrumentPanel(QFrame):
         self._grid.setContentsMargins(*((12, 4, 12, 6) if self._low else (12, 8, 12, 10)))
         self._grid.setVerticalSpacing(6 if self._low else 8)
         self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
-        unfolded = self.unfolded and self._patch_area
+        unfolded = self.unfolded and self._instrument_area
         self._knobs_row.setVisible(unfolded)
         for part in (self._stack, self.techniques):
             part.setVisible(not (self._low and unfolded))
@@ -232,7 +232,7 @@ class InstrumentPanel(QFrame):
             surface.set_range(low, high)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
-        """Show what the computer's keys play, of KEYS_PLAY. `possible`: there is a patch for pitches."""
+        """Show what the computer's keys play, of KEYS_PLAY. `possible`: there is an instrument for pitches."""
         words, tip = KEYS_PLAY[plays]
         self._plays[plays].setChecked(True)
         self.plays.setText(f"{words}  ▾")

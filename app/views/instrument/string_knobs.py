@@ -9,8 +9,8 @@ from PySide6.QtCore import QMargins, QRectF, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.patches.patch import Patch
-from app.shared.parameters import DECAY, OF_PATCHES, PITCH, PLUCK, STRING, TECHNIQUE, in_group
+from app.instruments.instrument import Instrument
+from app.shared.parameters import DECAY, OF_INSTRUMENTS, PITCH, PLUCK, STRING, TECHNIQUE, in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import NO_MARGINS, filled, vertical_rule
@@ -77,12 +77,12 @@ class Facts(QWidget):
 
 
 class StringKnobs(QWidget):
-    """Gestures emit `changed`; `show_patch` shows what became of them.
+    """Gestures emit `changed`; `show_instrument` shows what became of them.
 
     `technique` is a group by itself, which stands elsewhere.
     """
 
-    changed = Signal(str, object)  # a field of a patch and its new value
+    changed = Signal(str, object)  # a field of an instrument and its new value
     figure_asked = Signal(str, float)  # a knob's field, and the figure that it is to have, in the unit that is shown
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -125,18 +125,18 @@ class StringKnobs(QWidget):
         return filled(column, self.shape, None)
 
     def _ask(self, field: str, value: float) -> None:
-        self.changed.emit(field, round(value) if OF_PATCHES[field].whole else value)
+        self.changed.emit(field, round(value) if OF_INSTRUMENTS[field].whole else value)
 
-    def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
-        """Show the values of a patch; `saved`: those that a double-click resets to."""
+    def show_instrument(self, instrument: Instrument, saved: Instrument | None = None) -> None:
+        """Show the values of an instrument; `saved`: those that a double-click resets to."""
         for field, knob in self.knobs.items():
-            value = patch.value(field)
-            knob.set_barred(_why_barred(patch, field))
+            value = instrument.value(field)
+            knob.set_barred(_why_barred(instrument, field))
             knob.set_value(value)
             if saved is not None:
                 knob.default = saved.value(field)
-        self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
-        barred = _why_barred(patch, "pluck.shape")
+        self.shape.setCurrentIndex(SHAPES.index(instrument.pluck.shape))
+        barred = _why_barred(instrument, "pluck.shape")
         self.shape.setEnabled(not barred)
         self.shape.setToolTip(barred or SHAPE_TIP)
 
@@ -149,15 +149,15 @@ class StringKnobs(QWidget):
             knob.show_figure(figures.get(field, ""))
 
 
-def _why_barred(patch: Patch, field: str) -> str:
-    """The reason why a field means nothing in this patch; "" where it means something."""
+def _why_barred(instrument: Instrument, field: str) -> str:
+    """The reason why a field means nothing in this instrument; "" where it means something."""
     of_strings = field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
-    if patch.strings.kind == "drums" and of_strings and field not in DRUM_KNOBS:
+    if instrument.strings.kind == "drums" and of_strings and field not in DRUM_KNOBS:
         return NO_STRING
-    if field in SHAPED and patch.pluck.shape == "triangular":
+    if field in SHAPED and instrument.pluck.shape == "triangular":
         return NO_WIDTH
-    if field == "damping.release_t60_s" and patch.damping.let_ring:
+    if field == "damping.release_t60_s" and instrument.damping.let_ring:
         return LETS_RING
-    if field == "tuning.a4_hz" and patch.tuning.has_reference:
+    if field == "tuning.a4_hz" and instrument.tuning.has_reference:
         return NO_A4
     return ""

@@ -8,7 +8,7 @@ from functools import partial
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
 
-from app.instrument.events import Meter
+from app.player.events import Meter
 from app.shared.typed_number import typed_number
 from app.views.dialogs.question import ask_text
 

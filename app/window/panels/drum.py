@@ -8,7 +8,7 @@ import numpy as np
 
 from app.analysis.moment import caption_of
 from app.export.columns import Columns
-from app.patches.drums import PlayedDrum
+from app.instruments.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
 from app.session.shown import ShownSource
@@ -50,7 +50,7 @@ class DrumPanel(StagePanel):
         return self._place
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"patch", "single"} and self._drum is not None and self._key is not None:
+        if names & {"instrument", "single"} and self._drum is not None and self._key is not None:
             self.show_key(self._key)
         super().choices_changed(names)
 

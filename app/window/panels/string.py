@@ -10,7 +10,7 @@ import numpy as np
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, StringFrame, frame_at
 from app.export.columns import Columns, aligned
-from app.instrument.facts import by_two_numbers, outside_of_string
+from app.player.facts import by_two_numbers, outside_of_string
 from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
@@ -142,11 +142,11 @@ class StringPanel(StagePanel):
 
 def outside_of_shown(choices: Choices, entry: PresetEntry) -> str:
     """The differences of the shown string and its pluck from the training of its preset, in words; "": none."""
-    string, patch = choices.string, choices.patch
+    string, instrument = choices.string, choices.instrument
     if string is None:
         return "; ".join(outside_training(entry.info, choices.pluck))
-    if patch is not None and choices.plays_patch:
-        string = by_two_numbers(patch, string)
+    if instrument is not None and choices.plays_instrument:
+        string = by_two_numbers(instrument, string)
     return "; ".join(outside_of_string(entry.info, string, choices.pluck))
 
 

@@ -17,8 +17,8 @@ import soundfile
 import torch
 
 from app.commands.cli import main
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
+from app.player.events import NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
 from engine.excitation import displacement
 from engine.models import build_model
 from engine.models.base import Physics

@@ -16,8 +16,8 @@ import soundfile
 from app.export.plugin.identity import held_in, identifier
 from app.export.plugin.image import Image
 from app.export.sampled.plan import SampledPlan
-from app.patches.library import SHIPPED, find_patch, list_patches
-from app.shared.parameters import OF_PATCHES
+from app.instruments.library import SHIPPED, find_instrument, list_instruments
+from app.shared.parameters import OF_INSTRUMENTS
 from tests.app.commands.conftest import Run
 
 
@@ -45,7 +45,7 @@ def test_instruments_are_listed_and_a_broken_one_is_reported(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
-    own = tmp_path / "patches"
+    own = tmp_path / "instruments"
     own.mkdir()
     some = json.loads((SHIPPED / "classical_guitar.json").read_text(encoding="utf-8"))
     (own / "mine.json").write_text(json.dumps({**some, "name": "Mine"}))
@@ -59,11 +59,11 @@ def test_instruments_are_listed_and_a_broken_one_is_reported(
 
 
 def test_an_instruments_parameters_are_listed_with_its_values(run: Run) -> None:
-    own = find_patch("classical_guitar").patch
+    own = find_instrument("classical_guitar").instrument
     listed = {each["id"]: each for each in json.loads(run("instruments", "classical_guitar", "--json").out)}
-    assert set(listed) == {id for id in OF_PATCHES if own.has(id)}
+    assert set(listed) == {id for id in OF_INSTRUMENTS if own.has(id)}
     for id, each in listed.items():
-        parameter = OF_PATCHES[id]
+        parameter = OF_INSTRUMENTS[id]
         assert (each["name"], each["unit"], each["value"]) == (parameter.name, parameter.unit, own.value(id))
         assert (each["lowest"], each["highest"], each["default"]) == (*parameter.limits, parameter.default)
     assert "damping.release_t60_s" in run("instruments", "classical_guitar").out
@@ -80,26 +80,26 @@ def notes(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """Notes that were rendered: decaying sines, in place of the instrument."""
     rendered: list[tuple] = []
 
-    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
-        rendered.append((patch.room.mix, key, velocity, held_s, seconds, rate_hz, source))
+    def render_note(instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
+        rendered.append((instrument.room.mix, key, velocity, held_s, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-30 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
-        return np.stack([sound] * len(patch.pickup.points), axis=1).astype(np.float32)
+        return np.stack([sound] * len(instrument.pickup.points), axis=1).astype(np.float32)
 
-    monkeypatch.setitem(sys.modules, "app.instrument.offline", SimpleNamespace(render_note=render_note))
+    monkeypatch.setitem(sys.modules, "app.player.offline", SimpleNamespace(render_note=render_note))
     return rendered
 
 
 def test_an_sfz_with_its_samples(run: Run, notes: list[tuple], folder: Path) -> None:
-    patch, out = find_patch(GUITAR).patch, folder / "a.sfz"
-    plan = SampledPlan(patch, (60, 62), layers=2)
+    instrument, out = find_instrument(GUITAR).instrument, folder / "a.sfz"
+    plan = SampledPlan(instrument, (60, 62), layers=2)
     found = run("sampled", GUITAR, out, *SMALL, "--source", "truth", "--rate", 44_100)
     assert found.status == 0 and found.out.startswith(f"{out}: 6 samples, ")
-    assert notes == [(patch.room.mix, z.key, z.velocity, 0.2, 0.2, 44_100, "truth") for z in plan.zones]
+    assert notes == [(instrument.room.mix, z.key, z.velocity, 0.2, 0.2, 44_100, "truth") for z in plan.zones]
     assert len(list((folder / "a_samples").glob("*.flac"))) == 6
     dry = run("sampled", GUITAR, out, *SMALL, "--dry", "--format", "wav", "--bits", "16")
     assert ["--dry leaves the room" in each.err for each in (found, dry)] == [True, False]
-    assert patch.room.mix > 0 and {mix for mix, *_ in notes[6:]} == {0.0}
+    assert instrument.room.mix > 0 and {mix for mix, *_ in notes[6:]} == {0.0}
     for path in (folder / "a_samples").iterdir():
         facts = soundfile.info(path)
         assert path.stat().st_size == 44 + 2 * facts.channels * facts.frames
@@ -141,7 +141,7 @@ def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
     monkeypatch.setattr("app.export.plugin.build.build_plugin", made_at_once)
     image = "app.export.plugin.image.image_of"
-    monkeypatch.setattr(image, lambda patch, _: Image(identifier(patch.name), patch.name, b"", (), ()))
+    monkeypatch.setattr(image, lambda instrument, _: Image(identifier(instrument.name), instrument.name, b"", (), ()))
     return tmp_path
 
 
@@ -153,7 +153,7 @@ def test_one_bank_does_not_replace_another(run: Run, home: Path) -> None:
     assert run("plugin", "all", "--install").status == 0
     whole = held(home)["Learned Strings.clap"]
     assert whole > 50
-    many = [entry.name for entry in list_patches(SHIPPED)[0]][:9]
+    many = [entry.name for entry in list_instruments(SHIPPED)[0]][:9]
     assert run("plugin", *many, "--install").status == 0
     (name,) = (name for name, count in held(home).items() if count == 9)
     assert name.endswith(" + 8 others.clap") and held(home)["Learned Strings.clap"] == whole

@@ -17,9 +17,9 @@ import pytest
 import soundfile
 
 from app.commands.cli import main
-from app.instrument import learned
-from app.instrument.offline import render_note
-from app.patches.library import find_patch
+from app.instruments.library import find_instrument
+from app.player import learned
+from app.player.offline import render_note
 from app.shared.parameters import NOISE_DB
 from engine.presets import load_preset
 from engine.whole_file import WriteError
@@ -45,8 +45,8 @@ WORDS = ("--name", "My string", "--scale-length", "0.65", "--json")
 def whole(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """A folder with the instrument that was learned, and what the command printed."""
     folder = tmp_path_factory.mktemp("whole")
-    with pytest.MonkeyPatch.context() as patched, redirect_stdout(io.StringIO()) as printed:
-        patched.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+    with pytest.MonkeyPatch.context() as instrumented, redirect_stdout(io.StringIO()) as printed:
+        instrumented.setenv("LEARNED_STRINGS_PRESETS", str(folder))
         assert main(["learn", str(recording), *WORDS]) == 0
     return folder, json.loads(printed.getvalue().encode())
 
@@ -69,7 +69,7 @@ def test_a_note_becomes_an_instrument(
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
     assert data["recordings"][0]["errors"]["esr"] < 0.01
     assert Path(data["preset"]) == own / "my_string.safetensors"
-    assert (own / "bodies" / "my_string.wav").is_file() and (own / "patches" / "my_string.json").is_file()
+    assert (own / "bodies" / "my_string.wav").is_file() and (own / "instruments" / "my_string.json").is_file()
 
     out = tmp_path / "again.wav"  # which is without the attack
     assert run("render", "my_string", out, "--as-recorded").status == 0
@@ -80,15 +80,15 @@ def test_a_note_becomes_an_instrument(
     part = slice(round(0.11 * rate_hz), round(0.85 * rate_hz))
     assert np.sum((truth[part] - sound[part]) ** 2) < 0.01 * np.sum(truth[part] ** 2)
 
-    patch = find_patch("my_string").patch
-    low, high = patch.range
+    instrument = find_instrument("my_string").instrument
+    low, high = instrument.range
     preset, middle = load_preset(own / "my_string.safetensors"), (low + high) // 2
     for key in (low, middle, high):
-        assert np.abs(render_note(patch, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
+        assert np.abs(render_note(instrument, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
 
     # the recorded attack sounds with the stroke, as loud at every rate, and has a switch
-    assert patch.noise.kind == "recorded"
-    loud, off = (patch.with_value("noise.onset_db", each) for each in (0.0, NOISE_DB[0]))
+    assert instrument.noise.kind == "recorded"
+    loud, off = (instrument.with_value("noise.onset_db", each) for each in (0.0, NOISE_DB[0]))
     energies = []
     for rate in (44_100, 96_000):
         first, second = (render_note(each, preset, middle, 100, 0.4, 0.4, rate) for each in (loud, off))
@@ -138,8 +138,8 @@ def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
         save(*given)
         raise KeyboardInterrupt
 
-    with monkeypatch.context() as patched:
-        patched.setattr("training.recording.fit.save", save_and_stop)
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr("training.recording.fit.save", save_and_stop)
         stopped = run("learn", recording, "--name", "Mine")
     assert stopped.status == 130 and "the same command continues there" in stopped.err
     (checkpoint,) = (own / "unfinished").iterdir()
@@ -169,8 +169,8 @@ def test_where_an_instrument_cannot_be_written_none_of_its_files_stays(
     run: Run, recording: Path, own: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
-        raise WriteError("patches: cannot be written (No space left on device)")
+        raise WriteError("instruments: cannot be written (No space left on device)")
 
-    monkeypatch.setattr(learned, "save_patch", full)
+    monkeypatch.setattr(learned, "save_instrument", full)
     assert "No space left" in run("learn", recording, "--name", "My string").failure
     assert files(own) == []

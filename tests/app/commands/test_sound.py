@@ -16,9 +16,9 @@ import soundfile
 from numpy.typing import NDArray
 
 from app.export.note import default_file_name
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.patches.library import SHIPPED as PATCHES
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.player.events import NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
 from app.shared.version import program_version
 from engine.plain_text import name_text
 from engine.pluck import Pluck
@@ -282,15 +282,15 @@ def test_parts_of_a_song_sound_together_as_each_alone_and_softer_where_they_woul
 
 
 def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(play: Play, tmp_path: Path) -> None:
-    patch = json.loads((PATCHES / "classical_guitar.json").read_text(encoding="utf-8"))
-    (tmp_path / "mine.json").write_text(json.dumps({**patch, "body": {"name": "a cello", "mix": 0.5}}))
+    instrument = json.loads((INSTRUMENTS / "classical_guitar.json").read_text(encoding="utf-8"))
+    (tmp_path / "mine.json").write_text(json.dumps({**instrument, "body": {"name": "a cello", "mix": 0.5}}))
     sound, done = play(TONE, tmp_path / "mine.json")
     assert "is played without its body: the body a cello is not here" in done.err
     assert done.out.startswith(f"{tmp_path / 'one.wav'}: 0.5 s of model in ")
     assert abs(sound).max() > 0.01
 
 
-def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(play: Play) -> None:
+def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_instrument(play: Play) -> None:
     def spectrum(*keys: int) -> NDArray[np.float64]:
         sound = play([TimedEvent(0.0, NoteOn(key, 90, 2)) for key in keys], "oud")[0][:, 0]
         return np.abs(np.fft.rfft(sound * np.hanning(len(sound))))
@@ -354,7 +354,7 @@ def test_names_that_are_no_utf_8_are_read_written_and_printed(run: Run, tmp_path
     except (OSError, UnicodeError):
         pytest.skip("this system has no such names")
     (folder / f"{CAFE}.mid").write_bytes(midi_bytes(TONE))
-    shutil.copy(PATCHES / "classical_guitar.json", folder / f"{CAFE}.json")
+    shutil.copy(INSTRUMENTS / "classical_guitar.json", folder / f"{CAFE}.json")
     preset = PRESETS / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
     shutil.copy(preset, folder / f"{CAFE}.safetensors")
     np.save(folder / f"{CAFE}.npy", 1e-3 * np.sin(np.pi * np.linspace(0, 1, 101))[None])

@@ -10,24 +10,24 @@ from pathlib import Path
 import pytest
 
 from app.export.journal import Journal, left_journals
-from app.instrument.events import (
+from app.instruments.instrument import Instrument
+from app.instruments.library import list_instruments
+from app.player.events import (
     KEYS,
     Bend,
     ControlChange,
     Event,
+    InstrumentTurned,
     Meter,
     NoteOff,
     NoteOn,
-    PatchTurned,
     TimedEvent,
     played_from,
 )
-from app.patches.library import list_patches
-from app.patches.patch import Patch
 from engine.pluck import Pluck
 
 NOW = datetime(2024, 5, 6, 7, 8, 9, 1234, tzinfo=UTC)
-PATCHES = [entry.patch for entry in list_patches()[0]]
+INSTRUMENTS = [entry.instrument for entry in list_instruments()[0]]
 
 
 def drawn(draw: random.Random) -> Event:
@@ -37,10 +37,10 @@ def drawn(draw: random.Random) -> Event:
         [None, Pluck(draw.uniform(0.02, 0.98), draw.uniform(0, 20), "rounded", draw.uniform(0.02, 1))]
     )
     string = draw.choice([None, draw.randrange(6)])
-    patch = draw.choice(PATCHES)
-    turned = patch.model_copy(update={"level_db": patch.level_db - draw.random()})
+    instrument = draw.choice(INSTRUMENTS)
+    turned = instrument.model_copy(update={"level_db": instrument.level_db - draw.random()})
     tuned = turned.model_copy(
-        update={"tuning": patch.tuning.model_copy(update={"transpose": draw.randrange(-12, 13)})}
+        update={"tuning": instrument.tuning.model_copy(update={"transpose": draw.randrange(-12, 13)})}
     )
     return draw.choice(
         [
@@ -48,14 +48,14 @@ def drawn(draw: random.Random) -> Event:
             NoteOff(draw.randrange(128), channel, string),
             Bend(draw.uniform(-1, 1), channel),
             ControlChange(draw.randrange(128), draw.randrange(128), channel),
-            PatchTurned(draw.choice([patch, turned, tuned])),
+            InstrumentTurned(draw.choice([instrument, turned, tuned])),
         ]
     )
 
 
 def recorded(draw: random.Random, events: int) -> list[TimedEvent]:
     times_s = sorted(draw.uniform(0, 100) for _ in range(events))
-    first = [TimedEvent(0.0, PatchTurned(draw.choice(PATCHES))), TimedEvent(0.0, NoteOn(60, 90))]
+    first = [TimedEvent(0.0, InstrumentTurned(draw.choice(INSTRUMENTS))), TimedEvent(0.0, NoteOn(60, 90))]
     return first + [TimedEvent(time_s, drawn(draw)) for time_s in times_s]
 
 
@@ -85,7 +85,7 @@ def test_what_is_written_is_read(tmp_path: Path, seed: int) -> None:
     assert played is not None
     assert list(played.events) == played_from(events, 101.5, meter is not None)
     assert played.meter == meter and NoteOn(61, 90) not in [entry.event for entry in played.events]
-    assert played.patch == events[0].event.patch  # type: ignore[union-attr]
+    assert played.instrument == events[0].event.instrument  # type: ignore[union-attr]
     assert played.recorded == NOW
     assert (played.source, played.difference_gain_db) == ("model", 0.0)
 
@@ -117,7 +117,7 @@ def test_cut_at_any_byte_it_gives_the_whole_lines_before(tmp_path: Path) -> None
 
 
 HEAD = json.dumps({"version": 1, "recorded": NOW.isoformat()})
-FIRST = json.dumps({"t": 0.0, "patch": PATCHES[0].model_dump(mode="json")})
+FIRST = json.dumps({"t": 0.0, "instrument": INSTRUMENTS[0].model_dump(mode="json")})
 ON = '{"t": 1.0, "on": {"key": 60, "velocity": 90}}'
 
 
@@ -149,8 +149,8 @@ ON = '{"t": 1.0, "on": {"key": 60, "velocity": 90}}'
         '{"t": 2, "turned": [[["preset"], "../../x"]]}',
         '{"t": 2, "turned": [[[], {}]]}',
         '{"t": 2, "turned": 3}',
-        '{"t": 2, "patch": {}}',
-        '{"t": 2, "patch": []}',
+        '{"t": 2, "instrument": {}}',
+        '{"t": 2, "instrument": []}',
         '{"t": 2, "what": {}}',
         '{"t": 2, "on": {"key": 60, "velocity": 90}, "off": {"key": 60}}',
         '{"source": "preset:x", "difference_gain_db": 0}',
@@ -165,7 +165,7 @@ def test_of_a_damaged_journal_what_stands_before_is_kept(tmp_path: Path, line: s
     played = journal.read()
     assert played is not None
     assert [each.event for each in played.events if isinstance(each.event, NoteOn)] == [NoteOn(60, 90)]
-    assert isinstance(played.patch, Patch)
+    assert isinstance(played.instrument, Instrument)
 
 
 @pytest.mark.parametrize("first", ["", "{}", '{"version": 2}', '{"version": 1, "recorded": "x"}', "RIFF", FIRST])

@@ -14,10 +14,10 @@ from app.export.note import HeardNote, NoteExport, musical_name
 from app.export.recipe import SoundRecipe, read_recipe
 from app.export.sound import compared_sounds
 from app.export.wav import WavSettings
-from app.instrument.events import NoteOn, TimedEvent
-from app.instrument.offline import render_events
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import NoteOn, TimedEvent
+from app.player.offline import render_events
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
 from engine.pluck import Pluck
@@ -28,7 +28,7 @@ from engine.voices import model_program, voice_blocks
 from tests.app.sounds import export_sound
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
-GUITAR = read_patch(PATCHES / "classical_guitar.json")
+GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
 FIXED = ExportChoices(until_decayed=False, seconds=0.3, format="wav 32f", normalise=False)
 
 
@@ -126,7 +126,7 @@ def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitu
 
 def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) -> None:
     """It is as loud as those of the key's own model and truth: its gain is that of the whole instrument."""
-    electric = read_patch(PATCHES / "electric_guitar_bridge_pick_up.json")
+    electric = read_instrument(INSTRUMENTS / "electric_guitar_bridge_pick_up.json")
     assert electric.amp.drive_db > 0
     event = NoteOn(52, 100)
     preset = SHIPPED / "studio_any_string.safetensors"

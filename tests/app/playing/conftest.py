@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import PluckAt
+from app.player.events import PluckAt
 from app.playing.keyboard import PluckRange
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes

@@ -1,4 +1,4 @@
-"""The keys of a patch, played by events, in a mixer whose frames the test takes."""
+"""The keys of an instrument, played by events, in a mixer whose frames the test takes."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.drum_keys import DrumKeys
-from app.instrument.effects import body_curves
-from app.instrument.events import KEYS, Bend, ControlChange, NoteOff, NoteOn, PatchTurned
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
-from app.patches.patch import BodyChoice, Patch
+from app.instruments.instrument import BodyChoice, Instrument
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.compiled import InstrumentPlayer
+from app.player.drum_keys import DrumKeys
+from app.player.effects import body_curves
+from app.player.events import KEYS, Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn
 from app.playing import recorder
 from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
@@ -41,20 +41,20 @@ from engine.pluck import Pluck
 from engine.values.ear import Ear
 from engine.voices import Mixer
 from engine.voices.voice import FADE_S
-from tests.app.instrument.seen import Seen, seen, taken_up
 from tests.app.monitors import find_shipped, hears
+from tests.app.player.seen import Seen, seen, taken_up
 
 Wait = Callable[[Callable[[], bool]], None]
 EAR = Ear((0.3,))
-FRAME_DRUM, HARP = (read_patch(PATCHES / f"{name}.json") for name in ("frame_drum", "concert_harp"))
-SHIPPED = read_patch(PATCHES / "steel_string_acoustic.json")
-PATCH = SHIPPED.model_copy(  # its other strings stay silent, so that silence can be heard
+FRAME_DRUM, HARP = (read_instrument(INSTRUMENTS / f"{name}.json") for name in ("frame_drum", "concert_harp"))
+SHIPPED = read_instrument(INSTRUMENTS / "steel_string_acoustic.json")
+INSTRUMENT = SHIPPED.model_copy(  # its other strings stay silent, so that silence can be heard
     update={"body": BodyChoice(), "sympathy_s_kg": 0.0, "pluck": SHIPPED.pluck.model_copy(update={"variation": 0.0})}
 )
 
 
 class Played:
-    """Notes whose instrument is a patch, with what they report and which effects they ask for."""
+    """Notes whose instrument is an instrument, with what they report and which effects they ask for."""
 
     def __init__(self, sound: Any, wait: Wait) -> None:
         self.sound, self.wait = sound, wait
@@ -64,13 +64,13 @@ class Played:
         self.notes = Notes(sound, Sources(), find_shipped, report, self.effects.append)
         self.notes.set_monitor(hears("model"))
         self.keys, self.handle = self.notes.keys, self.notes.handle
-        self.choose(PATCH)
+        self.choose(INSTRUMENT)
 
-    def choose(self, patch: Patch, single: str | None = None) -> None:
+    def choose(self, instrument: Instrument, single: str | None = None) -> None:
         """Another instrument, and wait until its keys sound and its effects are set."""
-        self.notes.set_instrument(patch, EAR, single)
+        self.notes.set_instrument(instrument, EAR, single)
         if single is None:
-            self.wait(lambda: self.keys.player is not None and self.keys.player.patch == patch)
+            self.wait(lambda: self.keys.player is not None and self.keys.player.instrument == instrument)
         self.settle()
 
     def settle(self) -> None:
@@ -174,7 +174,7 @@ def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Played) -> None:
 
 
 def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the loudness of the turned patch takes: here it takes until the key has sounded."""
+    """Whatever the loudness of the turned instrument takes: here it takes until the key has sounded."""
     begun, held, struck = Event(), Event(), list[object]()
 
     def slow(*args: Any) -> Any:
@@ -182,8 +182,8 @@ def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch
         held.wait(30)
         return body_curves(*args)
 
-    monkeypatch.setattr("app.instrument.strings.body_curves", slow)
-    knob = Thread(target=played.notes.set_instrument, args=(PATCH.with_value("knobs.stiffness", 3.0), EAR))
+    monkeypatch.setattr("app.player.strings.body_curves", slow)
+    knob = Thread(target=played.notes.set_instrument, args=(INSTRUMENT.with_value("knobs.stiffness", 3.0), EAR))
     key = Thread(target=lambda: struck.append(played.handle(NoteOn(52, 60))))
     knob.start()
     played.wait(begun.is_set)
@@ -202,19 +202,19 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
     before = played.now(struck).now
     played.keys.begin_recording()
     for stiffness in np.linspace(1.1, 3.0, 20):
-        played.notes.set_instrument(PATCH.with_value("knobs.stiffness", float(stiffness)), EAR)
+        played.notes.set_instrument(INSTRUMENT.with_value("knobs.stiffness", float(stiffness)), EAR)
     played.notes.listen(Ear((0.1, 0.2), "velocity"))
     made = played.strike(NoteOn(50, 60))
-    assert made.ear.points == (0.1, 0.2) and made.patch.knobs.stiffness == 3.0
-    assert made.pluck is not None and made.pluck.position == PATCH.pluck.position
+    assert made.ear.points == (0.1, 0.2) and made.instrument.knobs.stiffness == 3.0
+    assert made.pluck is not None and made.pluck.position == INSTRUMENT.pluck.position
     played.settle()
     assert played.now(struck).now.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
     exact = played.player
-    fresh = InstrumentPlayer(exact.patch, exact.preset, 48_000, {"model": 1.0}, exact.ear)
+    fresh = InstrumentPlayer(exact.instrument, exact.preset, 48_000, {"model": 1.0}, exact.ear)
     fresh.handle(NoteOn(45, 60))
     fresh.compiled.catch_up(Mixer(48_000).address)
     assert played.strike(NoteOn(45, 60)).gain == fresh.compiled.reports()[0].gain
-    last = [event for event in played.recorded() if isinstance(event, PatchTurned)][-1].patch
+    last = [event for event in played.recorded() if isinstance(event, InstrumentTurned)][-1].instrument
     assert (last.knobs.stiffness, last.pickup.points, last.pickup.kind) == (3.0, (0.1, 0.2), "velocity")
 
 
@@ -226,8 +226,8 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
 ) -> None:
     """After an impossible tuning, what was played stays."""
     made = played.strike(NoteOn(45, 60))
-    value = PATCH.tuning.model_copy(update=value) if part == "tuning" else value
-    played.notes.set_instrument(PATCH.model_copy(update={part: value}), EAR)
+    value = INSTRUMENT.tuning.model_copy(update=value) if part == "tuning" else value
+    played.notes.set_instrument(INSTRUMENT.model_copy(update={part: value}), EAR)
     played.settle()
     played.notes.listen(Ear((0.1,)))
     played.settle()
@@ -239,16 +239,16 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
         assert (again.parameters, again.ear) == (made.parameters, Ear((0.1,)))
 
 
-def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
+def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
     held = Event()
     played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)
-    played.notes.set_instrument(PATCH, EAR)
+    played.notes.set_instrument(INSTRUMENT, EAR)
     played.notes.set_instrument(None, EAR, "")
     held.set()
     played.settle()
     assert played.keys.player is None
-    played.choose(PATCH)
+    played.choose(INSTRUMENT)
 
 
 def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
@@ -264,16 +264,18 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
     monkeypatch.setattr(DrumKeys, "of_key", slow)
     played.notes.set_instrument(FRAME_DRUM, EAR)
     played.wait(begun.is_set)
-    played.notes.set_instrument(PATCH, EAR)
+    played.notes.set_instrument(INSTRUMENT, EAR)
     held.set()
-    played.choose(PATCH)
+    played.choose(INSTRUMENT)
     assert len(computed) == 1
 
 
-def test_a_patch_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(played: Played) -> None:
-    played.choose(PATCH, "gone")
+def test_a_instrument_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(
+    played: Played,
+) -> None:
+    played.choose(INSTRUMENT, "gone")
     assert played.handle(NoteOn(45, 60)) is None and played.handle(NoteOff(45)) is None
-    played.notes.set_instrument(PATCH, EAR)
+    played.notes.set_instrument(INSTRUMENT, EAR)
     played.strike(NoteOn(45, 60))
 
 
@@ -297,7 +299,7 @@ def test_switches_hold_for_another_instruments_player_too(played: Played) -> Non
     switches = [ControlChange(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
     for event in (*switches, ControlChange(STRUM, 127), ControlChange(RESET, 0)):
         played.handle(event)
-    for other in (FRAME_DRUM, PATCH):
+    for other in (FRAME_DRUM, INSTRUMENT):
         played.choose(other)
     played.player.compiled.catch_up(played.sound.mixer.address)
     assert played.player.at_hand == switches
@@ -306,10 +308,12 @@ def test_switches_hold_for_another_instruments_player_too(played: Played) -> Non
 # Body and room
 
 
-WOODEN = PATCH.model_copy(update={"body": BodyChoice(name="guitar", mix=0.4)})
+WOODEN = INSTRUMENT.model_copy(update={"body": BodyChoice(name="guitar", mix=0.4)})
 
 
-def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are_compared(played: Played) -> None:
+def test_effects_are_set_once_and_are_off_without_the_instrument_and_where_models_are_compared(
+    played: Played,
+) -> None:
     del played.effects[:]
     for _ in range(2):
         played.choose(WOODEN)
@@ -328,7 +332,7 @@ def test_effects_are_set_once_and_are_off_without_the_patch_and_where_models_are
 
 def test_the_modulation_wheel_brings_the_room(played: Played) -> None:
     played.choose(WOODEN.model_copy(update={"mod_wheel": "room.mix"}))
-    for value, mix in ((127, 1.0), (0, PATCH.room.mix)):
+    for value, mix in ((127, 1.0), (0, INSTRUMENT.room.mix)):
         played.handle(ControlChange(MOD_WHEEL, value))
         played.settle()
         effects = played.effects[-1]
@@ -339,7 +343,7 @@ def test_the_modulation_wheel_brings_the_room(played: Played) -> None:
 def test_a_body_that_is_not_here_is_reported_once_however_its_knobs_are_turned(played: Played) -> None:
     del played.effects[:]
     for mix in (0.2, 0.3, 0.4):
-        played.choose(PATCH.model_copy(update={"body": BodyChoice(name="a cello", mix=mix)}))
+        played.choose(INSTRUMENT.model_copy(update={"body": BodyChoice(name="a cello", mix=mix)}))
     (reported,) = played.reported
     assert "is played without its body: the body a cello is not here" in reported
     assert all(effects is None or effects.body is None for effects in played.effects)
@@ -402,7 +406,7 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> N
         played.handle(event, Due(played.sound.mixer, begin + frame, 0.0))
     heard = played.hear(begin - 64 + 28_800)[begin - 64 :]
     mixer, expected = Mixer(48_000), []
-    player = InstrumentPlayer(PATCH, played.player.preset, 48_000, {"model": 1.0, "truth": 0.0}, EAR)
+    player = InstrumentPlayer(INSTRUMENT, played.player.preset, 48_000, {"model": 1.0, "truth": 0.0}, EAR)
     mixer.set_player(player.compiled)
     mixer.render(begin)
     for frame, event, end in zip(frames, events, (*frames[1:], 28_800), strict=True):
@@ -456,8 +460,11 @@ def test_what_is_played_is_recorded_from_its_first_note_on(played: Played) -> No
     for event in (NoteOn(45, 60), NoteOff(45)):
         played.handle(event)
     events = played.keys.recorder.end()
-    assert [type(each.event) for each in events] == [PatchTurned, NoteOn, NoteOff] and events[1].time_s == 0
-    assert (events[0].event.patch.pickup.points, events[0].event.patch.pickup.kind) == (EAR.points, EAR.pickup)  # type: ignore[union-attr]
+    assert [type(each.event) for each in events] == [InstrumentTurned, NoteOn, NoteOff] and events[1].time_s == 0
+    assert (events[0].event.instrument.pickup.points, events[0].event.instrument.pickup.kind) == (
+        EAR.points,
+        EAR.pickup,
+    )  # type: ignore[union-attr]
     played.keys.begin_recording()
     assert played.recorded() == []
 
@@ -478,7 +485,7 @@ def test_a_recording_begins_and_ends_as_the_hands_are(played: Played) -> None:
         played.handle(event)
     events, heard, mixer = played.recorded(), played.player, Mixer(48_000)
     assert events[-2:] == [ControlChange(SUSTAIN, 0), NoteOff(52)]
-    again = InstrumentPlayer(heard.patch, heard.preset, 48_000, {"model": 1.0, "truth": 0.0}, heard.ear)
+    again = InstrumentPlayer(heard.instrument, heard.preset, 48_000, {"model": 1.0, "truth": 0.0}, heard.ear)
     for event in events[:-2]:
         again.handle(event)
     as_heard = {each.key: each.now for each in taken_up(heard, played.sound.mixer)}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.instrument.events import Meter
+from app.player.events import Meter
 from app.playing.metronome import Metronome, click
 from app.playing.playback import AHEAD_S
 from engine.voices import Mixer

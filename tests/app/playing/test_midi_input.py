@@ -15,24 +15,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, release_all
-from app.instrument.midi_file import event_of
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
-from app.patches.patch import Damping, Pickup
+from app.instruments.instrument import Damping, Pickup
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import Bend, ControlChange, NoteOff, NoteOn, release_all
+from app.player.midi_file import event_of
 from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidiInput, load_backend
 from app.playing.midi_port import MidiInput
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.session.choices import Choices
-from app.shared.parameters import LEARNABLE, OF_CHOICES, OF_PATCHES
+from app.shared.parameters import LEARNABLE, OF_CHOICES, OF_INSTRUMENTS
 from engine.values.ear import Ear
-from tests.app.instrument.stage import cents, level_db, pitch_hz
 from tests.app.monitors import find_shipped, hears
+from tests.app.player.stage import cents, level_db, pitch_hz
 
 ROOT = Path(__file__).parents[3]
-GUITAR = read_patch(PATCHES / "classical_guitar.json")
+GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
 
 
 @pytest.mark.skipif(shutil.which("jackd") is None, reason="no JACK server is installed")
@@ -191,10 +191,10 @@ class Cable:
 def test_messages_of_an_input_are_heard(sound: Any, wait: Callable[[Callable[[], bool]], None]) -> None:
     """In tune, bent, damped by a release or by closing the input, held by the pedal."""
     strings = {"polarisations": None, "sympathy_s_kg": 0.0, "damping": Damping(release_t60_s=0.15)}
-    patch = read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update=strings)
+    instrument = read_instrument(INSTRUMENTS / "steel_string_acoustic.json").model_copy(update=strings)
     notes, cable = Notes(sound, Sources(), find_shipped, lambda *report: pytest.fail(str(report))), Cable()
     notes.set_monitor(hears("model"))
-    notes.set_instrument(patch, Ear((0.3,)))
+    notes.set_instrument(instrument, Ear((0.3,)))
     wait(lambda: notes.keys.player is not None)
     released: list[object] = []
     midi = MidiInput(notes.handle, lambda: cable, lambda event: released.append(event) or notes.handle(event))
@@ -250,20 +250,22 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
     assert OF_CHOICES["speed"].value(64 / 127) == pytest.approx(0.001**0.5, rel=0.05)
 
 
-@pytest.mark.parametrize("field", [field for field in LEARNABLE if field in OF_PATCHES])
-def test_a_controller_turns_every_parameter_of_the_patch(field: str) -> None:
-    patch = GUITAR.model_copy(update={"pickup": Pickup(points=(0.3, 0.7))})
-    patch = patch.with_value("pluck.softest_mm", 0.001)  # which may not be above the hardest
-    turns = turns_of(ControlChange(16, 64), MidiChoices().learned(field, 16), patch)
-    assert turns["patch"].value(field) == pytest.approx(OF_PATCHES[field].value(64 / 127))
+@pytest.mark.parametrize("field", [field for field in LEARNABLE if field in OF_INSTRUMENTS])
+def test_a_controller_turns_every_parameter_of_the_instrument(field: str) -> None:
+    instrument = GUITAR.model_copy(update={"pickup": Pickup(points=(0.3, 0.7))})
+    instrument = instrument.with_value("pluck.softest_mm", 0.001)  # which may not be above the hardest
+    turns = turns_of(ControlChange(16, 64), MidiChoices().learned(field, 16), instrument)
+    assert turns["instrument"].value(field) == pytest.approx(OF_INSTRUMENTS[field].value(64 / 127))
     assert turns_of(ControlChange(16, 64), MidiChoices().learned(field, 16), None) == {}
 
 
 def test_a_controller_turns_a_macro_and_leaves_what_is_impossible() -> None:
     soft = GUITAR.with_value("pluck.hardest_mm", 0.5)
-    for field, patch, expected in (
+    for field, instrument, expected in (
         ("macros.0", GUITAR, GUITAR.turned(0, 1.0)),
         ("macros.7", GUITAR, GUITAR),  # it has fewer
         ("pluck.softest_mm", soft, soft),  # it may not be above the hardest
     ):
-        assert turns_of(ControlChange(16, 127), MidiChoices().learned(field, 16), patch)["patch"] == expected
+        assert (
+            turns_of(ControlChange(16, 127), MidiChoices().learned(field, 16), instrument)["instrument"] == expected
+        )

@@ -17,10 +17,10 @@ import torch
 from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
 from app.audio.sound import Sound
-from app.instrument.compiled import InstrumentPlayer
-from app.instrument.events import NoteOff, NoteOn, PluckAt
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.compiled import InstrumentPlayer
+from app.player.events import NoteOff, NoteOn, PluckAt
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
 from app.playing.key_note import DROPPED, KeyNote
@@ -491,7 +491,7 @@ def is_loud(sound: Any) -> bool:
 def test_a_key_that_fails_costs_its_own_note(lab: Lab, monkeypatch: Any, kind: type, name: str) -> None:
     notes = Notes(lab.sound, Sources(), find_shipped, lambda message, details: lab.reports.append((message, details)))
     notes.set_monitor(hears("model"))
-    notes.set_instrument(read_patch(PATCHES / "classical_guitar.json"), EAR)
+    notes.set_instrument(read_instrument(INSTRUMENTS / "classical_guitar.json"), EAR)
     lab.wait(lambda: notes.keys.player is not None)
     monkeypatch.setattr(kind, name, once(getattr(kind, name), at=2))
     begun = []

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from app.instrument.events import KEYS, Bend, Event, NoteOff, NoteOn, TimedEvent, release_all
+from app.player.events import KEYS, Bend, Event, NoteOff, NoteOn, TimedEvent, release_all
 from app.playing.playback import AHEAD_S, Due, Playback
 from engine.voices import Mixer
 

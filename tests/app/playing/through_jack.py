@@ -16,8 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn
-from app.instrument.midi_file import message_of
+from app.player.events import Bend, ControlChange, Event, NoteOff, NoteOn
+from app.player.midi_file import message_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 

@@ -13,7 +13,7 @@ import soundfile
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
-from app.instrument.bodies import body_names
+from app.player.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, list_presets
 from app.rendering.note_sound import NoteSound

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from app.instrument.drum_keys import DrumKeys
-from app.instrument.events import NoteOn
-from app.patches.drums import Drums, PlayedDrum
-from app.patches.patch import Patch
+from app.instruments.drums import Drums, PlayedDrum
+from app.instruments.instrument import Instrument
+from app.player.drum_keys import DrumKeys
+from app.player.events import NoteOn
 from app.rendering import RenderRequest, Take, drum_line
 from app.rendering.blow import RATE_HZ, BlowTake, Head
 from app.rendering.job import RenderJob
@@ -47,14 +47,14 @@ STEEL = DrumParameters(
 PLACE, HARDEST, SOFTEST = (0.3, 0.1), 8.0, 0.01
 
 
-def drum_of(drum: DrumParameters, highest_hz: float) -> Patch:
+def drum_of(drum: DrumParameters, highest_hz: float) -> Instrument:
     """An instrument of one drum."""
     played = PlayedDrum(note=60, name="Drum", drum=drum, place=PLACE, softest_m_s=SOFTEST, hardest_m_s=HARDEST)
-    return Patch(name="Drum", category="drums", strings=Drums(drums=(played,), highest_hz=highest_hz))
+    return Instrument(name="Drum", category="drums", strings=Drums(drums=(played,), highest_hz=highest_hz))
 
 
-def modes_in(patch: Patch) -> DrumModes:
-    drum_key = DrumKeys(patch, Ear((0.5,))).of_key(60)
+def modes_in(instrument: Instrument) -> DrumModes:
+    drum_key = DrumKeys(instrument, Ear((0.5,))).of_key(60)
     assert drum_key is not None
     return drum_key.modes
 
@@ -81,8 +81,8 @@ def helper() -> Iterator[Executor]:
         yield pool
 
 
-def request_of(patch: Patch, velocity: int = 127, seconds: float = 0.25) -> RenderRequest:
-    return RenderRequest(PRESET, Pluck(), seconds, Ear((0.5,)), struck=Struck(patch, NoteOn(60, velocity)))
+def request_of(instrument: Instrument, velocity: int = 127, seconds: float = 0.25) -> RenderRequest:
+    return RenderRequest(PRESET, Pluck(), seconds, Ear((0.5,)), struck=Struck(instrument, NoteOn(60, velocity)))
 
 
 def rendered(request: RenderRequest, helper: Executor) -> BlowTake:
@@ -102,9 +102,9 @@ def true_amplitudes(modes: DrumModes, strike: Strike, frames: int) -> np.ndarray
     return solver.solve(ModalState(torch.zeros_like(speeds), speeds), frames)[0].numpy()
 
 
-@pytest.mark.parametrize("patch", [TOM, PLATE, BAR], ids=["tom", "plate", "bar"])
-def test_in_real_time_a_picture_is_the_true_motion(patch: Patch, helper: Executor) -> None:
-    take, modes = rendered(request_of(patch), helper), modes_in(patch)
+@pytest.mark.parametrize("instrument", [TOM, PLATE, BAR], ids=["tom", "plate", "bar"])
+def test_in_real_time_a_picture_is_the_true_motion(instrument: Instrument, helper: Executor) -> None:
+    take, modes = rendered(request_of(instrument), helper), modes_in(instrument)
     true = true_amplitudes(modes, HARD, take.frames - 1)
     head = take.head
     shapes = modes.shapes(head.places)[: len(head.shapes)]

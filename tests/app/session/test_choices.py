@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.patches.patch import Fretted, Patch, Pickup
+from app.instruments.instrument import Fretted, Instrument, Pickup
 from app.session.choices import Choices
 from app.stage.session import Session
 from engine.values.string import StringParameters
@@ -65,32 +65,39 @@ def test_slots_hold_any_two_sources_and_are_switched_there_and_back() -> None:
 
 
 def test_keys_play_what_was_chosen_last() -> None:
-    patch = Patch(name="p", category="harp", preset="many", strings=Fretted(string=StringParameters(**STRING)))
-    string = patch.strings.string  # type: ignore[union-attr]
-    session = Session(Choices(instrument=patch, string=string))
+    instrument = Instrument(
+        name="p", category="harp", preset="many", strings=Fretted(string=StringParameters(**STRING))
+    )
+    string = instrument.strings.string  # type: ignore[union-attr]
+    session = Session(Choices(instrument=instrument, string=string))
     session.update(preset="one")
     choices = session.choices
-    assert (choices.single, choices.patch, choices.string) == ("one", patch, None)
+    assert (choices.single, choices.instrument, choices.string) == ("one", instrument, None)
     session.update(preset="many")
-    assert (session.choices.played, session.choices.single) == (patch, None), "it is the preset of the instrument"
+    assert (session.choices.played, session.choices.single) == (instrument, None), (
+        "it is the preset of the instrument"
+    )
     session.update(preset="one")
-    session.play_patch()
-    assert (session.choices.preset, session.choices.plays_patch) == ("many", True)
+    session.play_instrument()
+    assert (session.choices.preset, session.choices.plays_instrument) == ("many", True)
     session.play(string=string)
     session.play_string()
     choices = session.choices
-    assert (choices.single, choices.patch, choices.string) == ("many", patch, string)
-    session.update(patch=patch.model_copy(update={"name": "turned"}))
-    assert (session.choices.plays_patch, session.choices.patch and session.choices.patch.name) == (False, "turned")
+    assert (choices.single, choices.instrument, choices.string) == ("many", instrument, string)
+    session.update(instrument=instrument.model_copy(update={"name": "turned"}))
+    assert (session.choices.plays_instrument, session.choices.instrument and session.choices.instrument.name) == (
+        False,
+        "turned",
+    )
 
 
 @pytest.mark.parametrize("plays", ["pitch", "place", None])
 @pytest.mark.parametrize("preset", ["many", "one"])
 def test_choices_from_before_the_instrument_are_understood(plays: str | None, preset: str) -> None:
-    patch = played_patch(0.2)
-    old = {"preset": preset, "patch": patch.model_dump(), "string": STRING, "position": 0.4}
+    instrument = played_instrument(0.2)
+    old = {"preset": preset, "instrument": instrument.model_dump(), "string": STRING, "position": 0.4}
     choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
-    assert (choices.patch, choices.position) == (patch, 0.4)
+    assert (choices.instrument, choices.position) == (instrument, 0.4)
     assert choices.single == (preset if plays == "place" else None)
     assert (choices.string is None) == (preset == "one" and plays != "place"), "it is no string of that preset"
     assert Choices.model_validate({"preset": preset}).single == preset
@@ -98,30 +105,30 @@ def test_choices_from_before_the_instrument_are_understood(plays: str | None, pr
 
 
 def test_choices_of_two_kinds_of_instruments_are_understood() -> None:
-    patch = played_patch(0.2).model_dump()
-    played = Choices.model_validate({"instrument": patch, "kept": None, "position": 0.4})
-    assert (played.played, played.single, played.preset) == (played_patch(0.2), None, "many")
-    beside = Choices.model_validate({"instrument": {"preset": "one"}, "kept": patch, "string": STRING})
-    assert (beside.played, beside.single, beside.patch) == (None, "one", played_patch(0.2))
+    instrument = played_instrument(0.2).model_dump()
+    played = Choices.model_validate({"instrument": instrument, "kept": None, "position": 0.4})
+    assert (played.played, played.single, played.preset) == (played_instrument(0.2), None, "many")
+    beside = Choices.model_validate({"instrument": {"preset": "one"}, "kept": instrument, "string": STRING})
+    assert (beside.played, beside.single, beside.instrument) == (None, "one", played_instrument(0.2))
     assert beside.string is not None
-    assert Choices.model_validate({"instrument": {"preset": "one"}, "kept": None}).patch is None
+    assert Choices.model_validate({"instrument": {"preset": "one"}, "kept": None}).instrument is None
 
 
-def played_patch(*points: float, kind: str = "displacement") -> Patch:
+def played_instrument(*points: float, kind: str = "displacement") -> Instrument:
     strings = Fretted(string=StringParameters(**STRING))
     pickup = Pickup.model_validate({"points": points, "kind": kind})
-    return Patch(name="p", category="harp", preset="many", strings=strings, pickup=pickup)
+    return Instrument(name="p", category="harp", preset="many", strings=strings, pickup=pickup)
 
 
 def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
-    patch = session.choices.patch
-    assert patch is not None
-    return patch.pickup.points, patch.pickup.kind
+    instrument = session.choices.instrument
+    assert instrument is not None
+    return instrument.pickup.points, instrument.pickup.kind
 
 
-def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
+def test_what_is_heard_is_the_pick_up_of_the_instrument_that_keys_play() -> None:
     session = Session()
-    session.update(played=played_patch(0.2))
+    session.update(played=played_instrument(0.2))
     session.update(pickup="velocity")
     session.move_listening_point(0.3)
     assert pickup_of(session) == ((0.3,), "velocity")
@@ -130,31 +137,31 @@ def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
     session.update(stereo=False)
     assert pickup_of(session) == ((0.3,), "velocity")
     seen = recorded(session)
-    session.update(patch=played_patch(0.6, 0.8))  # the other way
+    session.update(instrument=played_instrument(0.6, 0.8))  # the other way
     choices = session.choices
     assert (choices.listen, choices.listen_right, choices.stereo, choices.pickup) == (0.6, 0.8, True, "displacement")
-    assert seen == [frozenset({"patch", "listen", "listen_right", "stereo", "pickup"})]
+    assert seen == [frozenset({"instrument", "listen", "listen_right", "stereo", "pickup"})]
 
 
-def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:
+def test_a_instrument_that_keys_do_not_play_keeps_its_pick_up() -> None:
     session = Session()
-    session.update(played=played_patch(0.2))
+    session.update(played=played_instrument(0.2))
     session.update(preset="one")
     session.update(listen=0.7, pickup="velocity", stereo=True)
     assert pickup_of(session) == ((0.2,), "displacement")
-    session.update(patch=played_patch(0.4))
+    session.update(instrument=played_instrument(0.4))
     assert session.choices.listen == 0.7
-    session.play_patch()  # it is heard as it is
+    session.play_instrument()  # it is heard as it is
     choices = session.choices
     assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
 
 
-def test_a_patch_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
+def test_a_instrument_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
     target = {"field": "pickup.points.1", "low": 0.5, "high": 0.9}
     macro = {"name": "Width", "targets": (target,)}
-    patch = Patch.model_validate({**dict(played_patch(0.2, 0.8)), "macros": (macro,)})
+    instrument = Instrument.model_validate({**dict(played_instrument(0.2, 0.8)), "macros": (macro,)})
     session = Session()
-    session.update(played=patch)
+    session.update(played=instrument)
     before = session.choices
     with pytest.raises(ValueError, match=r"p stays in stereo: its macro Width"):
         session.update(stereo=False)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from app.shared.parameters import OF_CHOICES, OF_PATCHES, Parameter
+from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS, Parameter
 
 
-@pytest.mark.parametrize("id", [id for id, each in OF_PATCHES.items() if each.words])
+@pytest.mark.parametrize("id", [id for id, each in OF_INSTRUMENTS.items() if each.words])
 def test_each_whole_value_has_its_word(id: str) -> None:
-    parameter = OF_PATCHES[id]
+    parameter = OF_INSTRUMENTS[id]
     low, high = parameter.limits
     assert parameter.whole
     assert len(set(parameter.words)) == len(parameter.words) == high - low + 1
@@ -17,7 +17,7 @@ def test_each_whole_value_has_its_word(id: str) -> None:
     assert all(" " not in word for word in parameter.words)  # plug-ins keep them with spaces between
 
 
-@pytest.mark.parametrize("parameter", {**OF_PATCHES, **OF_CHOICES}.values(), ids=lambda parameter: parameter.id)
+@pytest.mark.parametrize("parameter", {**OF_INSTRUMENTS, **OF_CHOICES}.values(), ids=lambda parameter: parameter.id)
 def test_a_knob_goes_through_its_whole_range_and_back(parameter: Parameter) -> None:
     low, high = parameter.limits
     values = [parameter.value(share / 10) for share in range(11)]

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from app.shared.typed_number import begins_number, typed_number
 
 
@@ -61,7 +61,7 @@ def test_what_is_refused(text: str, unit: str) -> None:
 
 def test_every_parameter_reads_what_it_shows_with_either_sign() -> None:
     draw = random.Random(0)
-    for parameter in {**OF_PATCHES, **OF_CHOICES}.values():
+    for parameter in {**OF_INSTRUMENTS, **OF_CHOICES}.values():
         for _ in range(50):
             value = parameter.value(draw.random())
             if parameter.whole:
@@ -77,7 +77,7 @@ def test_every_parameter_reads_what_it_shows_with_either_sign() -> None:
 
 
 def test_a_share_in_per_cent_is_typed_so() -> None:
-    mix = OF_PATCHES["room.mix"]
+    mix = OF_INSTRUMENTS["room.mix"]
     assert [mix.typed(text) for text in ("20", "20%", "20 %", "100", "0.5")] == [0.2, 0.2, 0.2, 1.0, 0.005]
-    assert OF_PATCHES["tuning.transpose"].typed("2.5") is None
-    assert OF_PATCHES["technique.strokes"].typed("both") == OF_PATCHES["technique.strokes"].typed("2") == 2
+    assert OF_INSTRUMENTS["tuning.transpose"].typed("2.5") is None
+    assert OF_INSTRUMENTS["technique.strokes"].typed("both") == OF_INSTRUMENTS["technique.strokes"].typed("2") == 2

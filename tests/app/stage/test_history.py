@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED, read_instrument
 from app.session.choices import Choices
 from app.stage.session import GATHER_S, RECORDED, Session
 
@@ -36,8 +36,8 @@ def hand() -> Hand:
 
 
 @pytest.fixture(scope="module")
-def guitar() -> Patch:
-    return read_patch(SHIPPED / "classical_guitar.json")
+def guitar() -> Instrument:
+    return read_instrument(SHIPPED / "classical_guitar.json")
 
 
 def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
@@ -119,10 +119,10 @@ def test_a_drag_after_a_note_goes_back_to_where_the_note_was(hand: Hand) -> None
 
 def pickup_of(session: Session) -> tuple[object, ...]:
     choices = session.choices
-    return choices.stereo, choices.pickup, choices.listen, choices.patch and choices.patch.pickup
+    return choices.stereo, choices.pickup, choices.listen, choices.instrument and choices.instrument.pickup
 
 
-def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -> None:
+def test_where_a_instrument_is_heard_is_one_step_of_undo(hand: Hand, guitar: Instrument) -> None:
     hand.session.update(played=guitar)
     states, words = [pickup_of(hand.session)], []
     for change in ({"pickup": "velocity"}, {"stereo": not hand.session.choices.stereo}, {"listen": 0.11}):
@@ -137,7 +137,7 @@ def test_where_a_patch_is_heard_is_one_step_of_undo(hand: Hand, guitar: Patch) -
     assert not hand.session.redo_words
 
 
-def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Patch) -> None:
+def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Instrument) -> None:
     session = hand.session
     session.update(played=guitar)
     own = pickup_of(session)
@@ -145,28 +145,28 @@ def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand
     session.play_string()
     hand.change(1, listen=0.9)
     hand.now_s += 1
-    session.play_patch()
+    session.play_instrument()
     assert pickup_of(session) == own
     steps = []
-    for plays_patch, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
+    for plays_instrument, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
         steps.append(session.undo_words)
         session.undo()
-        assert (session.choices.plays_patch, session.choices.listen) == (plays_patch, listen)
+        assert (session.choices.plays_instrument, session.choices.listen) == (plays_instrument, listen)
     assert steps == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
     assert pickup_of(session) == own
     for _ in steps:
         session.redo()
-    assert (session.choices.plays_patch, pickup_of(session)) == (True, own)
+    assert (session.choices.plays_instrument, pickup_of(session)) == (True, own)
 
 
-def test_each_way_the_next_step_is_named_and_two_knobs_of_a_patch_are_two_however_quick(
-    hand: Hand, guitar: Patch
+def test_each_way_the_next_step_is_named_and_two_knobs_of_a_instrument_are_two_however_quick(
+    hand: Hand, guitar: Instrument
 ) -> None:
     hand.change(played=guitar)
     for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
-        patch = hand.session.choices.patch
-        assert patch is not None
-        hand.change(patch=patch.with_value(field, value))
+        instrument = hand.session.choices.instrument
+        assert instrument is not None
+        hand.change(instrument=instrument.with_value(field, value))
     hand.session.play(position=0.2)
     hand.change(position=0.5)
     words = []

@@ -6,8 +6,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from app.instrument.strings import Strings
-from app.patches.library import SHIPPED, read_patch
+from app.instruments.library import SHIPPED, read_instrument
+from app.player.strings import Strings
 from app.playing.note import PluckVoices
 from app.rendering import RenderRequest
 from app.session.choices import Choices
@@ -15,7 +15,7 @@ from app.stage.stage import Asked, Begun, Chosen, Parked, Rendered, Turned, firs
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 
-HARP, GUITAR = (read_patch(SHIPPED / f"{name}.json") for name in ("concert_harp", "classical_guitar"))
+HARP, GUITAR = (read_instrument(SHIPPED / f"{name}.json") for name in ("concert_harp", "classical_guitar"))
 REQUEST = RenderRequest(Path("one"), Pluck(0.3), 1.0, Ear((0.2,)))
 
 
@@ -25,9 +25,9 @@ def note(request: RenderRequest = REQUEST, from_s: float = 0.0) -> Any:
 
 def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it() -> None:
     stage = first_stage(Choices(single="one"))
-    for patch in (HARP, GUITAR):
-        stage = next_stage(stage, Chosen({"played": patch}))
-        string = Strings(patch).of_key(sum(patch.range) // 2)
+    for instrument in (HARP, GUITAR):
+        stage = next_stage(stage, Chosen({"played": instrument}))
+        string = Strings(instrument).of_key(sum(instrument.range) // 2)
         assert string is not None and stage.choices.string == string.parameters
     low = Strings(HARP).of_key(43)
     assert low is not None

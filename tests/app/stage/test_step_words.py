@@ -6,26 +6,26 @@ from typing import Any
 
 import pytest
 
-from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import ASSIGNABLE, Patch
-from app.shared.parameters import OF_PATCHES
+from app.instruments.instrument import ASSIGNABLE, Instrument
+from app.instruments.library import SHIPPED, read_instrument
+from app.shared.parameters import OF_INSTRUMENTS
 from app.stage.step_words import step_words
 
 
 @pytest.fixture(scope="module")
-def guitar() -> Patch:
-    return read_patch(SHIPPED / "classical_guitar.json")
+def guitar() -> Instrument:
+    return read_instrument(SHIPPED / "classical_guitar.json")
 
 
-def words(before: Patch, after: Patch) -> str:
-    return step_words({"patch": before}, {"patch": after})
+def words(before: Instrument, after: Instrument) -> str:
+    return step_words({"instrument": before}, {"instrument": after})
 
 
-def with_part(patch: Patch, **parts: Any) -> Patch:
-    return Patch.model_validate({**dict(patch), **parts})
+def with_part(instrument: Instrument, **parts: Any) -> Instrument:
+    return Instrument.model_validate({**dict(instrument), **parts})
 
 
-def test_whatever_a_knob_turns_has_words_without_marks(guitar: Patch) -> None:
+def test_whatever_a_knob_turns_has_words_without_marks(guitar: Instrument) -> None:
     for field in ASSIGNABLE:
         if field == "pickup.points.1":
             continue
@@ -36,10 +36,10 @@ def test_whatever_a_knob_turns_has_words_without_marks(guitar: Patch) -> None:
             except ValueError:
                 continue
             assert reported and "_" not in reported and "." not in reported, field
-            assert reported == ("listening point" if field.startswith("pickup.") else OF_PATCHES[field].name)
+            assert reported == ("listening point" if field.startswith("pickup.") else OF_INSTRUMENTS[field].name)
 
 
-def test_a_macro_is_reported_by_its_name(guitar: Patch) -> None:
+def test_a_macro_is_reported_by_its_name(guitar: Instrument) -> None:
     target = {"field": "knobs.decay", "low": 1.0, "high": 3.0}
-    patch = with_part(guitar, macros=({"name": "Damp", "value": 0.5, "targets": (target,)},))
-    assert words(patch, patch.turned(0, 0.9)) == "Damp"
+    instrument = with_part(guitar, macros=({"name": "Damp", "value": 0.5, "targets": (target,)},))
+    assert words(instrument, instrument.turned(0, 0.9)) == "Damp"

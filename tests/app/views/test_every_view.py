@@ -72,7 +72,7 @@ from app.views.dialogs import (
     learn_dialog,
 )
 from app.views.file_places import FilePlaces
-from app.views.instrument import patch_card
+from app.views.instrument import instrument_card
 from app.views.plots import figures_table, kept_plot, legend, plots, time_plot
 from app.views.plots import plot as plot_module
 from tests.app.conftest import make_sound
@@ -160,7 +160,7 @@ def with_text(label: QLabel) -> QLabel:
 
 
 MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
-    browser.Browser: patch_card.patch_browser,
+    browser.Browser: instrument_card.instrument_browser,
     browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.BrowserColumn("Name"),))),
     deck.Deck: made_deck,
     drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),

@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
-from app.patches.library import SHIPPED, PatchEntry, read_patch
+from app.instruments.library import SHIPPED, InstrumentEntry, read_instrument
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
 from app.views.controls.choosers import PresetBar
@@ -26,8 +26,8 @@ from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
 from app.views.dialogs.preset_card import preset_browser, preset_row
+from app.views.instrument.instrument_card import instrument_browser, instrument_row
 from app.views.instrument.panel import InstrumentPanel
-from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.exports import heard_note
 from engine.presets import read_info
 from tests.app.places import places_in
@@ -68,9 +68,9 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
     dialog = ExportDialog((ExportChoices(), SampledChoices()), places_in(tmp_path / EVIL))
-    patch = read_patch(SHIPPED / "classical_guitar.json")
+    instrument = read_instrument(SHIPPED / "classical_guitar.json")
     note = heard_note(Choices(single=entry.name), Library([entry]), None)
-    dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})
+    dialog.show_subjects({"note": note, "sampler": HeardInstrument(instrument, entry)})
     views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
     for view in views:
         qtbot.addWidget(view)
@@ -86,22 +86,22 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     assert "evil" in texts(notices)  # and it is shown
 
 
-def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
+def test_a_instrument_is_shown_as_it_is(qtbot: QtBot) -> None:
     """Its name can hold no markup, for it is a file's; its other texts can."""
-    patch = read_patch(SHIPPED / "classical_guitar.json")
-    macros = tuple(macro.model_copy(update={"name": EVIL}) for macro in patch.macros)
-    body = patch.body.model_copy(update={"name": EVIL})
-    patch = patch.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
-    entry = PatchEntry(Path("/x") / f"{EVIL}.json", patch)
-    panel, browser = InstrumentPanel(), patch_browser()
+    instrument = read_instrument(SHIPPED / "classical_guitar.json")
+    macros = tuple(macro.model_copy(update={"name": EVIL}) for macro in instrument.macros)
+    body = instrument.body.model_copy(update={"name": EVIL})
+    instrument = instrument.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
+    entry = InstrumentEntry(Path("/x") / f"{EVIL}.json", instrument)
+    panel, browser = InstrumentPanel(), instrument_browser()
     views: list[QWidget] = [panel, browser]
     for view in views:
         qtbot.addWidget(view)
-    panel.bar.show_patch(patch, own=True, changed=True)
+    panel.bar.show_instrument(instrument, own=True, changed=True)
     panel.bar.show_note(EVIL)
     panel.knobs.facts.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
-    browser.show_rows([patch_row(entry)], (), entry.name, EVIL)
+    browser.show_rows([instrument_row(entry)], (), entry.name, EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
         assert "evil" in texts(view)

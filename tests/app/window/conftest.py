@@ -13,8 +13,8 @@ from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
 from app.playing.midi_port import MidiInput
 from app.session.choices import Choices
 from app.views import theme
@@ -76,7 +76,7 @@ def lab(opened: Open) -> Window:
 @pytest.fixture
 def guitar(opened: Open) -> Window:
     """A window in which keys play a guitar."""
-    made = opened("studio_any_string", instrument=read_patch(PATCHES / "steel_string_acoustic.json"))
+    made = opened("studio_any_string", instrument=read_instrument(INSTRUMENTS / "steel_string_acoustic.json"))
     made.wait_for_keys()
     made.window.setFocus()
     return made

@@ -11,7 +11,7 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering.subject import string_of
@@ -76,10 +76,10 @@ class Window:
         return self.session.choices
 
     @property
-    def patch(self) -> Patch:
+    def instrument(self) -> Instrument:
         """The instrument that is there."""
-        assert self.choices.patch is not None
-        return self.choices.patch
+        assert self.choices.instrument is not None
+        return self.choices.instrument
 
     @property
     def rings(self) -> list[Any]:
@@ -110,7 +110,7 @@ class Window:
 
     def wait_for_keys(self) -> None:
         """Return when keys play what is chosen."""
-        self.wait(lambda: self.keys.player is not None and self.keys.player.patch == self.choices.patch)
+        self.wait(lambda: self.keys.player is not None and self.keys.player.instrument == self.choices.instrument)
 
     def wait_for_string(self) -> None:
         """Return when the string of the key that was struck last is shown."""
@@ -147,9 +147,9 @@ class Window:
         self.controller.pluck()
         return self.struck[-1]
 
-    def choose(self, patch: str) -> None:
+    def choose(self, instrument: str) -> None:
         """Choose an instrument, and return when keys play it."""
-        self.controller.patches.choose(patch)
+        self.controller.instruments.choose(instrument)
         self.wait_for_keys()
 
     def change(self, **choices: Any) -> None:

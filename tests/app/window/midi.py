@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
-from app.instrument.events import Event, NoteOn
-from app.instrument.midi_file import message_of
+from app.player.events import Event, NoteOn
+from app.player.midi_file import message_of
 from app.views.dialogs.midi_dialog import MidiDialog
 from tests.app.window.driver import CONTROL, KEY, Window
 

@@ -13,27 +13,27 @@ from PySide6.QtCore import QPoint
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QToolButton
 
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.instrument.offline import render_events
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
+from app.player.offline import render_events
 from app.playing.key_note import KeyNote
 from app.rendering import BlowTake, blow
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window.controller import DRUMS_PLAYED
 from engine.presets import SHIPPED, load_preset
 from engine.values.effects import Room
-from tests.app.instrument.seen import seen
 from tests.app.places import files_in
+from tests.app.player.seen import seen
 from tests.app.window.conftest import Open
 from tests.app.window.driver import KEY, LEFT, Window, press
 from tests.app.window.midi import FakeBackend
 from tests.app.window.panels.conftest import curves
 
 PADS = range(36, 52)
-DRUMS = sorted(path.stem for path in PATCHES.glob("*.json") if read_patch(path).strings.kind == "drums")
-KIT, TOMS = read_patch(PATCHES / "concert_toms.json"), read_patch(PATCHES / "tuned_toms.json")
+DRUMS = sorted(path.stem for path in INSTRUMENTS.glob("*.json") if read_instrument(path).strings.kind == "drums")
+KIT, TOMS = read_instrument(INSTRUMENTS / "concert_toms.json"), read_instrument(INSTRUMENTS / "tuned_toms.json")
 Levels = list[float]
 
 
@@ -83,7 +83,7 @@ def whole(w: Window) -> BlowTake:
 def test_pads_keys_and_channel_ten_strike_drums_that_ring_light_and_stop(
     backend: FakeBackend, kit: Window, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    assert len(DRUMS) == 7 and set(DRUMS) <= set(kit.controller.patches.browser.listed)
+    assert len(DRUMS) == 7 and set(DRUMS) <= set(kit.controller.instruments.browser.listed)
     levels = levels_of(kit, monkeypatch)
     for key in (38, 45):
         kit.play(key, 110)
@@ -143,8 +143,8 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window, tm
     kit.play(36, 127, hold=True)
     kit.sounds(36)
     for _ in range(3):
-        kit.controller.patches.choose("steel_string_acoustic")
-        kit.controller.patches.choose("concert_toms")
+        kit.controller.instruments.choose("steel_string_acoustic")
+        kit.controller.instruments.choose("concert_toms")
     kit.choose("steel_string_acoustic")
     assert (play.accessibleName(), fold.text(), panel.neck.isVisible()) == ("Pluck or stop", "String knobs", True)
     assert all(each.isEnabled() for each in of_string[:2]) and not any(each.covered for each in kit.panels)
@@ -155,7 +155,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window, tm
     kit.performance.stop()
     kit.wait(lambda: kit.controller.sound.mixer.active == 0)
     mine = tmp_path / "mine.json"
-    mine.write_bytes((PATCHES / "thin_bars.json").read_bytes())
+    mine.write_bytes((INSTRUMENTS / "thin_bars.json").read_bytes())
     kit.drop(mine)
     assert kit.performance.take is None
     kit.wait_for_keys()
@@ -164,7 +164,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window, tm
     kit.qtbot.keyPress(window, KEY.Key_K)
     kit.wait(lambda: 72 in kit.keys.sounding())  # from C4 all keys sound
     kit.qtbot.keyRelease(window, KEY.Key_K)
-    kit.controller.patches.choose("steel_string_acoustic")
+    kit.controller.instruments.choose("steel_string_acoustic")
     kit.wait(lambda: kit.performance.ready)
     assert kit.said == []
 
@@ -211,7 +211,7 @@ def test_drumming_is_recorded_and_exported_and_a_blow_is_a_note_that_comes_back(
     file = tmp_path / "Concert toms D2 hard.wav"
     assert np.abs(soundfile.read(file)[0]).max() > 0.05
     kit.controller.exports.open("plugin")
-    assert dialog.plugin.job().patch.strings.kind == "drums"
+    assert dialog.plugin.job().instrument.strings.kind == "drums"
     dialog.reject()
     kit.choose("steel_string_acoustic")
     kit.drop(file)
@@ -242,7 +242,7 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(
     toms.wait(lambda: "Error of this blow" in toms.window.error_label.text())
     take = whole(toms)
     assert take.request.struck.event.place == note.event.place
-    dry = toms.patch.model_copy(update={"room": Room(mix=0.0)})
+    dry = toms.instrument.model_copy(update={"room": Room(mix=0.0)})
     preset = load_preset(SHIPPED / "studio_any_string.safetensors")
     played = render_events(dry, preset, [TimedEvent(0.0, note.event)], blow.RATE_HZ, "truth", seconds=0.3)
     heard = np.concatenate(list(played))[:, 0]
@@ -258,7 +258,7 @@ def test_a_dragged_mark_changes_the_sound_and_a_seek_keeps_the_picture(toms: Win
     axes = view.axes
     foot = QPoint(round(axes.x(0.5)), round(axes.bottom) + 8)
     toms.drag(view, foot, QPoint(round(axes.x(0.97)), foot.y()))
-    assert toms.choices.listen == pytest.approx(0.97, abs=0.02) == toms.patch.pickup.points[0]
+    assert toms.choices.listen == pytest.approx(0.97, abs=0.02) == toms.instrument.pickup.points[0]
     ear = toms.choices.ear
     toms.wait(lambda: take.listened.ear == ear and take.listened.complete)
     assert np.abs(take.listened.signals["model"].read() - above).max() > 0.1 * np.abs(above).max()
@@ -288,7 +288,7 @@ def test_keys_choose_the_place_and_each_instrument_has_its_own(toms: Window) -> 
     toms.key(KEY.Key_Return, on=drum.view)
     assert toms.struck[-1].event.key == 36
     toms.wait(lambda: shown(toms) is not None)
-    timpani = read_patch(PATCHES / "timpani.json")
+    timpani = read_instrument(INSTRUMENTS / "timpani.json")
     toms.change(played=timpani)
     assert shown(toms) is None and drum.place == timpani.strings.drums[0].place  # type: ignore[union-attr]
     toms.wait(lambda: drum.view.frame is None)

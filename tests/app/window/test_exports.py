@@ -24,11 +24,11 @@ from app.export.played import Played
 from app.export.recipe import read_origin, read_recipe
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
-from app.instrument.bodies import own_bodies
-from app.instrument.events import NoteOff, NoteOn, PatchTurned, TimedEvent, bend_range
-from app.instrument.midi_file import read_midi
-from app.instrument.offline import render_note
-from app.patches.library import find_patch
+from app.instruments.library import find_instrument
+from app.player.bodies import own_bodies
+from app.player.events import InstrumentTurned, NoteOff, NoteOn, TimedEvent, bend_range
+from app.player.midi_file import read_midi
+from app.player.offline import render_note
 from app.shared.version import program_version
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.settings import load_settings
@@ -40,7 +40,7 @@ from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, choose
 
 LOST, BUSY = "Recording not saved", "Export under way"
-GUITAR = find_patch("Classical guitar").patch
+GUITAR = find_instrument("Classical guitar").instrument
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ def test_playing_is_recorded_as_it_is_heard_and_a_dropped_recording_changes_noth
         sound, rate_hz = soundfile.read(file)
         assert rate_hz == 48_000 and 0 < abs(sound).max() < 1
         events = [each.event for each in read_midi(file.with_suffix(".mid"))]
-        assert events[:6] == bend_range(guitar.patch.bend_semitones, 0)
+        assert events[:6] == bend_range(guitar.instrument.bend_semitones, 0)
         assert [type(event) for event in events[6:]] == [NoteOn, NoteOff]
         origin: Any = read_origin(file)
         assert (origin.instrument, origin.preset) == ("Steel-string acoustic", "studio_any_string")
@@ -151,8 +151,8 @@ def test_playing_is_recorded_as_it_is_heard_and_a_dropped_recording_changes_noth
 
 
 def test_a_recording_hears_the_pick_up_and_the_points_of_the_window(guitar: Window, tmp_path: Path) -> None:
-    """Not those with which the patch was saved."""
-    guitar.controller.patches.change("knobs.decay", 10.0)
+    """Not those with which the instrument was saved."""
+    guitar.controller.instruments.change("knobs.decay", 10.0)
     guitar.change(pickup="displacement", stereo=True)  # at the bridge both sides hear the same
     changes: dict[str, Callable[[], object]] = {
         "before.wav": lambda: None,
@@ -178,7 +178,7 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded_and_replaces_no_file
     guitar: Window, tmp_path: Path
 ) -> None:
     record(guitar)
-    guitar.controller.patches.choose("concert_harp")  # it was played by the other one
+    guitar.controller.instruments.choose("concert_harp")  # it was played by the other one
     for _ in range(2):
         (words,) = takes(guitar)
         assert words.startswith("Steel-string acoustic:") and words.endswith("1 note, not saved")
@@ -223,11 +223,11 @@ def test_no_key_closes_the_window_over_a_recording_and_save_closes_it_once_it_is
         guitar.play(60)
     for answer in (KEY.Key_Escape, KEY.Key_Return, KEY.Key_Space, "Cancel", "Save"):
         assert close(guitar, answer) == [LOST]
-        assert guitar.window.isVisible() and guitar.controller.patches.recordings.unsaved
+        assert guitar.window.isVisible() and guitar.controller.instruments.recordings.unsaved
     save(guitar, tmp_path / "absent" / "take.wav", "absent")  # it cannot be written
     close(guitar, "Save")
     dialog_of(guitar).close_button.click()  # the user thinks better of it
-    guitar.controller.patches.recordings.save_asked.emit()
+    guitar.controller.instruments.recordings.save_asked.emit()
     save(guitar, tmp_path / "kept.wav")
     assert guitar.window.isVisible()
     record(guitar)
@@ -246,9 +246,9 @@ def test_a_window_that_is_ended_keeps_the_recording_which_is_read_aside_and_offe
     guitar: Window, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not over another recording. An hour of notes and turned knobs takes seconds to read."""
-    recordings, read, readers = guitar.controller.patches.recordings, Journal.read, list[object]()
+    recordings, read, readers = guitar.controller.instruments.recordings, Journal.read, list[object]()
     journal = Journal.begun(recordings_folder(), datetime.now(UTC))
-    journal.write([TimedEvent(0.0, PatchTurned(guitar.patch)), TimedEvent(0.0, NoteOn(60, 100))])
+    journal.write([TimedEvent(0.0, InstrumentTurned(guitar.instrument)), TimedEvent(0.0, NoteOn(60, 100))])
     journal.close()
 
     def noted(journal: Journal, check: Callable[[], None] = lambda: None) -> Played | None:
@@ -270,9 +270,9 @@ def test_a_window_that_is_ended_keeps_the_recording_which_is_read_aside_and_offe
     (left,) = left_journals(recordings_folder())
     found = left.read()
     assert latest is not None and found is not None and found.recorded == latest.played.recorded
-    assert (found.events, found.patch, found.source) == (
+    assert (found.events, found.instrument, found.source) == (
         latest.played.events,
-        latest.played.patch,
+        latest.played.instrument,
         latest.played.source,
     )
     left.delete()
@@ -281,11 +281,11 @@ def test_a_window_that_is_ended_keeps_the_recording_which_is_read_aside_and_offe
 def play_long(w: Window, notes: int) -> None:
     """A recording of so many seconds, in place of the one of a note: as a journal of an earlier run."""
     record(w)
-    recordings = w.controller.patches.recordings
+    recordings = w.controller.instruments.recordings
     latest = recordings.offered
     assert latest is not None
     journal = Journal.begun(recordings_folder(), datetime.now(UTC))
-    journal.write([TimedEvent(0.0, PatchTurned(latest.played.patch))])
+    journal.write([TimedEvent(0.0, InstrumentTurned(latest.played.instrument))])
     journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(notes)])
     journal.close()
     discard(w)
@@ -318,24 +318,24 @@ def test_a_note_is_exported_through_its_instrument_with_turned_knobs_and_comes_b
     short: Window, tmp_path: Path
 ) -> None:
     preset = load_preset(SHIPPED / "studio_any_string.safetensors")
-    for patch in (GUITAR, GUITAR.with_value("pluck.position", 0.4)):
+    for instrument in (GUITAR, GUITAR.with_value("pluck.position", 0.4)):
         short.wait_for_keys()
         short.play(60)
         short.wait(lambda: short.struck[-1].known)
         short.wait_for_string()
-        short.change(patch=patch)  # a knob that is turned since
+        short.change(instrument=instrument)  # a knob that is turned since
         short.key(KEY.Key_E, CONTROL)
         save(short, words="Saved")
         (file,) = tmp_path.glob("*.wav")
         assert file.name == "Classical guitar C4 hard.wav"
         struck: Any = read_recipe(file).struck
         assert (struck.instrument, struck.key, struck.velocity) == (GUITAR.name, 60, 100)
-        heard, written = render_note(patch, preset, 60, 100, 9.0, 0.3, 48_000), soundfile.read(file)[0]
+        heard, written = render_note(instrument, preset, 60, 100, 9.0, 0.3, 48_000), soundfile.read(file)[0]
         np.testing.assert_allclose(written[:-960], heard[:-960], atol=2.0**-22)  # the end is faded
         short.change(preset="first")
         short.drop(file)
         assert short.choices.played == GUITAR
-        assert ("instrument Classical guitar is not the one" in short.window.notices.text) == (patch != GUITAR)
+        assert ("instrument Classical guitar is not the one" in short.window.notices.text) == (instrument != GUITAR)
         file.unlink()
 
 
@@ -367,7 +367,7 @@ def test_what_cannot_be_exported_says_so(short: Window) -> None:
     save(short, words="first.safetensors")
     dialog_of(short).reject()
     short.change(preset="gone")
-    short.change(patch=None)
+    short.change(instrument=None)
     for name, words in (("export", "There is no preset to export"), ("sampler", "There is no instrument to export")):
         short.window.action[name].trigger()
         assert short.controller.exports.dialog is None and words in short.said[-1]
@@ -379,14 +379,14 @@ def open_sampler(w: Window) -> ExportDialog:
     return dialog_of(w)
 
 
-def test_the_patch_is_exported_for_samplers_while_the_window_plays_and_choices_are_remembered(
+def test_the_instrument_is_exported_for_samplers_while_the_window_plays_and_choices_are_remembered(
     short: Window, tmp_path: Path
 ) -> None:
     dialog = open_sampler(short)
     assert dialog.isVisible() and not dialog.isModal() and open_sampler(short) is dialog
     for name in ("classical_guitar", "concert_harp"):
         short.choose(name)
-        assert dialog.sampler.what.text().startswith(short.patch.name)
+        assert dialog.sampler.what.text().startswith(short.instrument.name)
     dialog.save.click()
     short.qtbot.keyPress(short.window, KEY.Key_A)
     short.wait(short.keys.sounding)
@@ -394,7 +394,7 @@ def test_the_patch_is_exported_for_samplers_while_the_window_plays_and_choices_a
     short.wait(lambda: "Saved" in dialog.state.text() and "Concert_harp.sfz" in dialog.state.text())
     samples = sorted((tmp_path / "Concert_harp_samples").glob("*.flac"))
     assert [path.stem for path in samples] == [
-        zone.stem for zone in SampledPlan(short.patch, (60, 61), layers=1).zones
+        zone.stem for zone in SampledPlan(short.instrument, (60, 61), layers=1).zones
     ]
     assert soundfile.info(samples[0]).frames == 9_600
     dialog.sampler["layers"].setValue(7)

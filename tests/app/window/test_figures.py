@@ -17,8 +17,8 @@ from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QAbstractScrollArea, QApplication, QFileDialog, QMenu, QWidget
 
 from app.export import columns as columns_module
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
 from app.views import theme
 from tests.app.gestures import drag
 from tests.app.places import choose_files
@@ -208,7 +208,7 @@ def test_a_right_click_copies_pictures_and_a_right_drag_pans(lab: Window) -> Non
 def test_a_drum_is_saved_and_what_cannot_be_is_said(
     opened: Open, tmp_path: Path, chosen: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    w = opened("studio_any_string", face="lab", instrument=read_patch(PATCHES / "frame_drum.json"))
+    w = opened("studio_any_string", face="lab", instrument=read_instrument(INSTRUMENTS / "frame_drum.json"))
     w.wait_for_keys()
     drum = w.controller.drum
     by_menu_key(w, drum.figure)

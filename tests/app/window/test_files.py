@@ -16,10 +16,10 @@ from PySide6.QtWidgets import QMenu, QToolTip
 
 from app.export.choices import ExportChoices
 from app.export.recipe import read_origin, read_recipe
-from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import find_patch, own_patches, read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import find_instrument, own_instruments, read_instrument
+from app.player.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
 from app.views.controls.drag_handle import DragHandle
 from app.views.file_manager import reveal
 from app.views.file_places import MOST_RECENT, FileChoices, FilePlaces
@@ -28,7 +28,7 @@ from tests.app.places import choose_files, files_in
 from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, press
 
-GUITAR = find_patch("Classical guitar").patch
+GUITAR = find_instrument("Classical guitar").instrument
 AWAY = QPoint(60, 60)
 
 
@@ -121,7 +121,7 @@ def test_a_note_its_difference_and_a_recording_are_dragged_as_they_would_be_expo
     origin: Any = read_origin(recording)
     assert (recording.name, origin.instrument) == ("Classical guitar.wav", "Classical guitar")
     made.qtbot.mouseRelease(handle, LEFT, pos=AWAY)
-    made.controller.patches.recordings.forget_all()
+    made.controller.instruments.recordings.forget_all()
     assert handle.subject == "note"
     made.close()
     assert not any(file.exists() for files in dropped for file in files), "they are removed with the process"
@@ -188,7 +188,7 @@ def test_an_instrument_is_saved_anywhere_and_shown_in_its_folder(
     monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: shown.append(url.toLocalFile()) or True)
     made.window.action["reveal"].trigger()
     assert made.said[-1] == "Nothing was saved since the start."
-    far, own = tmp_path / "far", own_patches()
+    far, own = tmp_path / "far", own_instruments()
     far.mkdir()
 
     def save_as(*files: Path) -> str:
@@ -200,7 +200,7 @@ def test_an_instrument_is_saved_anywhere_and_shown_in_its_folder(
     assert save_as() == said[-1] and made.said == said, "cancelled"
     file = far / "My v1.2.json"
     assert save_as(far / "My v1.2") == f"My v1.2 was saved as {file}."
-    assert read_patch(file) == GUITAR.model_copy(update={"name": "My v1.2"}) and made.patch == GUITAR
+    assert read_instrument(file) == GUITAR.model_copy(update={"name": "My v1.2"}) and made.instrument == GUITAR
     press(made.window.notices, "Show in folder")
     made.window.action["reveal"].trigger()
     assert shown == [str(far), str(far)]
@@ -208,11 +208,11 @@ def test_an_instrument_is_saved_anywhere_and_shown_in_its_folder(
     assert "cannot be written" in save_as(file / "under a file.json")
     assert sorted(far.iterdir()) == [file]
     save_as(own / "Mine.json")
-    assert made.patch.name == "Mine" and made.controller.patches.chosen == "Mine"
-    made.controller.patches.change("knobs.decay", 3.0)
+    assert made.instrument.name == "Mine" and made.controller.instruments.chosen == "Mine"
+    made.controller.instruments.change("knobs.decay", 3.0)
     made.key(KEY.Key_S, CONTROL)
     made.window.action["reveal"].trigger()
-    assert shown[2:] == [str(own)] and read_patch(own / "Mine.json").knobs.decay == 3.0
+    assert shown[2:] == [str(own)] and read_instrument(own / "Mine.json").knobs.decay == 3.0
     file.unlink()
     reveal(file, said.append)
     assert said[-1] == f"{file} is not there any more."
@@ -235,7 +235,7 @@ def test_recent_files_are_listed_opened_again_and_forgotten_when_they_are_gone(
     song, scale = tmp_path / "a & b.mid", tmp_path / "third.scl"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(60, 90, KEYS)), TimedEvent(0.1, NoteOff(60, KEYS))], GUITAR))
     scale.write_text("! third.scl\nThirds\n 3\n!\n5/4\n3/2\n2/1\n")
-    instrument = PATCHES / "concert_harp.json"
+    instrument = INSTRUMENTS / "concert_harp.json"
     assert fill() == []
     for file in (song, instrument, scale, song):
         made.drop(file)
@@ -243,7 +243,7 @@ def test_recent_files_are_listed_opened_again_and_forgotten_when_they_are_gone(
     recent = made.window.action["recent"].menu()
     assert recent is not None
     recent.actions()[2].trigger()
-    assert made.patch.name == "Concert harp" and "concert_harp" in fill()[0]
+    assert made.instrument.name == "Concert harp" and "concert_harp" in fill()[0]
     song.unlink()
     recent.actions()[1].trigger()
     assert "a & b.mid" in made.said[-1] and len(fill()) == 2, "it is gone, and was removed"

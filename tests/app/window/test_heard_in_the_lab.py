@@ -21,9 +21,9 @@ from app.audio.output import Output
 from app.audio.sound import Sound
 from app.export.choices import ExportChoices
 from app.export.wav import WavSettings
-from app.instrument.events import NoteOn
-from app.patches.library import list_patches
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import list_instruments
+from app.player.events import NoteOn
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering.note_sound import NoteSound
@@ -60,8 +60,8 @@ KINDS = {
 }
 SOURCES: dict[str, Source] = {"a": "model", "b": "truth"}
 EFFECTIVE = "electric_guitar_bridge_pick_up"  # an amplifier, a cabinet and a room
-PLAYED = {entry.path.stem: entry.patch for entry in list_patches()[0]}
-SYMPATHETIC = [name for name, patch in PLAYED.items() if patch.sympathy_s_kg > 0]
+PLAYED = {entry.path.stem: entry.instrument for entry in list_instruments()[0]}
+SYMPATHETIC = [name for name, instrument in PLAYED.items() if instrument.sympathy_s_kg > 0]
 Samples = NDArray[np.float64]
 
 
@@ -105,12 +105,12 @@ def take(lab: Controller, seconds: float) -> Samples:
     return lab.sound.mixer.render(round(seconds * RATE_HZ) // QUANTUM * QUANTUM).astype(np.float64)
 
 
-def play_instrument(qtbot: QtBot, lab: Controller, patch: Patch) -> None:
+def play_instrument(qtbot: QtBot, lab: Controller, instrument: Instrument) -> None:
     """Plays a key of an instrument, which rings on."""
-    lab.session.update(played=patch)
+    lab.session.update(played=instrument)
     keys = lab.performance.notes.keys
-    qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.name == patch.name)
-    lab.inputs.play(NoteOn(sum(patch.range) // 2, 100))
+    qtbot.waitUntil(lambda: keys.player is not None and keys.player.instrument.name == instrument.name)
+    lab.inputs.play(NoteOn(sum(instrument.range) // 2, 100))
     take(lab, 0.05)
     qtbot.waitUntil(lambda: isinstance(lab.session.stage.note, KeyNote) and lab.session.stage.known)
 

@@ -13,14 +13,14 @@ import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
 
-from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.instrument.strings import Strings, on_string
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import own_patches, read_patch
-from app.patches.patch import Macro, MacroTarget, Patch, Pickup
-from app.patches.scales import SCALES
-from app.patches.tuning import TuningChoice
+from app.instruments.instrument import Instrument, Macro, MacroTarget, Pickup
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import own_instruments, read_instrument
+from app.instruments.scales import SCALES
+from app.instruments.tuning import TuningChoice
+from app.player.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
+from app.player.midi_file import midi_bytes
+from app.player.strings import Strings, on_string
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
 from app.playing.note import PluckVoices
@@ -30,12 +30,12 @@ from app.shared.key_names import note_name
 from app.views.controls.playing_keys import PlayingKeys
 from engine.pluck import SHAPES, Pluck
 from engine.presets.finding import SHIPPED
-from tests.app.instrument.conftest import STEEL
-from tests.app.instrument.seen import Seen, sounding
+from tests.app.player.conftest import STEEL
+from tests.app.player.seen import Seen, sounding
 from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, SHIFT, Window, choose
 from tests.app.window.midi import FakeBackend
 
-HARP = read_patch(PATCHES / "concert_harp.json")
+HARP = read_instrument(INSTRUMENTS / "concert_harp.json")
 FIVE_STEPS = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
 
 
@@ -77,7 +77,9 @@ def named(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[str, str]
 
 def test_keys_of_computer_and_screen_play_pitches_and_the_window_shows_the_string(guitar: Window) -> None:
     strip = guitar.window.instrument
-    assert strip.knobs.facts.accessibleDescription().startswith(f"key {note_name(sum(guitar.patch.range) // 2)}, ")
+    assert strip.knobs.facts.accessibleDescription().startswith(
+        f"key {note_name(sum(guitar.instrument.range) // 2)}, "
+    )
     guitar.qtbot.keyPress(guitar.window, KEY.Key_A)
     guitar.sounds(48)
     guitar.wait_for_string()
@@ -103,9 +105,9 @@ def test_keys_of_computer_and_screen_play_pitches_and_the_window_shows_the_strin
     strip.knobs.figure_asked.emit("knobs.tension", 200.0)
     assert tension.accessibleDescription().startswith("200 N (× ")
     now_mm = float(length.accessibleDescription().split()[0])
-    assert now_mm == pytest.approx(long_mm * guitar.patch.knobs.tension**0.5, rel=0.01)
+    assert now_mm == pytest.approx(long_mm * guitar.instrument.knobs.tension**0.5, rel=0.01)
     strip.knobs.figure_asked.emit("knobs.tension", 1e9)
-    assert guitar.patch.knobs.tension == pytest.approx(16.0)
+    assert guitar.instrument.knobs.tension == pytest.approx(16.0)
 
 
 def test_the_switch_of_keys_is_remembered(guitar: Window) -> None:
@@ -118,7 +120,7 @@ def test_the_switch_of_keys_is_remembered(guitar: Window) -> None:
     assert (
         plays.text().startswith("Keys set pluck position") and not guitar.window.instrument.bar.velocity.isVisible()
     )
-    assert guitar.choices.preset == "studio_any_string" and not guitar.controller.settings().choices.plays_patch
+    assert guitar.choices.preset == "studio_any_string" and not guitar.controller.settings().choices.plays_instrument
     guitar.wait(lambda: not guitar.keys.sounding())
     guitar.key(KEY.Key_A)
     assert isinstance(guitar.struck[-1], PluckVoices) and guitar.keys.sounding() == {}
@@ -171,7 +173,7 @@ def test_each_turn_of_a_loop_stays_with_the_instrument_when_pluck_and_string_cha
     guitar.wait(lambda: turns(52, 0.41))
     guitar.controller.inputs.play(NoteOn(57, 80, KEYS))
     guitar.wait(lambda: turns(57))
-    shape = next(each for each in ("gaussian", "triangular") if each != guitar.patch.pluck.shape)
+    shape = next(each for each in ("gaussian", "triangular") if each != guitar.instrument.pluck.shape)
     turn(guitar, "pluck.shape", shape)
     guitar.wait(lambda: guitar.choices.shape == shape and turns(57))
     assert rung == [], "no string sounds by itself"
@@ -187,29 +189,29 @@ def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar:
         assert guitar.choices.octave == octave and QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
     assert bar.octave.text() == "octave C6"
     bar.octave_asked.emit(1)
-    guitar.controller.patches.change("knobs.decay", 3.0)
+    guitar.controller.instruments.change("knobs.decay", 3.0)
     assert guitar.choices.octave == 3, "four keys sound"
     guitar.change(octave=2)  # C5 to F6
-    for patch, octave in (("slack_bass", -1), ("concert_harp", -1), ("mandolin", 1)):
-        guitar.controller.patches.choose(patch)
+    for instrument, octave in (("slack_bass", -1), ("concert_harp", -1), ("mandolin", 1)):
+        guitar.controller.instruments.choose(instrument)
         assert guitar.choices.octave == octave
-        assert patch != "slack_bass" or QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
+        assert instrument != "slack_bass" or QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
 
 
-def test_knobs_change_the_patch_its_pluck_and_its_pick_up_and_undo_takes_them_back(guitar: Window) -> None:
+def test_knobs_change_the_instrument_its_pluck_and_its_pick_up_and_undo_takes_them_back(guitar: Window) -> None:
     history, start, knobs = guitar.session, guitar.choices, guitar.window.instrument.knobs
     turn(guitar, "knobs.stiffness", 2.0)
-    assert guitar.patch.knobs.stiffness == 2.0
+    assert guitar.instrument.knobs.stiffness == 2.0
     turn(guitar, "knobs.stiffness", 99.0)
-    assert guitar.patch.knobs.stiffness == 2.0
+    assert guitar.instrument.knobs.stiffness == 2.0
     history.undo()
-    assert guitar.patch == start.patch
+    assert guitar.instrument == start.instrument
     history.redo()
-    guitar.controller.patches.revert()
-    assert guitar.patch == start.patch
+    guitar.controller.instruments.revert()
+    assert guitar.instrument == start.instrument
     for shape, name in (("triangular", "Triangle"), ("gaussian", "Gaussian"), ("raised_cosine", "Raised cosine")):
         turn(guitar, "pluck.shape", shape)
-        assert (guitar.patch.pluck.shape, knobs.shape.currentText()) == (shape, name)
+        assert (guitar.instrument.pluck.shape, knobs.shape.currentText()) == (shape, name)
         assert knobs.knobs["pluck.width_hard"].isEnabled() == (shape != "triangular")
         assert history.undo_words == "pluck shape"
     turn(guitar, "pickup.points.0", 0.11)
@@ -220,93 +222,93 @@ def test_knobs_change_the_patch_its_pluck_and_its_pick_up_and_undo_takes_them_ba
     history.undo()
     assert guitar.choices.listen == start.listen
     knobs.knobs["tuning.transpose"].value_asked.emit(2.2)
-    assert guitar.patch.tuning.transpose == 2
+    assert guitar.instrument.tuning.transpose == 2
     tuning = TuningChoice(a4_hz=432.0, scale=FIVE_STEPS)
-    guitar.change(patch=guitar.patch.model_copy(update={"tuning": tuning}))
+    guitar.change(instrument=guitar.instrument.model_copy(update={"tuning": tuning}))
     scale = guitar.window.instrument.bar.scale
     assert scale.isVisible() and "Five equal steps" in scale.toolTip()
     for name, text in (("Werckmeister III", SCALES["Werckmeister III"]), ("Twelve equal steps", "")):
         next(each for each in scale.menu().actions() if each.text() == name).trigger()
-        assert guitar.patch.tuning == TuningChoice(a4_hz=432.0, scale=text)
+        assert guitar.instrument.tuning == TuningChoice(a4_hz=432.0, scale=text)
         history.undo()
-        assert guitar.patch.tuning == tuning
+        assert guitar.instrument.tuning == tuning
 
 
-def test_the_transport_changes_where_the_patch_is_heard(guitar: Window) -> None:
+def test_the_transport_changes_where_the_instrument_is_heard(guitar: Window) -> None:
     stereo, pickup = guitar.find(QToolButton, "Stereo"), guitar.find(QComboBox, "Pick-up")
     before = guitar.choices.stereo
     choose(pickup, "bridge")
     stereo.setChecked(not before)
     guitar.session.move_listening_point(0.21)
-    heard = guitar.patch.pickup
+    heard = guitar.instrument.pickup
     assert (heard.kind, heard.points[0], len(heard.points) == 2) == ("bridge", 0.21, not before)
-    assert guitar.window.instrument.bar.save.isEnabled() and guitar.keys.player.patch == guitar.patch  # type: ignore[union-attr]
+    assert guitar.window.instrument.bar.save.isEnabled() and guitar.keys.player.instrument == guitar.instrument  # type: ignore[union-attr]
     guitar.choose("concert_harp")
     assert (pickup.currentData(), stereo.isChecked()) == (HARP.pickup.kind, len(HARP.pickup.points) == 2)
     macro = Macro(name="Width", targets=(MacroTarget(field="pickup.points.1", low=0.5, high=0.9),))
-    guitar.change(patch=HARP.model_copy(update={"pickup": Pickup(points=(0.2, 0.8)), "macros": (macro,)}))
+    guitar.change(instrument=HARP.model_copy(update={"pickup": Pickup(points=(0.2, 0.8)), "macros": (macro,)}))
     stereo.click()
     assert stereo.isChecked() and "stays in stereo: its macro Width" in guitar.window.notices.text
 
 
-def test_a_patch_is_saved_renamed_compared_and_deleted(guitar: Window, named: Callable[..., Any]) -> None:
-    patches, bar = guitar.controller.patches, guitar.window.instrument.bar
+def test_a_instrument_is_saved_renamed_compared_and_deleted(guitar: Window, named: Callable[..., Any]) -> None:
+    instruments, bar = guitar.controller.instruments, guitar.window.instrument.bar
     asked = named("AC/DC", "My Bass.", "Classical guitar", "Mine", "Yours")
-    patches.change("knobs.decay", 3.0)
-    patches.browser.search.setText("harpsichord")
+    instruments.change("knobs.decay", 3.0)
+    instruments.browser.search.setText("harpsichord")
     guitar.key(KEY.Key_S, CONTROL)
-    file = own_patches() / "mine.json"
-    assert read_patch(file).knobs.decay == 3.0
+    file = own_instruments() / "mine.json"
+    assert read_instrument(file).knobs.decay == 3.0
     assert [text for _, text in asked[1:]] == ["AC/DC", "My Bass.", "Classical guitar"], "the typed name stays"
     assert "must not begin or end with a full stop, or hold one of" in asked[1][0]
     assert "a factory instrument has this name" in asked[3][0]
-    assert "mine" in patches.browser.listed, "an old search does not hide it"
-    patches.change("knobs.decay", 4.0)
-    saved, mine = read_patch(file), guitar.patch
+    assert "mine" in instruments.browser.listed, "an old search does not hide it"
+    instruments.change("knobs.decay", 4.0)
+    saved, mine = read_instrument(file), guitar.instrument
 
-    def heard() -> tuple[bool, Patch]:
-        return bar.compare.isChecked(), guitar.keys.player.patch  # type: ignore[union-attr]
+    def heard() -> tuple[bool, Instrument]:
+        return bar.compare.isChecked(), guitar.keys.player.instrument  # type: ignore[union-attr]
 
     bar.compare.click()
-    assert heard() == (True, saved) and guitar.patch == mine
+    assert heard() == (True, saved) and guitar.instrument == mine
     bar.compare.click()
     assert heard() == (False, mine)
-    for ends in (lambda: patches.change("level_db", -3.0), guitar.session.undo, patches.revert):
+    for ends in (lambda: instruments.change("level_db", -3.0), guitar.session.undo, instruments.revert):
         bar.compare.click()
         ends()  # it is of the choice, not of the sound
-        assert heard() == (False, guitar.patch)
-    assert guitar.patch == saved and not bar.compare.isEnabled()
-    patches.change("knobs.decay", 5.0)
+        assert heard() == (False, guitar.instrument)
+    assert guitar.instrument == saved and not bar.compare.isEnabled()
+    instruments.change("knobs.decay", 5.0)
     bar.compare.click()
-    patches.save()  # the user's own, without a question
-    assert read_patch(file).knobs.decay == 5.0 and heard() == (False, guitar.patch)
-    patches.browser.favourite_asked.emit("mine")
-    copy = Path(shutil.copy(file, own_patches() / "mine (copy).json"))
-    patches.reload()
-    patches.choose("mine")
-    patches.change("knobs.decay", 6.0)
-    patches.save()
-    assert (read_patch(file).knobs.decay, read_patch(copy).knobs.decay) == (6.0, 5.0), "each by itself"
-    names = {patches.step(1) or patches.entry.name for _ in range(patches.browser.total)}  # type: ignore[union-attr]
-    assert names == set(patches.browser.listed)
+    instruments.save()  # the user's own, without a question
+    assert read_instrument(file).knobs.decay == 5.0 and heard() == (False, guitar.instrument)
+    instruments.browser.favourite_asked.emit("mine")
+    copy = Path(shutil.copy(file, own_instruments() / "mine (copy).json"))
+    instruments.reload()
+    instruments.choose("mine")
+    instruments.change("knobs.decay", 6.0)
+    instruments.save()
+    assert (read_instrument(file).knobs.decay, read_instrument(copy).knobs.decay) == (6.0, 5.0), "each by itself"
+    names = {instruments.step(1) or instruments.entry.name for _ in range(instruments.browser.total)}  # type: ignore[union-attr]
+    assert names == set(instruments.browser.listed)
     copy.unlink()
-    patches.choose("mine")
-    patches.rename()
-    assert not file.exists() and read_patch(own_patches() / "yours.json").name == "Yours"
+    instruments.choose("mine")
+    instruments.rename()
+    assert not file.exists() and read_instrument(own_instruments() / "yours.json").name == "Yours"
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (False, True), "it is saved, and one's own"
-    assert "yours" in patches.favourites and "mine" not in patches.favourites
-    patches.delete("yours")
-    assert not list(own_patches().glob("*.json")) and "yours" not in patches.favourites
+    assert "yours" in instruments.favourites and "mine" not in instruments.favourites
+    instruments.delete("yours")
+    assert not list(own_instruments().glob("*.json")) and "yours" not in instruments.favourites
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
 
 
 def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_steps(guitar: Window) -> None:
-    patches, bar, pressed = guitar.controller.patches, guitar.window.instrument.bar, list[object]()
+    instruments, bar, pressed = guitar.controller.instruments, guitar.window.instrument.bar, list[object]()
     (keys,) = guitar.window.findChildren(PlayingKeys)
     keys.pressed.connect(pressed.append)
     guitar.wait(guitar.window.isActiveWindow)
-    patches.toggle()
-    browser = patches.browser
+    instruments.toggle()
+    browser = instruments.browser
     guitar.key(KEY.Key_Down, on=browser.search)
     guitar.wait(browser.list.hasFocus)
     for letter in "harp":
@@ -316,20 +318,20 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_
         guitar.key(letter, on=guitar.window.focusWidget())
     assert (browser.search.text(), pressed, guitar.choices.heard) == ("harpab", [], "a")
     browser.search.setText("mandolin")
-    patches.choose("mandolin")
+    instruments.choose("mandolin")
     assert bar.filtered.isVisible() and bar.filtered.text() == f"{len(browser.listed)} of {browser.total}  ✕"
     bar.filtered.click()
     assert not bar.filtered.isVisible() and len(browser.listed) == browser.total
     bar.step_asked.emit(1)
-    assert guitar.patch.name != "Mandolin"
+    assert guitar.instrument.name != "Mandolin"
     bar.step_asked.emit(-1)
-    patches.change("knobs.decay", 3.0)
-    changed = guitar.patch
+    instruments.change("knobs.decay", 3.0)
+    changed = guitar.instrument
     guitar.session.play_string()
-    patches.audition("mandolin")  # it is there already, with its changes
+    instruments.audition("mandolin")  # it is there already, with its changes
     assert guitar.choices.played == changed
-    patches.audition("concert_harp")
-    assert guitar.patch == HARP
+    instruments.audition("concert_harp")
+    assert guitar.instrument == HARP
 
 
 def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
@@ -342,7 +344,7 @@ def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
     guitar.sounds(52)
     assert guitar.said == ["song.mid is played without its drums (channel 10)."]
     guitar.key(KEY.Key_Space)
-    assert not guitar.controller.patches.playing
+    assert not guitar.controller.instruments.playing
     mido.MidiFile(tracks=[[mido.Message("program_change", program=46), mido.Message("note_on", note=52)]]).save(song)
     guitar.drop(song)
     assert "without its program changes. Each channel with its own" in guitar.window.notices.text
@@ -352,32 +354,32 @@ def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
     guitar.drop(song)
     assert "song.mid" in guitar.said[-1]
     tuned, names = HARP.model_copy(update={"level_db": HARP.level_db - 2}), []
-    for patch in (tuned, tuned, HARP, tuned.model_copy(update={"description": "Another"})):
-        file.write_text(patch.model_dump_json())
+    for instrument in (tuned, tuned, HARP, tuned.model_copy(update={"description": "Another"})):
+        file.write_text(instrument.model_dump_json())
         guitar.drop(file)
-        names.append(guitar.patch.name)
-        assert guitar.patch.model_copy(update={"name": patch.name}) == patch
+        names.append(guitar.instrument.name)
+        assert guitar.instrument.model_copy(update={"name": instrument.name}) == instrument
     assert names == ["Concert harp 2", "Concert harp 2", "Concert harp", "Concert harp 3"]
-    assert sorted(path.stem for path in own_patches().glob("*.json")) == ["concert_harp_2", "concert_harp_3"]
-    guitar.drop(own_patches() / "concert_harp_2.json")  # it is there already
-    before = (own_patches() / "concert_harp_2.json").read_bytes()
+    assert sorted(path.stem for path in own_instruments().glob("*.json")) == ["concert_harp_2", "concert_harp_3"]
+    guitar.drop(own_instruments() / "concert_harp_2.json")  # it is there already
+    before = (own_instruments() / "concert_harp_2.json").read_bytes()
     file.write_text(tuned.model_copy(update={"name": "Concert-harp 2!"}).model_dump_json())  # the same file's name
     guitar.drop(file)
-    assert (own_patches() / "concert_harp_2.json").read_bytes() == before
-    assert len(list(own_patches().glob("*.json"))) == 3
+    assert (own_instruments() / "concert_harp_2.json").read_bytes() == before
+    assert len(list(own_instruments().glob("*.json"))) == 3
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(song))  # a file: nothing can be added there
     mine = tuned.model_copy(update={"name": "Mine"})
     file.write_text(mine.model_dump_json())
     guitar.drop(file)
-    assert guitar.patch == mine and "not added to your library" in guitar.window.notices.text
+    assert guitar.instrument == mine and "not added to your library" in guitar.window.notices.text
 
 
 def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Window) -> None:
     tip = guitar.window.outside_label.toolTip
 
     def turned(decay: float, brightness: float, beyond: bool) -> None:
-        guitar.controller.patches.change("knobs.brightness_decay", brightness)
-        guitar.controller.patches.change("knobs.decay", decay)
+        guitar.controller.instruments.change("knobs.brightness_decay", brightness)
+        guitar.controller.instruments.change("knobs.decay", decay)
         guitar.wait(lambda: ("decay time near 3 kHz" in tip()) == beyond)
 
     turned(0.5, 0.1, False)  # nothing was struck
@@ -390,7 +392,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Windo
     turned(0.5, 0.1, True)  # before the next key
     guitar.session.play_string()
     guitar.wait(lambda: not tip())
-    guitar.session.play_patch()
+    guitar.session.play_instrument()
     guitar.play(80, hold=True)
     guitar.wait(lambda: "decay time near 3 kHz" in tip())
     guitar.choose("concert_harp")
@@ -411,7 +413,7 @@ def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_i
     guitar.session.play_string()
     guitar.change(a="preset:first")
     assert said() == 1
-    guitar.session.play_patch()
+    guitar.session.play_instrument()
     assert guitar.window.notices.notices[-1].times == 2 or said() == 2
     dry: list[bool] = []
     monkeypatch.setattr(guitar.notes, "hear_dry", dry.append)
@@ -427,13 +429,13 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
 ) -> None:
     history = guitar.session
     for name in ("classical_guitar", "concert_harp"):
-        patch = read_patch(PATCHES / f"{name}.json")
+        instrument = read_instrument(INSTRUMENTS / f"{name}.json")
         guitar.choose(name)
-        key = sum(patch.range) // 2
-        string = Strings(patch).of_key(key)
+        key = sum(instrument.range) // 2
+        string = Strings(instrument).of_key(key)
         assert string is not None
         guitar.wait(lambda own=string: guitar.choices.string == own.parameters)
-        assert guitar.choices.pluck == on_string(string, patch.pluck.pluck(guitar.choices.velocity))
+        assert guitar.choices.pluck == on_string(string, instrument.pluck.pluck(guitar.choices.velocity))
     guitar.wait(lambda: guitar.performance.playable)
     note = guitar.pluck()
     assert note.event.key == key and abs(note.event.velocity - guitar.choices.velocity) <= 1
@@ -442,28 +444,28 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     guitar.play(52)
     guitar.wait_for_string()
     guitar.wait(lambda: guitar.choices.string is not None)
-    own, patch = guitar.choices.string, guitar.patch
-    pluck = patch.pluck.model_copy(update={"position": 0.22, "shape": "raised_cosine"})
-    guitar.change(patch=patch.model_copy(update={"pluck": pluck}))
+    own, instrument = guitar.choices.string, guitar.instrument
+    pluck = instrument.pluck.model_copy(update={"position": 0.22, "shape": "raised_cosine"})
+    guitar.change(instrument=instrument.model_copy(update={"pluck": pluck}))
     guitar.wait(lambda: (guitar.choices.position, guitar.choices.shape) == (0.22, "raised_cosine"))
     assert guitar.choices.string == own
     guitar.change(position=0.45)
-    guitar.change(patch=guitar.patch.with_value("knobs.decay", 2.0))
+    guitar.change(instrument=guitar.instrument.with_value("knobs.decay", 2.0))
     assert guitar.choices.position == 0.45, "a knob of the string leaves what was drawn"
     low = Strings(HARP).of_key(43)
     assert low is not None
     for string in (STEEL, low.parameters):
         guitar.change(played=HARP, string=string, position=0.2, shape=HARP.pluck.shape)
         assert (guitar.choices.string, guitar.choices.position) == (string, 0.2)
-        guitar.change(played=patch)
+        guitar.change(played=instrument)
     guitar.change(played=HARP, string=low.parameters)
     guitar.wait(lambda: guitar.performance.playable)
     assert guitar.pluck().event.key == 43, "the string that was restored"
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder / "another.safetensors")
     guitar.controller.library.refresh()
-    other = read_patch(PATCHES / "cimbalom.json").model_copy(update={"preset": "another"})
-    guitar.change(played=patch)
-    guitar.wait(lambda: guitar.choices.shape == patch.pluck.shape != other.pluck.shape)
+    other = read_instrument(INSTRUMENTS / "cimbalom.json").model_copy(update={"preset": "another"})
+    guitar.change(played=instrument)
+    guitar.wait(lambda: guitar.choices.shape == instrument.pluck.shape != other.pluck.shape)
     before = guitar.choices.string, guitar.choices.shape
     guitar.change(played=other)
     guitar.wait(lambda: guitar.choices.shape == other.pluck.shape)
@@ -484,7 +486,7 @@ def test_notes_of_midi_choose_places_and_presets_and_a_pluck_after_them_is_of_th
         backend.play(guitar, "position", NoteOn(HIGHEST_PLACE, 127))
         guitar.wait(lambda: guitar.choices.position == reach.position[1])
         assert guitar.choices.amplitude_mm == reach.amplitude_mm[1]
-        assert (guitar.choices.string, guitar.choices.plays_patch) == (string, True)
+        assert (guitar.choices.string, guitar.choices.plays_instrument) == (string, True)
     backend.play(guitar, "preset", NoteOn(LOWEST_PLACE + guitar.controller.library.names.index("second"), 100))
     note = guitar.struck[-1]
     assert path_of(note.request.preset).stem == "second"
@@ -517,7 +519,7 @@ def test_the_menu_and_the_key_name_the_steps_of_undo_and_a_lost_release_ends_a_d
         assert QToolTip.text().startswith(said)
     menu.action["undo"].trigger()
     assert words() == ["Undo", "Redo: pluck width"]
-    lab.controller.patches.choose("classical_guitar")
+    lab.controller.instruments.choose("classical_guitar")
     assert words()[0] == "Undo: instrument Classical guitar"
     history.undo()
     knob = lab.window.transport.knobs["position"]

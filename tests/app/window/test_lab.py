@@ -16,8 +16,8 @@ from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QToolButton
 
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
-from app.instrument.events import PluckAt
-from app.patches.library import find_patch
+from app.instruments.library import find_instrument
+from app.player.events import PluckAt
 from app.playing.note import PluckVoices
 from app.session.choices import Choices
 from app.views.stage import MARGIN_X
@@ -536,14 +536,16 @@ def test_an_error_that_grew_is_put_into_words(errors: list[float], own: float | 
 
 def test_a_preset_is_plucked_as_trained_and_a_pluck_by_hand_stays_while_models_are_compared(opened: Open) -> None:
     known, same, noise = (f"nylon_nonlinear_{name}" for name in KNOWN)
-    lab = opened(known, same, noise, "studio_any_string", instrument=find_patch("Classical guitar").patch, face="lab")
+    lab = opened(
+        known, same, noise, "studio_any_string", instrument=find_instrument("Classical guitar").instrument, face="lab"
+    )
     before, middle = lab.choices.pluck, Pluck(0.5, 5.5, "gaussian", 0.06)
     button = lab.find(QToolButton, "Pluck as trained")
     assert not button.isEnabled() and "trained on many strings" in button.toolTip()
     lab.change(preset=known)
     assert lab.choices.pluck == middle and button.isEnabled()
     lab.key(KEY.Key_Z, CONTROL)
-    assert (lab.choices.plays_patch, lab.choices.pluck) == (True, before), "preset and pluck are one step"
+    assert (lab.choices.plays_instrument, lab.choices.pluck) == (True, before), "preset and pluck are one step"
     lab.change(preset=known)
     lab.wait(lambda: lab.performance.ready)
     lab.change(position=0.1, amplitude_mm=9.0, shape="triangular")

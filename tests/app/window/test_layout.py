@@ -300,7 +300,7 @@ def test_no_control_is_lost_nor_cut_in_a_small_window_with_large_text(
     window, bar = guitar.window, guitar.window.instrument.bar
     window.show_keys(False)
     guitar.change(face=face)
-    guitar.controller.patches.change("level_db", -3.5)
+    guitar.controller.instruments.change("level_db", -3.5)
     if face == "lab":
         guitar.wait_for_take()
     window.error_label.setText("Error of this pluck: 1.2 % in the training range, 3.4 % beyond")
@@ -349,7 +349,7 @@ def test_the_overflow_menu_does_what_its_buttons_do(guitar: Window, themed: Them
     more = guitar.find(Overflow, "More of the Lab")
     window.resize(1280, 720)
     themed("dark", 150)  # chosen in the menu: the window keeps its size
-    guitar.controller.patches.change("level_db", -3.5)
+    guitar.controller.instruments.change("level_db", -3.5)
     assert bar.more.isVisible() and bar.more.focusPolicy() & Qt.FocusPolicy.TabFocus
     found = entries(bar.more)
     assert {"Rename …", "Revert", "Compare"} <= found.keys()
@@ -357,7 +357,7 @@ def test_the_overflow_menu_does_what_its_buttons_do(guitar: Window, themed: Them
     found["Compare"].trigger()  # type: ignore[attr-defined]
     assert bar.compare.isChecked() and bar.compare.isVisible()
     entries(bar.more)["Revert"].trigger()  # type: ignore[attr-defined]
-    assert guitar.patch == guitar.controller.patches.entry.patch  # type: ignore[union-attr]
+    assert guitar.instrument == guitar.controller.instruments.entry.instrument  # type: ignore[union-attr]
     guitar.change(face="lab")
     window.error_label.setText("Error of this pluck: 1.2 %")
     found = entries(more)
@@ -405,7 +405,7 @@ def test_a_notice_is_read_whole_over_the_window_moves_nothing_and_is_dismissed_b
         assert settled() == bare and fits(window)
         for part in parts[:3]:
             assert not part.isVisible() or part.height() >= part.minimumSizeHint().height()
-        for desk in (lab.controller.presets, lab.controller.patches):
+        for desk in (lab.controller.presets, lab.controller.instruments):
             desk.toggle()
             browser = desk.browser
             lab.wait(lambda: browser.y() > notices.geometry().bottom())  # noqa: B023

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.instrument.bodies import own_bodies
-from app.patches.library import own_patches
+from app.instruments.library import own_instruments
+from app.player.bodies import own_bodies
 from app.views.dialogs.learn_dialog import ON_KEYS, LearnDialog
 from engine.presets import find_preset, read_info
 from tests.app.questions import answered
@@ -49,7 +49,7 @@ def test_a_note_is_learned_compared_kept_and_played(guitar: Window, note: Path) 
     dialog.start.click()
     assert not dialog.start.isEnabled()
     guitar.wait(lambda: dialog.state.text() == UNWRITTEN + ON_KEYS)
-    assert "error-to-signal ratio 0.0" in dialog.report.toPlainText() and not own_patches().exists()
+    assert "error-to-signal ratio 0.0" in dialog.report.toPlainText() and not own_instruments().exists()
     for heard, other in (("learned", "recording"), ("recording", "learned")):
         dialog.heard[heard].click()
         assert dialog.heard[heard].isChecked() and not dialog.heard[other].isChecked()
@@ -61,8 +61,8 @@ def test_a_note_is_learned_compared_kept_and_played(guitar: Window, note: Path) 
             assert asked == ["Discard the instrument?"] and dialogs(guitar) == [dialog]
     dialog.start.click()
     guitar.wait(lambda: not dialogs(guitar))
-    patch = guitar.patch
-    assert (patch.name, patch.category, patch.preset) == ("Low string", "bass", "low_string")
+    instrument = guitar.instrument
+    assert (instrument.name, instrument.category, instrument.preset) == ("Low string", "bass", "low_string")
     assert (own_bodies() / "low_string.wav").exists()
     notice = guitar.window.notices.notices[-1]
     assert notice.message.startswith("low_string: learned.") and not notice.error
@@ -129,4 +129,4 @@ def test_a_name_that_is_taken_is_refused_and_the_learning_can_be_cancelled(guita
     guitar.wait(lambda: "Cancelled" in dialog.state.text())
     assert dialog.start.isEnabled()
     dialog.reject()
-    assert not dialogs(guitar) and not own_patches().exists()
+    assert not dialogs(guitar) and not own_instruments().exists()

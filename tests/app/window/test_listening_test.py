@@ -10,9 +10,9 @@ import pytest
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from app.analysis.abx.trials import AbxChoices
-from app.instrument import events
-from app.instrument.events import PluckAt, TimedEvent
-from app.instrument.offline import render_events
+from app.player import events
+from app.player.events import PluckAt, TimedEvent
+from app.player.offline import render_events
 from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window import controller
@@ -125,14 +125,14 @@ def test_a_key_is_compared_as_the_instrument_plays_it(
         dialog, (_, material, _, render, *_) = guitar.window.findChildren(AbxDialog)[-1], made[-1]
         struck, entry = guitar.session.stage.struck, guitar.controller.library.find("studio_any_string")
         assert struck is not None and entry is not None and (struck.event.pluck is None) == bool(velocity)
-        assert (material.pluck["instrument"], material.pluck["key"]) == (guitar.patch.name, struck.event.key)
+        assert (material.pluck["instrument"], material.pluck["key"]) == (guitar.instrument.name, struck.event.key)
         words = [each.text() for each in dialog.findChildren(QLabel)]
         assert f"{struck.words}. All modes, although mode 2 is soloed" in words
         rate_hz = guitar.controller.sound.rate_hz
         found = render(rate_hz).result(60)
         for source in ("model", "truth"):
             alone = render_events(
-                struck.patch,
+                struck.instrument,
                 load_preset(entry.path),
                 [TimedEvent(0.0, struck.event)],
                 rate_hz,

@@ -15,9 +15,9 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.export.journal import left_journals
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, PatchTurned, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.patches.library import SHIPPED as PATCHES
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
 from app.shared.log import FILE_VARIABLE, LARGEST_BYTES, OLDER_KEPT, faults_logged, log_fault
 from app.views.controls.notice_bar import NoticeBar
 from app.window.signals import SIGNALS, asked_to_end
@@ -33,7 +33,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn
+from app.player.events import Bend, ControlChange, NoteOff, NoteOn
 from app.window import main
 from app.window.main_window import MainWindow
 
@@ -78,11 +78,11 @@ def watch(controller):
         if not controller.performance.playable:
             return False
         if not recorder.recording:
-            controller.patches.recordings.record()
+            controller.instruments.recordings.record()
         elif left:
             controller.inputs.play(left.pop(0))
             if len(left) == 2:
-                controller.patches.change("level_db", -7.5)
+                controller.instruments.change("level_db", -7.5)
         else:
             print(json.dumps([each.time_s for each in recorder._recorded]), flush=True)
             return True
@@ -101,7 +101,7 @@ def watch(controller):
             asked.append(box.text())
             QTest.keyClick(box, Qt.Key[key])
         elif asked and (controller.exports.dialog is not None or key == "Key_Escape"):
-            latest = controller.patches.recordings.offered
+            latest = controller.instruments.recordings.offered
             print(json.dumps([each.time_s for each in latest.played.events] if latest else None), flush=True)
             controller.window.may_close = lambda: True
             return controller.window.close()
@@ -173,7 +173,7 @@ def test_files_are_taken_at_the_start_no_note_of_a_song_is_lost_and_no_thread_st
     song = tmp_path / "song.mid"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.1, NoteOn(57, 90))]))
     (tmp_path / "settings.json").write_text('{"choices": {"seconds": 0.5, "preset": "a preset that is gone"}}')
-    status, lines, errors = ended(START + OPENING, tmp_path, PATCHES / "concert_harp.json", song)
+    status, lines, errors = ended(START + OPENING, tmp_path, INSTRUMENTS / "concert_harp.json", song)
     assert status == 0, errors
     assert json.loads(lines[-2]) == {"struck": [[50, True], [57, True]], "instrument": "Concert harp"}
     assert lines[-1] == "[]"
@@ -203,14 +203,22 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
 ) -> None:
     times_s = recorded(tmp_path, end)
     if end != KILL:
-        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["patch"]["level_db"] == -7.5
+        assert json.loads((tmp_path / "settings.json").read_text())["choices"]["instrument"]["level_db"] == -7.5
     (journal,) = left_journals(tmp_path / "left")
     played = journal.read()
     journal.close()
     assert played is not None
     kinds = [type(each.event) for each in played.events]
-    assert [kind for kind in kinds if kind is not PatchTurned][:5] == [NoteOn, ControlChange, Bend, NoteOff, NoteOn]
-    assert [each.event.patch.level_db for each in played.events if isinstance(each.event, PatchTurned)][-1] == -7.5
+    assert [kind for kind in kinds if kind is not InstrumentTurned][:5] == [
+        NoteOn,
+        ControlChange,
+        Bend,
+        NoteOff,
+        NoteOn,
+    ]
+    assert [each.event.instrument.level_db for each in played.events if isinstance(each.event, InstrumentTurned)][
+        -1
+    ] == -7.5
     first_s = times_s[kinds.index(NoteOn)]
     wanted = [max(0.0, time_s - first_s) for time_s in sorted(times_s)]
     found = [each.time_s for each in played.events]

@@ -12,9 +12,9 @@ from PySide6.QtCore import QCoreApplication
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import Bend, ControlChange, Event, NoteOff, NoteOn, release_all
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import Bend, ControlChange, Event, NoteOff, NoteOn, release_all
 from app.playing.midi import MidiChoices
 from app.playing.midi_backend import MidiUnavailable
 from app.playing.midi_port import MidiInput, same_device
@@ -222,18 +222,18 @@ def test_a_controller_with_a_function_of_its_own_is_played_and_not_learned(
     assert keys.came[-1] == ControlChange(number, 0, 1)
 
 
-def test_the_patch_says_what_channels_and_wheels_do_and_without_the_package_nothing_is_learned(
+def test_the_instrument_says_what_channels_and_wheels_do_and_without_the_package_nothing_is_learned(
     desk: Callable[..., Desk], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keys = desk()
     boxes = [find(keys.dialog, QComboBox, name) for name in ("Channels", "Bend range", "Pitch bend", "Modulation")]
-    assert not boxes[3].isEnabled(), "there is no patch"
+    assert not boxes[3].isEnabled(), "there is no instrument"
     hands = {"mode": "guitar", "bend_semitones": 2.5, "bend_by": "length", "mod_wheel": "knobs.decay"}
-    keys.midi.show_patch(read_patch(PATCHES / "classical_guitar.json").model_copy(update=hands))
+    keys.midi.show_instrument(read_instrument(INSTRUMENTS / "classical_guitar.json").model_copy(update=hands))
     assert [box.currentData() for box in boxes] == list(hands.values())
     for (field, _), box, value in zip(hands.items(), boxes, ("mpe", 12.0, "tension", "pluck.position"), strict=True):
         choose(box, value)
-        assert getattr(keys.performed[-1]["patch"], field) == value
+        assert getattr(keys.performed[-1]["instrument"], field) == value
     learns = [each for each in keys.dialog.findChildren(QPushButton) if each.accessibleName().startswith("Assign")]
 
     def missing() -> list[str]:

@@ -53,7 +53,7 @@ def typed_on(qtbot: QtBot, knob: Knob, text: str) -> None:
 
 
 def test_every_knob(qtbot: QtBot, locale: str, lab: Window) -> None:
-    lab.controller.patches.choose("classical_guitar")
+    lab.controller.instruments.choose("classical_guitar")
     lab.wait(lambda: lab.choices.string is not None)
     knobs = [knob for knob in lab.window.findChildren(Knob) if knob.isEnabled() and not knob.isHidden()]
     assert len(knobs) > 30

@@ -13,9 +13,9 @@ import soundfile
 from PySide6.QtCore import QPoint, QRect
 
 from app.audio.sound import Sound
-from app.instrument.bodies import own_bodies
-from app.patches.library import find_patch
-from app.patches.tuning import Tuning
+from app.instruments.library import find_instrument
+from app.instruments.tuning import Tuning
+from app.player.bodies import own_bodies
 from app.rendering.note_sound import NoteSound
 from app.views.controls.browser import Browser
 from app.views.dialogs.learn_dialog import LearnDialog
@@ -33,7 +33,7 @@ FIVE = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for
 FIVE_KEYS, SEVEN_KEYS = (
     f"{n}\n0\n127\n60\n69\n440\n{n}\n" + "".join(f"{degree}\n" for degree in range(n)) for n in (5, 7)
 )
-GUITAR = find_patch("Classical guitar").patch
+GUITAR = find_instrument("Classical guitar").instrument
 
 
 @pytest.fixture
@@ -205,24 +205,24 @@ def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(
         assert words in lab.window.notices.text and lab.choices == choices
 
 
-def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pick_up(
+def test_a_recipe_of_the_model_that_plays_the_instrument_leaves_the_instrument_and_its_pick_up(
     guitar: Window, tmp_path: Path
 ) -> None:
-    """The patch is heard in stereo, the recipe in mono; both are of the model of many strings."""
+    """The instrument is heard in stereo, the recipe in mono; both are of the model of many strings."""
     guitar.change(pickup="displacement", stereo=True)
     before, entry = guitar.choices, guitar.performance.entry
-    assert entry is not None and entry.name == before.patch.preset
+    assert entry is not None and entry.name == before.instrument.preset
     export_sound(NoteSound(entry.path, Pluck(0.3, 2.0), 0.6, Ear((0.22,))), tmp_path / "a.wav")
     guitar.drop(tmp_path / "a.wav")
     choices = guitar.choices
     assert (choices.pluck.position, choices.listen, choices.stereo) == (0.3, 0.22, False)
-    assert (choices.single, choices.patch) == (entry.name, before.patch)
-    guitar.session.play_patch()
+    assert (choices.single, choices.instrument) == (entry.name, before.instrument)
+    guitar.session.play_instrument()
     choices = guitar.choices
-    assert (choices.stereo, choices.listen, choices.patch) == (True, before.listen, before.patch)
+    assert (choices.stereo, choices.listen, choices.instrument) == (True, before.listen, before.instrument)
 
 
-def test_scales_and_mappings_tune_the_patch_in_either_order_and_undo_takes_them_back(
+def test_scales_and_mappings_tune_the_instrument_in_either_order_and_undo_takes_them_back(
     guitar: Window, tmp_path: Path
 ) -> None:
     """A mapping joins a scale: alone its degrees would name steps of twelve equal ones in higher octaves."""
@@ -232,22 +232,22 @@ def test_scales_and_mappings_tune_the_patch_in_either_order_and_undo_takes_them_
         return tmp_path / name
 
     def cents(low: int, high: int) -> Any:
-        tuning = Tuning(guitar.patch.tuning)
+        tuning = Tuning(guitar.instrument.tuning)
         return pytest.approx(1200 * math.log2(tuning.hz(high) / tuning.hz(low)), abs=1e-3)
 
-    before, history, name = guitar.patch, guitar.session, guitar.patch.name
+    before, history, name = guitar.instrument, guitar.session, guitar.instrument.name
     guitar.drop(written("Five.SCL", FIVE))
     assert cents(60, 61) == 240 and f"Five.SCL tunes {name}" in guitar.window.notices.text
     history.undo()
-    assert guitar.patch == before and cents(60, 61) == 100
+    assert guitar.instrument == before and cents(60, 61) == 100
     history.redo()
     assert cents(60, 61) == 240
     scale, keys, seven = written("5.scl", FIVE), written("5.kbm", FIVE_KEYS), written("7.kbm", SEVEN_KEYS)
     for files in ((scale, keys), (keys, scale), (seven, scale, keys)):
         guitar.drop(*files)
-        assert (guitar.patch.tuning.scale, guitar.patch.tuning.keymap) == (FIVE, FIVE_KEYS)
+        assert (guitar.instrument.tuning.scale, guitar.instrument.tuning.keymap) == (FIVE, FIVE_KEYS)
         assert cents(60, 65) == 1200
-        guitar.controller.patches.revert()
+        guitar.controller.instruments.revert()
     scale = written("31.scl", "31\n31\n" + "".join(f" {1200 * n / 31:.6f}\n" for n in range(1, 32)))
     degrees = "".join(f"{degree}\n" for degree in (0, 3, 5, 8, 10, 13, 16, 18, 21, 23, 26, 28))
     keys = written("31.kbm", f"12\n0\n127\n60\n69\n440\n31\n{degrees}")
@@ -255,7 +255,7 @@ def test_scales_and_mappings_tune_the_patch_in_either_order_and_undo_takes_them_
         guitar.drop(*files)
         assert joined.format(name) in guitar.window.notices.text
         assert cents(60, 61) == 3 * 1200 / 31 and cents(60, 72) == 1200
-        guitar.controller.patches.revert()
+        guitar.controller.instruments.revert()
     before = guitar.choices
     for bad, text in (
         ("empty.scl", ""),
@@ -275,10 +275,10 @@ def knock(path: Path, seconds: float = 0.05) -> Path:
     return path
 
 
-def test_sounds_are_bodies_of_the_patch_as_far_as_they_are_short(
+def test_sounds_are_bodies_of_the_instrument_as_far_as_they_are_short(
     guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before, box, start = guitar.patch, guitar.window.instrument.bar.body, guitar.choices
+    before, box, start = guitar.instrument, guitar.window.instrument.bar.body, guitar.choices
     for path in (knock(tmp_path / "long.wav", 61.0), knock(tmp_path / "long.flac", 61.0)):
         guitar.drop(path)
         words = f"{path}: lasts 61 s; cut out a note of at most 60 s, or a body's response"
@@ -288,21 +288,21 @@ def test_sounds_are_bodies_of_the_patch_as_far_as_they_are_short(
         guitar.drop(file)
         assert (own_bodies() / file.name).read_bytes() == file.read_bytes()
         assert [box.itemData(row) for row in range(len(BODIES) + 1)] == ["", *BODIES]
-        assert box.currentData() == guitar.patch.body.name == file.stem and guitar.patch.body.mix > 0
+        assert box.currentData() == guitar.instrument.body.name == file.stem and guitar.instrument.body.mix > 0
         assert f"now has the body {file.stem}" in guitar.window.notices.text
         guitar.session.undo()
-        assert guitar.patch == before
+        assert guitar.instrument == before
     for ending in ("wav", "flac"):
         guitar.drop(knock(tmp_path / f"hall_{ending}.{ending}", 6.97))
         dialog = next(each for each in guitar.window.findChildren(LearnDialog) if each.isVisible())
         guitar.wait(dialog.body.isChecked)  # as long as a note: the dialog asks
         dialog.start.click()
-        assert guitar.patch.body.name == f"hall_{ending}"
+        assert guitar.instrument.body.name == f"hall_{ending}"
         assert f"hall_{ending}.{ending} lasts 6.97 s: its first 3 s, faded out, are the body." in guitar.said
 
 
 def test_a_body_that_comes_back_is_heard_again(opened: Open, tmp_path: Path) -> None:
-    """The patch names it all the time, so that nothing of it changes."""
+    """The instrument names it all the time, so that nothing of it changes."""
     heard: list[Effects | None] = []
 
     class Noting(Sound):
@@ -320,8 +320,8 @@ def test_a_body_that_comes_back_is_heard_again(opened: Open, tmp_path: Path) -> 
     chosen = w.choices
     w.wait(is_knock)
     (own_bodies() / "knock.wav").unlink()
-    w.performance.choices_changed(frozenset({"patch"}))
+    w.performance.choices_changed(frozenset({"instrument"}))
     w.wait(lambda: not is_knock() and any("played without its body" in each for each in w.said))
     w.drop(tmp_path / "knock.wav")
     w.wait(is_knock)
-    assert w.choices.patch == chosen.patch
+    assert w.choices.instrument == chosen.instrument

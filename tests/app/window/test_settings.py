@@ -17,7 +17,7 @@ from pytestqt.qtbot import QtBot
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
-from app.patches.library import SHIPPED as PATCHES
+from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.background import Background
@@ -114,13 +114,13 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
     sound, export = SoundChoice(rate_hz=96_000), ExportChoices(format="wav 32f")
     assert settings == Settings(choices=Choices(listen=0.2), sound=sound, export=export)
     assert "choices.position" in notice and "settings.broken.json" in notice
-    patch = json.loads((PATCHES / "classical_guitar.json").read_text())
-    kept = {"volume_db": -12.0, "patch": patch, "string": {"length_m": 0.65}}
+    instrument = json.loads((INSTRUMENTS / "classical_guitar.json").read_text())
+    kept = {"volume_db": -12.0, "instrument": instrument, "string": {"length_m": 0.65}}
     for extra, is_there in (({}, True), ({"kind": "set", "extra": 1}, False)):
-        patch["strings"] |= extra
+        instrument["strings"] |= extra
         settings, notice = load(path, json.dumps({"choices": kept, "favourites": ["mine"]}))
         assert (settings.choices.volume_db, settings.favourites) == (-12.0, ("mine",))
-        assert settings.choices.string is None and (settings.choices.patch is not None) == is_there
+        assert settings.choices.string is None and (settings.choices.instrument is not None) == is_there
         assert "choices.string" in notice or not is_there
 
 

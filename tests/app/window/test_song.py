@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import ControlChange, NoteOff, NoteOn, TimedEvent
+from app.player.events import ControlChange, NoteOff, NoteOn, TimedEvent
 from app.playing.playback import Playback
 from app.views.controls.song_strip import SongStrip
 from app.window import song as module

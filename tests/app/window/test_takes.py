@@ -11,8 +11,8 @@ import pytest
 import soundfile
 from PySide6.QtWidgets import QInputDialog
 
-from app.instrument.events import KEYS, NoteOff, NoteOn
-from app.instrument.midi_file import read_midi
+from app.player.events import KEYS, NoteOff, NoteOn
+from app.player.midi_file import read_midi
 from app.playing import playback, recorder
 from app.playing.playback import AHEAD_S
 from app.window.settings import load_settings
@@ -64,7 +64,7 @@ def test_takes_are_written_where_the_first_was_saved_and_their_own_files_alone_a
     record(guitar)
     guitar.wait(lambda: "menu beside Record" in guitar.said[-1])
     assert "make the folder first" in guitar.said[-1] and next(iter(takes(guitar))).endswith("not saved")
-    assert guitar.controller.patches.recordings.unsaved
+    assert guitar.controller.instruments.recordings.unsaved
     record(guitar)  # asks for another place
     save(guitar, tmp_path / "elsewhere.wav")
 
@@ -75,10 +75,10 @@ def test_a_take_is_played_again_through_its_instrument_with_the_knobs_that_were_
     record(guitar)
     save(guitar, tmp_path / "first.wav")
     dialog_of(guitar).reject()
-    patch = guitar.patch
+    instrument = guitar.instrument
     guitar.window.instrument.bar.record.click()
     guitar.play(64, hold=True)
-    guitar.controller.patches.change("level_db", -9.0)
+    guitar.controller.instruments.change("level_db", -9.0)
     guitar.wait(lambda: guitar.struck[-1].seconds > 0.4)
     guitar.window.instrument.released.emit(64, None)
     guitar.window.instrument.bar.record.click()
@@ -88,12 +88,12 @@ def test_a_take_is_played_again_through_its_instrument_with_the_knobs_that_were_
     guitar.struck.clear()
     chosen(guitar, 0, "Play")
     guitar.wait(lambda: [note.event.key for note in guitar.struck] == [64])
-    assert guitar.patch == patch and guitar.struck[0].patch == patch
-    guitar.wait(lambda: guitar.keys.player is not None and guitar.keys.player.patch.level_db == -9.0)
-    guitar.wait(lambda: not guitar.controller.patches.playing)
-    guitar.wait(lambda: guitar.keys.player is not None and guitar.keys.player.patch == patch)
+    assert guitar.instrument == instrument and guitar.struck[0].instrument == instrument
+    guitar.wait(lambda: guitar.keys.player is not None and guitar.keys.player.instrument.level_db == -9.0)
+    guitar.wait(lambda: not guitar.controller.instruments.playing)
+    guitar.wait(lambda: guitar.keys.player is not None and guitar.keys.player.instrument == instrument)
     guitar.session.undo()
-    assert guitar.patch.name == "Concert harp"
+    assert guitar.instrument.name == "Concert harp"
 
 
 def test_a_counted_recording_begins_at_the_beat_and_is_sample_equal_to_one_without_clicks(
@@ -109,7 +109,7 @@ def test_a_counted_recording_begins_at_the_beat_and_is_sample_equal_to_one_witho
         add(mixer, *voices)
 
     monkeypatch.setattr(Mixer, "add", note_added)
-    recordings, sounds, now_s = guitar.controller.patches.recordings, [], 1000.0
+    recordings, sounds, now_s = guitar.controller.instruments.recordings, [], 1000.0
     actions = {each.text(): each for each in guitar.window.instrument.bar.takes.actions()}
     for counted in (False, True):
         if counted:

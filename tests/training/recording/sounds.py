@@ -375,17 +375,17 @@ def membrane(random: Random) -> Sound:
 
 def drum(random: Random, number: int) -> Sound:
     """A blow on one of the project's drums."""
-    from app.instrument.offline import render_note
-    from app.patches.library import SHIPPED, read_patch
+    from app.instruments.library import SHIPPED, read_instrument
+    from app.player.offline import render_note
     from engine.presets import SHIPPED as PRESETS
     from engine.presets import load_preset
 
     name, key = DRUMS[number % len(DRUMS)]
-    patch = read_patch(Path(SHIPPED) / f"{name}.json")
+    instrument = read_instrument(Path(SHIPPED) / f"{name}.json")
     preset = load_preset(PRESETS / "studio_any_string.safetensors")
-    low, high = patch.range
+    low, high = instrument.range
     key = min(max(key + int(random.integers(-3, 4)), low), high)
-    sound = render_note(patch, preset, key, int(random.integers(60, 127)), 1.5, 1.5, 44_100)[:, 0]
+    sound = render_note(instrument, preset, key, int(random.integers(60, 127)), 1.5, 1.5, 44_100)[:, 0]
     return np.concatenate([np.zeros(2_000), sound.astype(float)]) + 1e-6 * random.standard_normal(
         len(sound) + 2_000
     ), 44_100

@@ -12,12 +12,12 @@ from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
 from engine.kernels import cache
 from tests.app.export.plugin.host import Library
-from tests.app.export.plugin.pieces import NAMES, patch_of, preset_of
+from tests.app.export.plugin.pieces import NAMES, instrument_of, preset_of
 
 
 @pytest.fixture(scope="package")
 def images() -> list[Image]:
-    return [image_of(patch_of(name), preset_of(name)) for name in NAMES]
+    return [image_of(instrument_of(name), preset_of(name)) for name in NAMES]
 
 
 @pytest.fixture(scope="package")

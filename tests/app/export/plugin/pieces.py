@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
-from app.instrument.offline import render_events
-from app.patches.library import SHIPPED as INSTRUMENTS
-from app.patches.library import read_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.player.offline import render_events
 from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Event, Instance, midi, note_off, note_on
 from tests.engine.resonators.test_recorded import recorded
@@ -40,25 +40,25 @@ SECONDS = 1.6
 EQUAL_DB = -140.0
 
 
-def patch_of(name: str) -> Patch:
+def instrument_of(name: str) -> Instrument:
     if name == LEARNED:
-        return read_patch(INSTRUMENTS / "falling_nylon.json").model_copy(update={"name": "Learned"})
+        return read_instrument(INSTRUMENTS / "falling_nylon.json").model_copy(update={"name": "Learned"})
     if name == MEMBERS:
-        guitar = read_patch(INSTRUMENTS / "classical_guitar.json")
+        guitar = read_instrument(INSTRUMENTS / "classical_guitar.json")
         return guitar.model_copy(update={"name": "Member channels", "mode": "mpe", "bend_semitones": 12.0})
-    return read_patch(INSTRUMENTS / f"{name}.json")
+    return read_instrument(INSTRUMENTS / f"{name}.json")
 
 
 def preset_of(name: str) -> Preset:
-    preset = load_preset(SHIPPED / f"{patch_of(name).preset}.safetensors")
+    preset = load_preset(SHIPPED / f"{instrument_of(name).preset}.safetensors")
     if name != LEARNED:
         return preset
     own = replace(recorded(), smooth_hz=(200.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8), pitch_hz=196.0)
     return replace(preset, info=replace(preset.info, recorded=own))
 
 
-def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | ControlChange]]:
-    low = max(patch.range[0], min(52, patch.range[1] - 20))
+def piece(instrument: Instrument) -> list[tuple[float, NoteOn | NoteOff | Bend | ControlChange]]:
+    low = max(instrument.range[0], min(52, instrument.range[1] - 20))
     half = 4096 / 8191  # as 14 bits have it
     return [
         (0.0, NoteOn(low, 100)),
@@ -98,30 +98,30 @@ def to_host(event: NoteOn | NoteOff | Bend | ControlChange, frame: int) -> Event
 
 def played(
     instance: Instance,
-    patch: Patch,
+    instrument: Instrument,
     rate_hz: int,
     block: int = 512,
     more: tuple[Event, ...] = (),
     before: tuple[Event, ...] = (),
 ) -> NDArray[np.float32]:
     """The piece, without the latency; other events after and before it."""
-    own = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)]
+    own = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(instrument)]
     events = [*before, *own, *more]
     latency = instance.latency
     return instance.render(round(SECONDS * rate_hz) + latency, events, block)[latency:]
 
 
 def rendered(
-    patch: Patch,
+    instrument: Instrument,
     rate_hz: int,
     source: str = "model",
     gain_db: float = 0.0,
     more: tuple[TimedEvent, ...] = (),
     before: tuple[TimedEvent, ...] = (),
 ) -> NDArray[np.float32]:
-    preset = preset_of(LEARNED if patch.name == "Learned" else "concert_harp")
-    timed = [*before, *(TimedEvent(time_s, event) for time_s, event in piece(patch)), *more]
-    sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
+    preset = preset_of(LEARNED if instrument.name == "Learned" else "concert_harp")
+    timed = [*before, *(TimedEvent(time_s, event) for time_s, event in piece(instrument)), *more]
+    sound = render_events(instrument, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
     return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
 
 

@@ -23,7 +23,7 @@ from engine.python_process import python_command, python_environment
 from engine.whole_file import WriteError
 from tests.app.export.plugin import lv2_host
 from tests.app.export.plugin.host import Browser, Library
-from tests.app.export.plugin.pieces import LEARNED, patch_of, preset_of
+from tests.app.export.plugin.pieces import LEARNED, instrument_of, preset_of
 
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
 
@@ -51,7 +51,7 @@ def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid
     objects: Path, tmp_path: Path
 ) -> None:
     names = ("é" * 60, "古琴" * 18, "古琴" * 18 + "!", "🎸" * 60, "My bass!", "my bass-", "My bass", "عود", "!!!")
-    harp, preset = patch_of("concert_harp"), preset_of("concert_harp")
+    harp, preset = instrument_of("concert_harp"), preset_of("concert_harp")
     made = [image_of(harp.model_copy(update={"name": name}), preset) for name in names]
     library = Library(build_plugin(made, "clap", this_target(), tmp_path / "bank", objects))
     assert list(library.plugins) == [image.id for image in made]
@@ -73,8 +73,8 @@ def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid
 
 def test_instruments_are_small_and_one_that_cannot_sound_is_refused() -> None:
     for name in ("concert_toms", "frame_drum", "slow_water"):  # the most drums or modes, the longest room
-        assert image_of(patch_of(name), preset_of(name)).bytes < LARGEST_BYTES
-    sitar = patch_of("sitar")
+        assert image_of(instrument_of(name), preset_of(name)).bytes < LARGEST_BYTES
+    sitar = instrument_of("sitar")
     assert sitar.pickup.kind == "bridge"  # whose force a recording does not give
     with pytest.raises(ValueError, match="no key sounds"):
         image_of(sitar, preset_of(LEARNED))

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image
-from app.instrument.events import Bend, NoteOff, NoteOn
-from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from app.player.events import Bend, NoteOff, NoteOn
+from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from tests.app.export.plugin import host, lv2_host, vst3_host
-from tests.app.export.plugin.pieces import SECONDS, difference_db, midi_bytes, patch_of, piece, played
+from tests.app.export.plugin.pieces import SECONDS, difference_db, instrument_of, midi_bytes, piece, played
 
 RATE_HZ = 48_000
 BEND = 129
@@ -68,29 +68,29 @@ def lv2(lv2_bundle: Path, images: list[Image]) -> Iterator[Lv2]:
 
 
 def image_of(images: list[Image], name: str) -> Image:
-    return next(each for each in images if each.name == patch_of(name).name)
+    return next(each for each in images if each.name == instrument_of(name).name)
 
 
 def active(library: vst3_host.Library, name: str, rate_hz: int = RATE_HZ) -> vst3_host.Instance:
-    instance = library.create(patch_of(name).name)
+    instance = library.create(instrument_of(name).name)
     instance.activate(rate_hz)
     return instance
 
 
 def by_clap(bank: host.Library, name: str) -> Sound:
-    instance = bank.create_named(patch_of(name).name)
+    instance = bank.create_named(instrument_of(name).name)
     instance.activate(RATE_HZ)
-    return played(instance, patch_of(name), RATE_HZ)
+    return played(instance, instrument_of(name), RATE_HZ)
 
 
 def by_lv2(instance: lv2_host.Instance, name: str, block: int = 512) -> Sound:
-    messages = [(round(time_s * RATE_HZ), bytes(midi_bytes(event))) for time_s, event in piece(patch_of(name))]
+    messages = [(round(time_s * RATE_HZ), bytes(midi_bytes(event))) for time_s, event in piece(instrument_of(name))]
     return instance.render(round(SECONDS * RATE_HZ), messages, block)
 
 
 def by_vst3(instance: vst3_host.Instance, name: str, block: int = 480) -> Sound:
     events, changes = [], []
-    for time_s, event in piece(patch_of(name)):
+    for time_s, event in piece(instrument_of(name)):
         frame = round(time_s * RATE_HZ)
         if isinstance(event, NoteOn):
             events.append((frame, vst3_host.note_on(event.key, event.velocity, event.channel)))
@@ -122,7 +122,7 @@ def test_impossible_rates_and_blocks_are_refused_and_unusual_ones_sound(
     bank: host.Library, vst3: vst3_host.Library, lv2: Lv2
 ) -> None:
     name = "electric_bass"
-    other, instance = bank.create_named(patch_of(name).name), vst3.create(patch_of(name).name)
+    other, instance = bank.create_named(instrument_of(name).name), vst3.create(instrument_of(name).name)
     for rate_hz in IMPOSSIBLE_HZ:
         assert not other.accepts(rate_hz, 4_096) and not instance.accepts(rate_hz)
         with pytest.raises(lv2_host.Refused):
@@ -142,7 +142,7 @@ def test_impossible_rates_and_blocks_are_refused_and_unusual_ones_sound(
 
 def test_values_without_a_finite_number_are_ignored(bank: host.Library, vst3: vst3_host.Library, lv2: Lv2) -> None:
     name = "electric_bass"
-    plain, other = (bank.create_named(patch_of(name).name) for _ in range(2))
+    plain, other = (bank.create_named(instrument_of(name).name) for _ in range(2))
     for each in (plain, other):
         each.activate(RATE_HZ)
     struck = host.note_on(0, 40, 100)
@@ -201,7 +201,7 @@ def moved(lv2: Lv2, images: list[Image]) -> lv2_host.Instance:
     """A macro is moved, then a parameter that it moves: ports alone do not say which was last."""
     instance = lv2(SAVED)
     macro = place_of(images, SAVED, MACRO)
-    target = place_of(images, SAVED, patch_of(SAVED).macros[0].targets[0].field)
+    target = place_of(images, SAVED, instrument_of(SAVED).macros[0].targets[0].field)
     for place, share in ((target, 0.7), (macro, 0.9), (target, 0.2), (macro, 0.1)):
         each = image_of(images, SAVED).parameters[place]
         instance.values[place] = each.low + share * (each.high - each.low)
@@ -286,7 +286,7 @@ def test_damaged_states_are_refused_and_change_nothing(
     assert not moved.restore(state, kind="http://lv2plug.in/ns/ext/atom#String")
     assert moved.restore(state) and moved.save() == state
 
-    other, instance = bank.create_named(patch_of(SAVED).name), active(vst3, SAVED)
+    other, instance = bank.create_named(instrument_of(SAVED).name), active(vst3, SAVED)
     other.activate(RATE_HZ)
     other.render(64, [host.param(0, id, 0.3) for id in other.ids])
     whole = other.save()
@@ -304,13 +304,13 @@ def test_damaged_states_are_refused_and_change_nothing(
 
 def share_of(name: str, shown: host.ParamInfo, value: float) -> float:
     """The place of a knob in a VST3 host: that of the window's."""
-    known = {each.name: each for each in (*OF_PATCHES.values(), OF_CHOICES["volume_db"])}
+    known = {each.name: each for each in (*OF_INSTRUMENTS.values(), OF_CHOICES["volume_db"])}
     return known[name].share(value) if name in known else (value - shown.low) / (shown.high - shown.low)
 
 
 def test_parameters_are_the_clap_plug_in_s_and_macros_move_them(vst3: vst3_host.Library, bank: host.Library) -> None:
-    patch = patch_of("classical_guitar")
-    other, instance = bank.create_named(patch.name), active(vst3, "classical_guitar")
+    instrument = instrument_of("classical_guitar")
+    other, instance = bank.create_named(instrument.name), active(vst3, "classical_guitar")
     shown, wanted = instance.parameters, other.parameters
     for name, each in wanted.items():
         assert shown[name].id == each.id
@@ -319,14 +319,14 @@ def test_parameters_are_the_clap_plug_in_s_and_macros_move_them(vst3: vst3_host.
     hidden = [each for name, each in shown.items() if name not in wanted]
     assert len({each.id for each in shown.values()}) == len(shown)
     assert hidden and all(each.flags & 16 for each in hidden)
-    macro = patch.macros[0].name
+    macro = instrument.macros[0].name
     instance.block(64, [], [(0, shown[macro].id, 1.0)])
     assert instance.moved  # the host is given the others that have moved
     other.activate(RATE_HZ)
     other.block(64, [host.param(0, wanted[macro].id, 1.0)])
     for name, each in wanted.items():
         assert instance.value(each.id) == pytest.approx(share_of(name, each, other.value(each.id)), abs=1e-9)
-    state, again = instance.save(), vst3.create(patch.name)
+    state, again = instance.save(), vst3.create(instrument.name)
     assert state == other.save()
     assert again.load(state)
     assert again.save() == state
@@ -361,8 +361,8 @@ def test_pedalboard_plays_it(vst3_bundle: Path, bank: host.Library, tmp_path: Pa
     python = os.environ.get("PEDALBOARD_PYTHON") or (sys.executable if find_spec("pedalboard") else "")
     if not python:
         pytest.skip("needs pedalboard; PEDALBOARD_PYTHON may be a Python that has it")
-    events = json.dumps([(midi_bytes(event), time_s) for time_s, event in piece(patch_of(SAVED))])
-    words = [str(vst3_bundle), patch_of(SAVED).name, str(tmp_path / "sound.npy"), events]
+    events = json.dumps([(midi_bytes(event), time_s) for time_s, event in piece(instrument_of(SAVED))])
+    words = [str(vst3_bundle), instrument_of(SAVED).name, str(tmp_path / "sound.npy"), events]
     done = subprocess.run([python, "-c", PEDALBOARD, *words], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-600:]
     sound, wanted = np.load(tmp_path / "sound.npy"), by_clap(bank, SAVED)

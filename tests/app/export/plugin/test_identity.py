@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from app.export.plugin.formats import PluginError
 from app.export.plugin.identity import MOST_BYTES, check_kept, held_in, identifier, lost_with
 from app.export.plugin.image import Image
-from app.patches.library import SHIPPED, list_patches
+from app.instruments.library import SHIPPED, list_instruments
 
 PREFIX = "org.learned-strings."
 # Names that fold to one another; those of the factory differ from the last two.
@@ -29,7 +29,7 @@ def is_valid(id: str) -> bool:
 
 
 def test_other_names_have_other_identifiers() -> None:
-    names = {*NAMES, *(each.patch.name for each in list_patches(SHIPPED)[0])}
+    names = {*NAMES, *(each.instrument.name for each in list_instruments(SHIPPED)[0])}
     assert len({identifier(name) for name in names}) == len(names)
     assert all(is_valid(identifier(name)) for name in names)
 
@@ -55,8 +55,8 @@ def test_a_random_name_and_its_other_spellings_differ(name: str, data: st.DataOb
 
 
 def test_factory_instruments_and_plain_names_keep_theirs() -> None:
-    for entry in list_patches(SHIPPED)[0]:
-        name = entry.patch.name
+    for entry in list_instruments(SHIPPED)[0]:
+        name = entry.instrument.name
         assert identifier(name) == PREFIX + "".join(c if c.isalnum() else "-" for c in name.lower())
     for name, wanted in (("My bass", "my-bass"), ("Bäss 2", "bäss-2"), ("古琴", "古琴")):
         assert identifier(name) == PREFIX + wanted

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.instrument.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
-from app.instrument.offline import render_events
+from app.player.events import Bend, ControlChange, NoteOff, NoteOn, TimedEvent
+from app.player.offline import render_events
 from tests.app.export.plugin.host import Event, Library, brighten, midi, note_on, tune
-from tests.app.export.plugin.pieces import EQUAL_DB, MEMBERS, difference_db, patch_of, preset_of, to_host
+from tests.app.export.plugin.pieces import EQUAL_DB, MEMBERS, difference_db, instrument_of, preset_of, to_host
 
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
 
@@ -41,12 +41,12 @@ MEMBERS_PLAY: tuple[Timed, ...] = (
 
 def in_app(timed: Sequence[Timed], rate_hz: int) -> NDArray[np.float32]:
     events = [TimedEvent(time_s, event) for time_s, event in timed]
-    sound = render_events(patch_of(MEMBERS), preset_of(MEMBERS), events, rate_hz, "model", SECONDS)
+    sound = render_events(instrument_of(MEMBERS), preset_of(MEMBERS), events, rate_hz, "model", SECONDS)
     return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
 
 
 def in_host(bank: Library, events: Sequence[Event], rate_hz: int) -> NDArray[np.float32]:
-    instance = bank.create_named(patch_of(MEMBERS).name)
+    instance = bank.create_named(instrument_of(MEMBERS).name)
     instance.activate(rate_hz)
     latency = instance.latency
     return instance.render(round(SECONDS * rate_hz) + latency, events)[latency:]

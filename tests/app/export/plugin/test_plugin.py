@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
-from app.instrument.events import ControlChange, NoteOn, PatchTurned, TimedEvent
-from app.instrument.offline import render_events
-from app.instrument.strings import Strings
-from app.patches.drums import Drums
-from app.patches.patch import Patch, Technique
-from app.shared.parameters import OF_PATCHES
+from app.instruments.drums import Drums
+from app.instruments.instrument import Instrument, Technique
+from app.player.events import ControlChange, InstrumentTurned, NoteOn, TimedEvent
+from app.player.offline import render_events
+from app.player.strings import Strings
+from app.shared.parameters import OF_INSTRUMENTS
 from engine.kernels.midi import HARMONICS, STRUM, TREMOLO
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import (
@@ -47,7 +47,7 @@ from tests.app.export.plugin.pieces import (
     NAMES,
     TURNED,
     difference_db,
-    patch_of,
+    instrument_of,
     piece,
     played,
     preset_of,
@@ -67,13 +67,13 @@ def frame_of(time_s: float) -> int:
 
 
 def instance_of(bank: Library, name: str, rate_hz: int = RATE_HZ) -> Instance:
-    instance = bank.create_named(patch_of(name).name)
+    instance = bank.create_named(instrument_of(name).name)
     instance.activate(rate_hz)
     return instance
 
 
 def of_name(images: list[Image], name: str) -> Image:
-    return next(each for each in images if each.name == patch_of(name).name)
+    return next(each for each in images if each.name == instrument_of(name).name)
 
 
 def moves(images: list[Image], instance: Instance, name: str, values: Values, time_s: float = 0.0) -> list[Event]:
@@ -98,27 +98,27 @@ def check_alike(sound: Sound, wanted: Sound, plain: Sound | None = None) -> None
     assert plain is None or difference_db(sound, plain) > -60
 
 
-Turned = Callable[[Patch, Image, np.random.Generator], Values]
+Turned = Callable[[Instrument, Image, np.random.Generator], Values]
 
 
-def macros_anywhere(patch: Patch, _image: Image, draw: np.random.Generator) -> Values:
-    return {f"macros.{number}": float(place) for number, place in enumerate(draw.random(len(patch.macros)))}
+def macros_anywhere(instrument: Instrument, _image: Image, draw: np.random.Generator) -> Values:
+    return {f"macros.{number}": float(place) for number, place in enumerate(draw.random(len(instrument.macros)))}
 
 
-def parameters_anywhere(patch: Patch, image: Image, draw: np.random.Generator) -> Values:
+def parameters_anywhere(instrument: Instrument, image: Image, draw: np.random.Generator) -> Values:
     """Values of one to nine parameters, each up to 0.4 of its range away, with which the piece can be played."""
-    known = {each.id for each in image.parameters} & {*OF_PATCHES}
+    known = {each.id for each in image.parameters} & {*OF_INSTRUMENTS}
     while True:
         count = min(int(draw.choice([1, 2, 4, 9])), len(known))
         chosen, found = draw.choice(sorted(known), count, replace=False), Values()
         for id in map(str, chosen):
-            share = OF_PATCHES[id].share(patch.value(id))
-            found[id] = OF_PATCHES[id].value(share + draw.uniform(-0.4, 0.4))
+            share = OF_INSTRUMENTS[id].share(instrument.value(id))
+            found[id] = OF_INSTRUMENTS[id].value(share + draw.uniform(-0.4, 0.4))
         if not 0.02 < found.get("pickup.points.0", 0.5) < 0.98:  # at its ends a string is silent
             continue
         with suppress(ValueError):
-            changed = patch.with_values(found)
-            keys = [Strings(changed).of_key(event.key) for _, event in piece(patch) if isinstance(event, NoteOn)]
+            changed = instrument.with_values(found)
+            keys = [Strings(changed).of_key(event.key) for _, event in piece(instrument) if isinstance(event, NoteOn)]
             if all(key is not None and key.modes > 1 for key in keys):
                 return found
 
@@ -150,20 +150,24 @@ def test_it_sounds_as_the_app_renders(
     request: pytest.FixtureRequest,
 ) -> None:
     """At any rate, with parameters and macros anywhere, of the model and of the truth."""
-    patch, image = patch_of(name), of_name(images, name)
+    instrument, image = instrument_of(name), of_name(images, name)
     draw = np.random.default_rng(zlib.crc32(request.node.name.encode()))
-    values = turned(patch, image, draw) if callable(turned) else turned
+    values = turned(instrument, image, draw) if callable(turned) else turned
     print(values)
-    wanted = patch.with_values({id: value for id, value in values.items() if id in OF_PATCHES})
-    for number in range(len(patch.macros)):
+    wanted = instrument.with_values({id: value for id, value in values.items() if id in OF_INSTRUMENTS})
+    for number in range(len(instrument.macros)):
         wanted = wanted.turned(number, values[f"macros.{number}"]) if turned is macros_anywhere else wanted
-    sound = played(with_values(bank, images, name, values, rate_hz), patch, rate_hz)
+    sound = played(with_values(bank, images, name, values, rate_hz), instrument, rate_hz)
     check_alike(sound, rendered(wanted, rate_hz, "truth" if values == {"source": 1.0} else "model"))
-    assert turned is not macros_anywhere or difference_db(sound, rendered(patch, rate_hz)) > -60  # they are heard
+    assert (
+        turned is not macros_anywhere or difference_db(sound, rendered(instrument, rate_hz)) > -60
+    )  # they are heard
 
 
 def test_the_difference_of_model_and_truth_is_nearly_silent(bank: Library, images: list[Image]) -> None:
-    sound = played(with_values(bank, images, "electric_bass", {"source": 2.0}), patch_of("electric_bass"), RATE_HZ)
+    sound = played(
+        with_values(bank, images, "electric_bass", {"source": 2.0}), instrument_of("electric_bass"), RATE_HZ
+    )
     assert float(np.abs(sound).max()) < 1e-3
 
 
@@ -180,21 +184,23 @@ def test_it_follows_parameters_while_it_plays(
     bank: Library, images: list[Image], name: str, steps: tuple, settled_s: float
 ) -> None:
     """Blows and plucks follow at once; drums that ring are heard at other places."""
-    patch = turned = patch_of(name)
+    instrument = turned = instrument_of(name)
     instance, more, events = instance_of(bank, name), list[TimedEvent](), list[Event]()
     instance.go_offline()
     for time_s, *change in steps:
         if len(change) == 1:
             turned, values = turned.with_values(change[0]), change[0]
         else:  # a macro of those that do not move the room
-            dry = [n for n, macro in enumerate(patch.macros) if all(t.field != "room.mix" for t in macro.targets)]
+            dry = [
+                n for n, macro in enumerate(instrument.macros) if all(t.field != "room.mix" for t in macro.targets)
+            ]
             number, place = dry[change[0]], change[1]
             turned, values = turned.turned(number, place), {f"macros.{number}": place}
-        more.append(TimedEvent(time_s, PatchTurned(turned)))
+        more.append(TimedEvent(time_s, InstrumentTurned(turned)))
         events += moves(images, instance, name, values, time_s)
-    sound, after = played(instance, patch, RATE_HZ, more=tuple(events)), slice(frame_of(settled_s), None)
-    check_alike(sound[after], rendered(patch, RATE_HZ, more=tuple(more))[after])
-    assert difference_db(sound, rendered(patch, RATE_HZ)) > -60
+    sound, after = played(instance, instrument, RATE_HZ, more=tuple(events)), slice(frame_of(settled_s), None)
+    check_alike(sound[after], rendered(instrument, RATE_HZ, more=tuple(more))[after])
+    assert difference_db(sound, rendered(instrument, RATE_HZ)) > -60
 
 
 def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library, images: list[Image]) -> None:
@@ -205,7 +211,7 @@ def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library, images: li
             each for step in range(40)
             for each in moves(images, instance, MOVED, {"body.size": 0.6 + 0.05 * step}, 0.01 * step)
         ]  # fmt: skip
-        return played(instance, patch_of(MOVED), RATE_HZ, more=tuple(sweep))
+        return played(instance, instrument_of(MOVED), RATE_HZ, more=tuple(sweep))
 
     assert np.array_equal(bounced(), bounced())
 
@@ -221,21 +227,24 @@ def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library, images: li
 def test_controllers_are_followed_as_in_the_app(
     bank: Library, name: str, time_s: float, sent: dict[int, int]
 ) -> None:
-    patch, controls = patch_of(name), [ControlChange(number, value) for number, value in sent.items()]
+    instrument, controls = instrument_of(name), [ControlChange(number, value) for number, value in sent.items()]
     sound = played(
-        instance_of(bank, name), patch, RATE_HZ, before=tuple(to_host(each, frame_of(time_s)) for each in controls)
+        instance_of(bank, name),
+        instrument,
+        RATE_HZ,
+        before=tuple(to_host(each, frame_of(time_s)) for each in controls),
     )
-    wanted = rendered(patch, RATE_HZ, before=tuple(TimedEvent(time_s, each) for each in controls))
+    wanted = rendered(instrument, RATE_HZ, before=tuple(TimedEvent(time_s, each) for each in controls))
     after = slice(frame_of(0.7) if time_s else 0, None)
     check_alike(sound[after], wanted[after])
-    assert difference_db(sound, rendered(patch, RATE_HZ)) > -60
+    assert difference_db(sound, rendered(instrument, RATE_HZ)) > -60
 
 
 def test_techniques_are_as_in_the_app_and_their_values_are_words(bank: Library) -> None:
-    patch = patch_of(MOVED)
+    instrument = instrument_of(MOVED)
     values = {"harmonic": 3.0, "strum": 12.0, "strokes of strums": 1.0, "tremolo": 9.0}
     fields = ("harmonic", "strum_ms", "strokes", "tremolo_hz")
-    turned = patch.model_copy(update={"technique": Technique(**dict(zip(fields, values.values(), strict=True)))})
+    turned = instrument.model_copy(update={"technique": Technique(**dict(zip(fields, values.values(), strict=True)))})
     instance = instance_of(bank, MOVED)
     ids = {name: instance.parameters[name].id for name in values}
     instance.block(64, [param(0, ids[name], value) for name, value in values.items()])
@@ -249,13 +258,13 @@ def test_techniques_are_as_in_the_app_and_their_values_are_words(bank: Library) 
     assert other.load(instance.save())
     other.deactivate()
     other.activate(RATE_HZ)
-    check_alike(played(other, patch, RATE_HZ), rendered(turned, RATE_HZ), rendered(patch, RATE_HZ))
+    check_alike(played(other, instrument, RATE_HZ), rendered(turned, RATE_HZ), rendered(instrument, RATE_HZ))
 
 
 @pytest.fixture(scope="module")
-def others(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Patch, Library]:
+def others(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Instrument, Library]:
     """A shell, a kettle, a rectangle in air, of many modes, and a modulus that becomes impossible."""
-    timpani = patch_of("timpani")
+    timpani = instrument_of("timpani")
     assert isinstance(timpani.strings, Drums)
     one = timpani.strings.drums[0]
     changed: list[dict[str, object]] = [
@@ -269,14 +278,14 @@ def others(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
         for place, each in enumerate(changed)
     )
     strings = timpani.strings.model_copy(update={"drums": drums, "keys": "pads"})
-    patch = timpani.model_copy(update={"name": "Others", "strings": strings, "range": (50, 53)})
-    image, place = image_of(patch, preset_of("timpani")), tmp_path_factory.mktemp("others") / "others"
-    return patch, Library(build_plugin([image], "clap", this_target(), place, objects))
+    instrument = timpani.model_copy(update={"name": "Others", "strings": strings, "range": (50, 53)})
+    image, place = image_of(instrument, preset_of("timpani")), tmp_path_factory.mktemp("others") / "others"
+    return instrument, Library(build_plugin([image], "clap", this_target(), place, objects))
 
 
 @pytest.mark.parametrize("factor", (0.05, 1.0, 20.0))
-def test_other_drums_are_computed_as_in_the_app(others: tuple[Patch, Library], factor: float) -> None:
-    patch, library = others
+def test_other_drums_are_computed_as_in_the_app(others: tuple[Instrument, Library], factor: float) -> None:
+    instrument, library = others
     instance = library.create_named("Others")
     instance.activate(RATE_HZ)
     instance.block(64, [param(0, instance.parameters["modulus"].id, factor)])
@@ -287,28 +296,28 @@ def test_other_drums_are_computed_as_in_the_app(others: tuple[Patch, Library], f
     sound = instance.render(24_000 + instance.latency, events)[instance.latency :]
     library.destroy_instances()
     possible = struck[:3] if factor > 1 else struck  # beyond the bounds of a modulus a key is silent
-    timed, moved = [TimedEvent(*each) for each in possible], patch.with_value("knobs.modulus", factor)
+    timed, moved = [TimedEvent(*each) for each in possible], instrument.with_value("knobs.modulus", factor)
     check_alike(sound, np.concatenate(list(render_events(moved, preset_of("timpani"), timed, RATE_HZ, "model", 0.5))))
 
 
 def test_blocks_of_any_size_and_neighbours_change_nothing(bank: Library) -> None:
-    patch, neighbour = patch_of("cimbalom"), instance_of(bank, "concert_harp")
-    whole = played(instance_of(bank, "cimbalom"), patch, RATE_HZ)
-    events = [to_host(event, frame_of(time_s)) for time_s, event in piece(patch)]
+    instrument, neighbour = instrument_of("cimbalom"), instance_of(bank, "concert_harp")
+    whole = played(instance_of(bank, "cimbalom"), instrument, RATE_HZ)
+    events = [to_host(event, frame_of(time_s)) for time_s, event in piece(instrument)]
     instance = instance_of(bank, "cimbalom")
     sound = instance.render(4_800, events, 1)[instance.latency :]  # the first tenth: a block is a call from Python
     assert np.array_equal(sound, whole[: len(sound)])
     for block in (17, 4096):
         neighbour.block(480, [note_on(neighbour.frame, 60, 100)])
-        assert np.array_equal(played(instance_of(bank, "cimbalom"), patch, RATE_HZ, block), whole)
+        assert np.array_equal(played(instance_of(bank, "cimbalom"), instrument, RATE_HZ, block), whole)
 
 
 # State and presets
 
 
 def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> None:
-    patch, instance = patch_of(MOVED), instance_of(bank, MOVED)
-    macro = patch.macros[0]
+    instrument, instance = instrument_of(MOVED), instance_of(bank, MOVED)
+    macro = instrument.macros[0]
     control = instance.parameters[macro.name]
     assert (control.low, control.high, control.standard) == (0.0, 1.0, macro.value)
     before = {name: instance.value(each.id) for name, each in instance.parameters.items()}
@@ -316,16 +325,16 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     moved = {name for name, each in instance.parameters.items() if instance.value(each.id) != before[name]}
     assert macro.name in moved and len(moved) > 1
     assert instance.callbacks == 1  # the host must read the other parameters again
-    state, sound = instance.save(), played(instance, patch, RATE_HZ)
+    state, sound = instance.save(), played(instance, instrument, RATE_HZ)
     for running in (False, True):
-        other = bank.create_named(patch.name)
+        other = bank.create_named(instrument.name)
         if running:
             other.activate(RATE_HZ)
         assert other.load(state)
         if not running:
             other.activate(RATE_HZ)
         assert other.save() == state
-        again = played(other, patch, RATE_HZ)
+        again = played(other, instrument, RATE_HZ)
         assert difference_db(again, sound) < -80  # a knob glides to where it was set; the state is there at once
 
 
@@ -336,10 +345,10 @@ def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank: Lib
     assert browser.locations == [(1, "Instruments", IN_PLUGIN, None)]  # of the factory
     assert {preset.key: preset.name for preset in found} == bank.plugins
     for preset, name in zip(found, NAMES, strict=True):
-        patch = patch_of(name)
-        features = ["instrument", "drum" if name in DRUMS else "synthesizer", "stereo", patch.category]
-        owner, text = [("clap", preset.key)], patch.description.encode()[:511].decode(errors="ignore")
-        assert preset == Preset(patch.name, preset.key, owner, 1, ["Learned Strings"], text, features)
+        instrument = instrument_of(name)
+        features = ["instrument", "drum" if name in DRUMS else "synthesizer", "stereo", instrument.category]
+        owner, text = [("clap", preset.key)], instrument.description.encode()[:511].decode(errors="ignore")
+        assert preset == Preset(instrument.name, preset.key, owner, 1, ["Learned Strings"], text, features)
     assert len(browser.read(most=2)[1]) == 3  # where the host has enough, the plug-in stops
     assert browser.read(bare=True) == (True, [Preset(preset.name, preset.key) for preset in found])
     assert browser.read(kind=IN_FILE) == (False, [])
@@ -351,9 +360,9 @@ def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank: Lib
 
 @pytest.mark.parametrize("name", (MOVED, "timpani"))
 def test_a_preset_brings_back_the_instrument_as_it_was(bank: Library, name: str) -> None:
-    patch, fresh = patch_of(name), instance_of(bank, name)
-    state, sound = fresh.save(), played(fresh, patch, RATE_HZ)
-    (key,) = (preset.key for preset in Browser(bank).read()[1] if preset.name == patch.name)
+    instrument, fresh = instrument_of(name), instance_of(bank, name)
+    state, sound = fresh.save(), played(fresh, instrument, RATE_HZ)
+    (key,) = (preset.key for preset in Browser(bank).read()[1] if preset.name == instrument.name)
     all_at_the_top = [param(0, each.id, each.high) for each in fresh.described]
     for playing in (False, True):
         instance = instance_of(bank, name)
@@ -367,17 +376,17 @@ def test_a_preset_brings_back_the_instrument_as_it_was(bank: Library, name: str)
         assert instance.loaded == [(IN_PLUGIN, None, key.encode())]
         if playing:  # knobs glide, the room follows
             instance.render(96_000, [])
-            assert difference_db(played(instance, patch, RATE_HZ), sound) < -80
+            assert difference_db(played(instance, instrument, RATE_HZ), sound) < -80
         else:
             instance.activate(RATE_HZ)
-            assert np.array_equal(played(instance, patch, RATE_HZ), sound)
+            assert np.array_equal(played(instance, instrument, RATE_HZ), sound)
 
 
 def test_the_preset_of_another_instrument_is_refused(bank: Library) -> None:
     instance, other = instance_of(bank, MOVED), instance_of(bank, "timpani")
     by_name = {shown: id for id, shown in bank.plugins.items()}
-    own, foreign = by_name[patch_of(MOVED).name], by_name[patch_of("timpani").name]
-    instance.block(512, [param(0, instance.parameters[patch_of(MOVED).macros[0].name].id, 1.0)])
+    own, foreign = by_name[instrument_of(MOVED).name], by_name[instrument_of("timpani").name]
+    instance.block(512, [param(0, instance.parameters[instrument_of(MOVED).macros[0].name].id, 1.0)])
     state = instance.save()
     for key, kind in ((foreign, IN_PLUGIN), (None, IN_PLUGIN), ("", IN_PLUGIN), (own, IN_FILE)):
         assert not instance.load_preset(key, kind)
@@ -395,7 +404,7 @@ def test_latency_tail_and_ends_of_notes_are_reported(bank: Library) -> None:
     harp = instance_of(bank, "concert_harp", 96_000)
     assert harp.latency == 96
     tail = harp.extension("clap.tail", host.Frames).get(harp.at)
-    assert tail / 96_000 > patch_of("concert_harp").room.t60_s
+    assert tail / 96_000 > instrument_of("concert_harp").room.t60_s
     instance = instance_of(bank, "electric_bass")
     instance.block(4_096, [note_on(0, 40, 100, note_id=7)])
     instance.block(512, [note_off(4_096, 40)])
@@ -457,8 +466,8 @@ def test_tuning_one_note_leaves_the_others(bank: Library) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
-    patch = patch_of(name)
-    low = max(patch.range[0], min(52, patch.range[1] - 20))
+    instrument = instrument_of(name)
+    low = max(instrument.range[0], min(52, instrument.range[1] - 20))
     instance, fresh = instance_of(bank, name), instance_of(bank, name)
     pedals = [midi(0, 0xE0, 0, 100), midi(0, 0xB0, 1, 90), midi(0, 0xB0, 64, 127), midi(0, 0xB1, 101, 0)]
     events = [*pedals, *(note_on(10 + 900 * each, low + 2 * each, 90 + 4 * each) for each in range(9))]
@@ -466,7 +475,7 @@ def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
     instance.reset()
     silence = instance.render(24_000, [])
     assert np.array_equal(silence, fresh.render(24_000, []))
-    assert not silence.any() or (patch.amp.drive_db > 0 and np.abs(silence).max() < 1e-15)  # as when new
+    assert not silence.any() or (instrument.amp.drive_db > 0 and np.abs(silence).max() < 1e-15)  # as when new
     instance.render(9_000, events)
     names = {"volume", "decay", "modulus", "pluck position", "release", "body mix", "room", "amplifier drive"}
     for moved in (each for shown, each in instance.parameters.items() if shown in names):
@@ -477,9 +486,9 @@ def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
     fresh.activate(RATE_HZ)
     instance.reset()
     assert instance.save() == state
-    wanted = played(fresh, patch, RATE_HZ)
+    wanted = played(fresh, instrument, RATE_HZ)
     assert np.abs(wanted).max() > 1e-3
-    assert np.array_equal(played(instance, patch, RATE_HZ), wanted)
+    assert np.array_equal(played(instance, instrument, RATE_HZ), wanted)
 
 
 def test_the_last_of_many_values_counts_also_just_before_a_reset(bank: Library) -> None:

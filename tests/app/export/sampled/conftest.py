@@ -1,4 +1,4 @@
-"""A patch that is rendered without a model, decaying sines at the patch's own levels, and players of samples."""
+"""An instrument that is rendered without a model, decaying sines at the instrument's own levels, and players of samples."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from app.instrument.events import ControlChange, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes
-from app.patches.patch import Fretted, Patch
+from app.instruments.instrument import Fretted, Instrument
+from app.player.events import ControlChange, NoteOff, NoteOn, TimedEvent
+from app.player.midi_file import midi_bytes
 from engine.values.string import StringParameters
 
 T60_S = 2.0
@@ -24,25 +24,25 @@ BLOCK = 64
 
 Sound = NDArray[np.floating]
 Render = Callable[..., NDArray[np.float32]]
-PatchOf = Callable[..., Patch]
+InstrumentOf = Callable[..., Instrument]
 Events = Sequence[tuple[float, int, int]]  # time in s, key, velocity; 0 releases
 Play = Callable[[Path, Events, float], Sound]
 
 
 @pytest.fixture
-def patch_of() -> PatchOf:
-    """A patch of keys 45 … 64; fields as given."""
+def instrument_of() -> InstrumentOf:
+    """An instrument of keys 45 … 64; fields as given."""
 
-    def made(**fields: object) -> Patch:
+    def made(**fields: object) -> Instrument:
         defaults = {"name": "Any string", "category": "guitar", "range": (45, 64)}
-        return Patch.model_validate({**defaults, "strings": Fretted(string=StringParameters()), **fields})
+        return Instrument.model_validate({**defaults, "strings": Fretted(string=StringParameters()), **fields})
 
     return made
 
 
 @pytest.fixture
-def patch(patch_of: PatchOf) -> Patch:
-    return patch_of()
+def instrument(instrument_of: InstrumentOf) -> Instrument:
+    return instrument_of()
 
 
 @pytest.fixture
@@ -50,16 +50,16 @@ def render() -> Render:
     """A sine of the key's pitch, and the softer the wider the pluck; a right channel is 6 dB softer."""
 
     def rendered(
-        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, **_: object
+        instrument: Instrument, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, **_: object
     ) -> NDArray[np.float32]:
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         decay = 10 ** (-3 * time_s / T60_S)
         if held_s < seconds:
-            decay *= 10 ** (-3 * np.maximum(0, time_s - held_s) / patch.damping.release_t60_s)
-        pluck = patch.pluck.pluck(velocity)
-        level = pluck.amplitude_mm / 10 * 10 ** (patch.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
+            decay *= 10 ** (-3 * np.maximum(0, time_s - held_s) / instrument.damping.release_t60_s)
+        pluck = instrument.pluck.pluck(velocity)
+        level = pluck.amplitude_mm / 10 * 10 ** (instrument.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
         sound = level * decay * np.sin(2 * math.pi * hz_of(key) * time_s)
-        return np.stack([sound / 2**side for side in range(len(patch.pickup.points))], axis=1).astype(np.float32)
+        return np.stack([sound / 2**side for side in range(len(instrument.pickup.points))], axis=1).astype(np.float32)
 
     return rendered
 

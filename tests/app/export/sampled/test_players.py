@@ -12,16 +12,16 @@ from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import release_timecents
 from app.export.sampled.sfz import release_s
-from app.instrument.offline import render_note
-from app.patches.library import find_patch
-from app.patches.patch import BodyChoice, Patch
-from app.shared.parameters import OF_PATCHES
+from app.instruments.instrument import BodyChoice, Instrument
+from app.instruments.library import find_instrument
+from app.player.offline import render_note
+from app.shared.parameters import OF_INSTRUMENTS
 from engine.presets import find_preset, load_preset
 from engine.values.effects import Amp, Room
 from tests.app.export.sampled.conftest import (
     PLAYERS,
     RATE_HZ,
-    PatchOf,
+    InstrumentOf,
     Render,
     Sfizz,
     by_fluidsynth,
@@ -37,8 +37,8 @@ PARTS = {"sfz": slice(0, 5_760), "sf2": slice(2_400, 20_000)}  # of a sound that
 STEREO = {"points": (0.2, 0.4)}
 
 
-def small(kind: str, patch: Patch, **choices: object) -> SampledPlan:
-    return SampledPlan(patch, **{"keys": (58, 61), "layers": 3, "seconds": SECONDS[kind], **choices})
+def small(kind: str, instrument: Instrument, **choices: object) -> SampledPlan:
+    return SampledPlan(instrument, **{"keys": (58, 61), "layers": 3, "seconds": SECONDS[kind], **choices})
 
 
 @pytest.mark.parametrize(
@@ -50,15 +50,15 @@ def small(kind: str, patch: Patch, **choices: object) -> SampledPlan:
         ("sf2", {"pluck": {"curve": 0.2}}, 3.0),  # in a layer, dB over velocity are a straight line
     ],
 )
-def test_it_sounds_as_the_patch_in_pitch_and_level(
-    kind: str, fields: dict, spread_db: float, patch_of: PatchOf, render: Render, tmp_path: Path
+def test_it_sounds_as_the_instrument_in_pitch_and_level(
+    kind: str, fields: dict, spread_db: float, instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
-    patch, out, offsets = patch_of(**fields), tmp_path / f"a.{kind}", []
+    instrument, out, offsets = instrument_of(**fields), tmp_path / f"a.{kind}", []
     seconds, part = SECONDS[kind], PARTS[kind]
-    gain_db = export_sampled(small(kind, patch), out, render).gain_db
+    gain_db = export_sampled(small(kind, instrument), out, render).gain_db
     for key, velocity in [(58, 127), (58, 1), (59, 20), (60, 42), (60, 43), (61, 84), (61, 100)]:
         heard = PLAYERS[kind](out, [(0, key, velocity)], part.stop / RATE_HZ)
-        direct = render(patch, key, velocity, seconds, seconds, RATE_HZ)[part]
+        direct = render(instrument, key, velocity, seconds, seconds, RATE_HZ)[part]
         off = abs(cents(strongest_hz(direct[:, 0]), hz_of(key)))
         assert abs(cents(strongest_hz(heard[0, part]), hz_of(key))) < 0.1 + off
         for side, own in zip(heard, (direct[:, 0], direct[:, -1]), strict=True):
@@ -69,22 +69,22 @@ def test_it_sounds_as_the_patch_in_pitch_and_level(
         assert np.mean(offsets) - pan_db == pytest.approx(1.4, abs=0.3)
 
 
-@pytest.mark.parametrize(("patch_db", "gain_db"), [(-30.0, 0.0), (20.0, -21.0)])
-def test_a_loud_patch_is_lowered_as_a_whole(
-    patch_db: float, gain_db: float, patch_of: PatchOf, render: Render, tmp_path: Path
+@pytest.mark.parametrize(("instrument_db", "gain_db"), [(-30.0, 0.0), (20.0, -21.0)])
+def test_a_loud_instrument_is_lowered_as_a_whole(
+    instrument_db: float, gain_db: float, instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
     levels = []
-    for level in (0.0, patch_db):
-        patch = patch_of(level_db=level, pluck={"softest_mm": 1.0, "hardest_mm": 10.0})
-        report = export_sampled(small("sfz", patch), tmp_path / "a.sfz", render)
+    for level in (0.0, instrument_db):
+        instrument = instrument_of(level_db=level, pluck={"softest_mm": 1.0, "hardest_mm": 10.0})
+        report = export_sampled(small("sfz", instrument), tmp_path / "a.sfz", render)
         levels.append(level_db(PLAYERS["sfz"](tmp_path / "a.sfz", [(0, 60, 30)], 0.1)[0]) - report.gain_db)
     assert report.gain_db == pytest.approx(gain_db, abs=0.1)
-    assert levels[1] - levels[0] == pytest.approx(patch_db, abs=0.02)
+    assert levels[1] - levels[0] == pytest.approx(instrument_db, abs=0.02)
 
 
-def test_neighbours_of_a_sampled_key_are_transposed(patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_neighbours_of_a_sampled_key_are_transposed(instrument: Instrument, render: Render, tmp_path: Path) -> None:
     out = tmp_path / "a.sfz"
-    export_sampled(small("sfz", patch, every=3), out, render)
+    export_sampled(small("sfz", instrument, every=3), out, render)
     assert "// A sample for every 3 keys" in out.read_text("utf-8")
     for key in (58, 59, 60):
         heard = PLAYERS["sfz"](out, [(0, key, 100)], 0.15)[0]
@@ -93,25 +93,25 @@ def test_neighbours_of_a_sampled_key_are_transposed(patch: Patch, render: Render
 
 @KINDS
 def test_a_released_key_falls_by_60_db_in_the_damping_time(
-    kind: str, patch_of: PatchOf, render: Render, tmp_path: Path
+    kind: str, instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
     t60_s, released_s = {"sfz": (0.1, 0.04), "sf2": (0.4, 0.2)}[kind]
     out, step_s = tmp_path / f"a.{kind}", 0.5 * t60_s
-    export_sampled(small(kind, patch_of(damping={"release_t60_s": t60_s})), out, render)
+    export_sampled(small(kind, instrument_of(damping={"release_t60_s": t60_s})), out, render)
     heard = PLAYERS[kind](out, [(0, 60, 127), (released_s, 60, 0)], released_s + 0.03 + step_s)[0]
     before, after = (level_db(heard[round(at * RATE_HZ) :][:960]) for at in (released_s - 0.02, released_s + step_s))
     delay_s = 0.01  # from a block's end, and the first ms of a release
     assert before - after == pytest.approx(60 * (step_s / t60_s) + 30 * (step_s + 0.02), abs=60 * delay_s / t60_s)
-    assert release_timecents(patch_of(damping={"release_t60_s": 0.6})) == 0  # 100 dB in a second
-    longest = OF_PATCHES["damping.release_t60_s"].limits[1]
-    assert release_s(patch_of(damping={"release_t60_s": longest})) < 100  # within the format's range
+    assert release_timecents(instrument_of(damping={"release_t60_s": 0.6})) == 0  # 100 dB in a second
+    longest = OF_INSTRUMENTS["damping.release_t60_s"].limits[1]
+    assert release_s(instrument_of(damping={"release_t60_s": longest})) < 100  # within the format's range
 
 
 def test_strings_that_ring_on_end_where_they_are_plucked_again(
-    patch_of: PatchOf, render: Render, tmp_path: Path
+    instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
-    patch = patch_of(damping={"let_ring": True, "release_t60_s": 0.01})
-    export_sampled(small("sfz", patch), tmp_path / "a.sfz", render)
+    instrument = instrument_of(damping={"let_ring": True, "release_t60_s": 0.01})
+    export_sampled(small("sfz", instrument), tmp_path / "a.sfz", render)
     player = Sfizz(tmp_path / "a.sfz")
     for key in (60, 61):
         player.press(key, 127)
@@ -126,7 +126,7 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(
     assert player.voices() == 2
 
     out = tmp_path / "a.sf2"
-    export_sampled(small("sf2", patch_of(damping={"let_ring": True}), seconds=2.0), out, render)
+    export_sampled(small("sf2", instrument_of(damping={"let_ring": True}), seconds=2.0), out, render)
     heard = by_fluidsynth(out, [(0, 60, 127), (0.1, 60, 0), (0.8, 60, 1)], 1.6)[0]
     alone = by_fluidsynth(out, [(0.8, 60, 1)], 1.6)[0]
     level = {at: level_db(heard[round(at * RATE_HZ) :][:4_800]) for at in (0.05, 0.65, 1.45)}
@@ -134,9 +134,9 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(
     assert level[1.45] == pytest.approx(level_db(alone[round(1.45 * RATE_HZ) :][:4_800]), abs=1)
 
 
-def test_another_player_reads_a_soundfont(patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_another_player_reads_a_soundfont(instrument: Instrument, render: Render, tmp_path: Path) -> None:
     player = pytest.importorskip("tinysoundfont", reason="its wheels and those of PyAudio are not for every Python")
-    export_sampled(small("sf2", patch), tmp_path / "a.sf2", render)
+    export_sampled(small("sf2", instrument), tmp_path / "a.sf2", render)
     synth = player.Synth(gain=0, samplerate=RATE_HZ)
     synth.program_select(0, synth.sfload(str(tmp_path / "a.sf2")), 0, 0)
     for key in (58, 61):
@@ -149,11 +149,11 @@ def test_another_player_reads_a_soundfont(patch: Patch, render: Render, tmp_path
 
 @KINDS
 def test_a_shipped_instrument_sounds_as_the_note_itself(kind: str, tmp_path: Path) -> None:
-    harp = find_patch("Concert harp").patch.with_value("room.mix", 0.0)  # a string alone
+    harp = find_instrument("Concert harp").instrument.with_value("room.mix", 0.0)  # a string alone
     preset = load_preset(find_preset(harp.preset))
 
-    def note(patch: Patch, *words: float, **_: object) -> np.ndarray:
-        return render_note(patch, preset, *words)  # type: ignore[arg-type]
+    def note(instrument: Instrument, *words: float, **_: object) -> np.ndarray:
+        return render_note(instrument, preset, *words)  # type: ignore[arg-type]
 
     out, seconds = tmp_path / f"harp.{kind}", SECONDS[kind]
     plan = SampledPlan(harp, (52, 53), layers=3, seconds=seconds)
@@ -173,7 +173,9 @@ def test_a_shipped_instrument_sounds_as_the_note_itself(kind: str, tmp_path: Pat
 @pytest.mark.parametrize(("key", "layers"), [(28, 2), (33, 4)])
 def test_a_note_starts_within_the_reported_error(key: int, layers: int, tmp_path: Path) -> None:
     """Rendered at the hardest velocity of its layer, a note would start about twice as far off."""
-    bass = find_patch("Electric bass").patch.model_copy(update={"amp": Amp(), "body": BodyChoice(), "room": Room()})
+    bass = find_instrument("Electric bass").instrument.model_copy(
+        update={"amp": Amp(), "body": BodyChoice(), "room": Room()}
+    )
     render, part = note_renderer(load_preset(find_preset(bass.preset)), "model"), slice(480, 12_000)
     plan = SampledPlan(bass, (key, key), layers=layers, seconds=0.5)
     export_sampled(plan, tmp_path / "a.sf2", render)

@@ -17,16 +17,16 @@ import soundfile
 from app.export.sampled.job import export_sampled, plain_stem, planned, sample_folder
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND
-from app.patches.patch import Patch
-from tests.app.export.sampled.conftest import RATE_HZ, PatchOf, Render
+from app.instruments.instrument import Instrument
+from tests.app.export.sampled.conftest import RATE_HZ, InstrumentOf, Render
 
 ROWS = {"phdr": 38, "pbag": 4, "pmod": 10, "pgen": 4, "inst": 22, "ibag": 4, "imod": 10, "igen": 4, "shdr": 46}
 KEY_RANGE, VEL_RANGE, SAMPLE_ID = 43, 44, 53
 STEREO = {"points": (0.2, 0.4)}
 
 
-def small(patch: Patch, **choices: object) -> SampledPlan:
-    return SampledPlan(patch, **{"keys": (58, 61), "layers": 3, "seconds": 0.17, **choices})
+def small(instrument: Instrument, **choices: object) -> SampledPlan:
+    return SampledPlan(instrument, **{"keys": (58, 61), "layers": 3, "seconds": 0.17, **choices})
 
 
 def lint(path: Path) -> str:
@@ -50,9 +50,9 @@ def opcodes(text: str, name: str) -> list[str]:
     ],
 )
 def test_sfzlint_accepts_it_and_every_sample_is_there(
-    fields: dict, choices: dict, patch_of: PatchOf, render: Render, tmp_path: Path
+    fields: dict, choices: dict, instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
-    out, plan = tmp_path / "An instrument (2).sfz", small(patch_of(**fields), **choices)
+    out, plan = tmp_path / "An instrument (2).sfz", small(instrument_of(**fields), **choices)
     export_sampled(plan, out, render)
     assert lint(out) == ""
     text = out.read_text("utf-8")
@@ -61,9 +61,9 @@ def test_sfzlint_accepts_it_and_every_sample_is_there(
     assert len(names) == len(set(names)) == len(plan.zones)
     for name in names:
         with soundfile.SoundFile(out.parent / folder / name) as file:
-            assert file.channels == len(plan.patch.pickup.points)
+            assert file.channels == len(plan.instrument.pickup.points)
     assert max(map(float, opcodes(text, "volume"))) <= 0
-    if plan.patch.damping.let_ring:  # a fault would be reported
+    if plan.instrument.damping.let_ring:  # a fault would be reported
         out.write_text(text.replace("note_selfmask=off", "note_selfmask=perhaps"))
         assert "note_selfmask" in lint(out)
 
@@ -83,12 +83,12 @@ HOSTILE = (
 )
 
 
-def test_no_name_becomes_a_path_or_an_opcode(patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_no_name_becomes_a_path_or_an_opcode(instrument: Instrument, render: Render, tmp_path: Path) -> None:
     for place, name in enumerate(HOSTILE):
         folder = tmp_path / str(place)
         folder.mkdir()
         assert re.fullmatch(r"[A-Za-z0-9+][A-Za-z0-9_.+-]{0,59}", plain_stem(name))
-        hostile = patch.model_copy(update={"name": name, "description": f"{name}\n#include"})
+        hostile = instrument.model_copy(update={"name": name, "description": f"{name}\n#include"})
         plan = small(hostile, keys=(60, 60), layers=1)
         fits = name.isprintable() and re.fullmatch(r"[^/\\:<>]{1,50}", name)
         out = folder / (f"{name}.sfz" if fits else "a.sfz")
@@ -142,9 +142,9 @@ class SoundFont:
 
 @pytest.mark.parametrize("points", [(0.2,), (0.2, 0.4)])
 def test_the_tables_are_as_the_specification_has_them(
-    points: tuple[float, ...], patch_of: PatchOf, render: Render, tmp_path: Path
+    points: tuple[float, ...], instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
-    plan = small(patch_of(pickup={"points": points}, name="Häärp ñ 琴", description="Two lines."))
+    plan = small(instrument_of(pickup={"points": points}, name="Häärp ñ 琴", description="Two lines."))
     export_sampled(plan, tmp_path / "a.sf2", render)
     font = SoundFont(tmp_path / "a.sf2")
     assert font.info["ifil"] == struct.pack("<HH", 2, 1)
@@ -175,14 +175,16 @@ def test_the_tables_are_as_the_specification_has_them(
     assert (0x0502, 48, 0, 0, 0) in sources  # the default of velocity, of no amount
 
 
-@pytest.mark.parametrize("patch_db", [-30.0, 20.0])
+@pytest.mark.parametrize("instrument_db", [-30.0, 20.0])
 def test_the_whole_of_a_soundfont_is_at_full_level_and_a_hostile_name_is_a_name(
-    patch_db: float, patch_of: PatchOf, render: Render, tmp_path: Path
+    instrument_db: float, instrument_of: InstrumentOf, render: Render, tmp_path: Path
 ) -> None:
     pluck, name = {"softest_mm": 1.0, "hardest_mm": 10.0}, "../\x00\n" + "é漢" * 5_000
-    patch = patch_of(level_db=patch_db, pluck=pluck).model_copy(update={"name": name, "description": name})
-    report = export_sampled(small(patch), tmp_path / "a.sf2", render)
-    assert report.gain_db == pytest.approx(-1 - patch_db, abs=0.5)  # the peak is estimated from quiet plucks
+    instrument = instrument_of(level_db=instrument_db, pluck=pluck).model_copy(
+        update={"name": name, "description": name}
+    )
+    report = export_sampled(small(instrument), tmp_path / "a.sf2", render)
+    assert report.gain_db == pytest.approx(-1 - instrument_db, abs=0.5)  # the peak is estimated from quiet plucks
     font = SoundFont(tmp_path / "a.sf2")
     assert 20 * np.log10(np.abs(font.frames.astype(int)).max() / 2**15) == pytest.approx(-1, abs=0.02)
     assert len(font.info["INAM"]) <= 256 and font.info["INAM"].isascii()
@@ -199,10 +201,10 @@ def test_the_whole_of_a_soundfont_is_at_full_level_and_a_hostile_name_is_a_name(
     ],
 )
 def test_plans_that_no_file_can_hold_are_reported_before(
-    name: str, choices: dict, reported: str, patch_of: PatchOf
+    name: str, choices: dict, reported: str, instrument_of: InstrumentOf
 ) -> None:
-    plan = small(patch_of(range=(0, 127)), **choices)
+    plan = small(instrument_of(range=(0, 127)), **choices)
     with pytest.raises(ValueError, match=reported):
         planned(plan, Path(name))
     assert planned(plan, Path("a.sfz")) == plan
-    assert planned(small(patch_of(range=(0, 127)), keys=(0, 127), layers=32), Path("a.sf2")).bits == "24"
+    assert planned(small(instrument_of(range=(0, 127)), keys=(0, 127), layers=32), Path("a.sf2")).bits == "24"

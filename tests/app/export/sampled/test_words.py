@@ -19,12 +19,12 @@ from app.export.sampled.words import instrument_bytes, needed_bytes
     [("sfz", "wav", "16"), ("sfz", "wav", "24"), ("sfz", "flac", "16"), ("sfz", "flac", "24"), ("sf2", "flac", "24")],
 )
 def test_no_instrument_is_larger_than_reported(
-    kind: str, form: str, bits: str, points: tuple[float, ...], patch_of: Callable, tmp_path: Path
+    kind: str, form: str, bits: str, points: tuple[float, ...], instrument_of: Callable, tmp_path: Path
 ) -> None:
-    patch = patch_of(pickup={"points": points})
-    plan = SampledPlan(patch, (50, 52), layers=2, seconds=0.4, format=form, bits=bits)
+    instrument = instrument_of(pickup={"points": points})
+    plan = SampledPlan(instrument, (50, 52), layers=2, seconds=0.4, format=form, bits=bits)
 
-    def noise(patch, key, velocity, held_s, seconds, rate_hz, *, advanced):
+    def noise(instrument, key, velocity, held_s, seconds, rate_hz, *, advanced):
         frames = round(seconds * rate_hz)
         return np.random.default_rng(key).uniform(-0.1, 0.1, (frames, len(points))).astype(np.float32)
 

@@ -19,10 +19,10 @@ from app.export.choices import ExportChoices
 from app.export.note import HeardNote
 from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
-from app.instrument.events import NoteOn
-from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
+from app.player.events import NoteOn
 from app.presets.library import Library, list_presets
 from app.rendering.note_sound import Struck
 from app.rendering.subject import path_of
@@ -35,7 +35,7 @@ from tests.app.places import places_in
 from tests.app.questions import answered
 
 Make = Callable[..., ExportDialog]
-GUITAR = read_patch(PATCHES / "classical_guitar.json")
+GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
 
     def note(heard: dict[str, object]) -> HeardNote | None:
         choices = Choices(single="small", position=0.4).changed(heard)
-        struck = Struck(choices.played, NoteOn(59, 100)) if isinstance(choices.played, Patch) else None
+        struck = Struck(choices.played, NoteOn(59, 100)) if isinstance(choices.played, Instrument) else None
         return heard_note(choices, library, struck)
 
     dialogs = []
@@ -231,7 +231,7 @@ def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplica
     sheet, font = qapp.styleSheet(), qapp.font()
     try:
         theme.apply_theme(qapp, "dark", 150)
-        dialog = made(None, {"played": read_patch(PATCHES / "concert_harp.json")})
+        dialog = made(None, {"played": read_instrument(INSTRUMENTS / "concert_harp.json")})
         texts = [dialog.note.what, dialog.note.through_words]
         for long in (False, True):  # as it opens, and as a text changes
             if long:

@@ -13,7 +13,7 @@ from app.export.choices import ExportChoices
 from app.export.plugin.formats import FORMATS, install_folder, this_target
 from app.export.plugin.identity import identifier
 from app.export.sampled.choices import SampledChoices
-from app.patches.library import find_patch
+from app.instruments.library import find_instrument
 from app.presets.library import list_presets
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PLUGIN_NAMES, PLUGIN_NOTE, SYSTEM_NAMES, HeardInstrument
@@ -52,12 +52,12 @@ def dialog(
 
     monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: name)
     monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
-    monkeypatch.setattr("app.export.plugin.image.image_of", lambda patch, preset: patch.name)
+    monkeypatch.setattr("app.export.plugin.image.image_of", lambda instrument, preset: instrument.name)
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
     made = ExportDialog((ExportChoices(), SampledChoices()), FilePlaces())
     qtbot.addWidget(made)
     preset = list_presets(preset_folder)[0][0]
-    made.show_subjects({"plugin": HeardInstrument(find_patch("Classical guitar").patch, preset)})
+    made.show_subjects({"plugin": HeardInstrument(find_instrument("Classical guitar").instrument, preset)})
     made.open_at("plugin")
     yield made
     gate.set()

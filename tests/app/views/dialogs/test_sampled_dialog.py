@@ -18,8 +18,8 @@ from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.words import pitch_words
-from app.patches.library import find_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import find_instrument
 from app.presets.library import PresetEntry, list_presets
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
@@ -38,26 +38,26 @@ class Notes:
         self.gate = threading.Event()  # never closed again: a note that looks late finds it open
         self.last = 10**6
 
-    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
+    def render_note(self, instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         assert len(self.rendered) < self.last or self.gate.wait(20)
         advanced(seconds)
-        self.rendered.append((patch, key, velocity, seconds, rate_hz, source))
+        self.rendered.append((instrument, key, velocity, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
-        return np.stack([sound] * len(patch.pickup.points), axis=1).astype(np.float32)
+        return np.stack([sound] * len(instrument.pickup.points), axis=1).astype(np.float32)
 
 
 @pytest.fixture
 def notes(monkeypatch: pytest.MonkeyPatch) -> Iterator[Notes]:
     made = Notes()
-    monkeypatch.setitem(sys.modules, "app.instrument.offline", SimpleNamespace(render_note=made.render_note))
+    monkeypatch.setitem(sys.modules, "app.player.offline", SimpleNamespace(render_note=made.render_note))
     yield made
     made.gate.set()
 
 
 @pytest.fixture
-def patch() -> Patch:
-    return find_patch("Classical guitar").patch
+def instrument() -> Instrument:
+    return find_instrument("Classical guitar").instrument
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def made(
-    qtbot: QtBot, patch: Patch, preset: PresetEntry, notes: Notes, folder: Path
+    qtbot: QtBot, instrument: Instrument, preset: PresetEntry, notes: Notes, folder: Path
 ) -> Iterator[Callable[..., ExportDialog]]:
     dialogs = []
 
@@ -83,7 +83,7 @@ def made(
         dialog = ExportDialog((ExportChoices(), remembered), places_in(folder))
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
-        show(dialog, patch, preset)
+        show(dialog, instrument, preset)
         dialog.open_at("sampler")
         return dialog
 
@@ -93,8 +93,8 @@ def made(
         dialog.accept()
 
 
-def show(dialog: ExportDialog, patch: Patch, preset: PresetEntry) -> None:
-    dialog.show_subjects({"sampler": HeardInstrument(patch, preset)})
+def show(dialog: ExportDialog, instrument: Instrument, preset: PresetEntry) -> None:
+    dialog.show_subjects({"sampler": HeardInstrument(instrument, preset)})
 
 
 def says(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
@@ -108,17 +108,17 @@ def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
 
 
 def test_an_sfz_is_written_as_it_was_reported(
-    qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot, made, folder: Path, notes: Notes, instrument: Instrument, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dialog = made(rate_hz=44_100, source="truth", form="wav", bits="16")
     assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.sampler.size_text.text()
-    assert dialog.sampler.what.text().startswith(patch.name)
+    assert dialog.sampler.what.text().startswith(instrument.name)
     run(qtbot, dialog, "Saved")
     out = folder / "Classical_guitar.sfz"
     assert f"Saved {out} (6 samples, " in dialog.state.text()
     assert "peak -1.0 dBFS" in dialog.state.text()
     assert "softer than the instrument, so that no note clips" in dialog.state.text()
-    zones = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones
+    zones = SampledPlan(instrument, SMALL["keys"], layers=SMALL["layers"]).zones
     assert [note[1:] for note in notes.rendered] == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
     samples = sorted((folder / "Classical_guitar_samples").glob("*.wav"))
     assert len(samples) == MADE
@@ -131,7 +131,7 @@ def test_an_sfz_is_written_as_it_was_reported(
 
 
 def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
-    qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch
+    qtbot: QtBot, made, folder: Path, notes: Notes, instrument: Instrument
 ) -> None:
     dialog = made()
     form = dialog.sampler
@@ -142,7 +142,7 @@ def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
     for box, value in ((form.highest, 60), (form["every"], 1), (form["layers"], 1), (form["seconds"], 10)):
         box.setValue(value)
     counted = "1 sample (1 key, 1 velocity layer)"
-    pitch = pitch_words(SampledPlan(patch, (60, 60), layers=1).pitch_error_cents)
+    pitch = pitch_words(SampledPlan(instrument, (60, 60), layers=1).pitch_error_cents)
     says(qtbot, dialog, f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}")
     form["form"].setCurrentIndex(form["form"].findData("sf2"))
     said = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
@@ -213,7 +213,7 @@ def edit(form, text: str) -> None:
     form.file.edit.textEdited.emit(text)
 
 
-def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
+def test_its_state_is_remembered(made, folder: Path, instrument: Instrument) -> None:
     dialog = made()
     form = dialog.sampler
     for box, data in (
@@ -231,16 +231,16 @@ def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
     )
     assert made(**choices.model_dump()).choices()[1] == choices
     whole = made(keys=None)
-    assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == patch.range
+    assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == instrument.range
     assert whole.choices()[1].keys is None
-    assert made(keys=(0, 127)).choices()[1].keys is None  # not of this patch
+    assert made(keys=(0, 127)).choices()[1].keys is None  # not of this instrument
 
 
-def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
-    made, folder: Path, patch: Patch, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
+def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
+    made, folder: Path, instrument: Instrument, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dialog = made()
-    other = find_patch("Concert harp").patch
+    other = find_instrument("Concert harp").instrument
     show(dialog, other, preset)
     assert dialog.sampler.file.path == folder / "Concert_harp.sfz"
     assert dialog.sampler.what.text().startswith("Concert harp")
@@ -250,21 +250,21 @@ def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
     assert dialog.sampler.file.path == folder / "mine.sfz"
     dialog.sampler["form"].setCurrentIndex(2)
     assert dialog.sampler.file.path == folder / "mine.sf2"
-    show(dialog, patch, preset)
+    show(dialog, instrument, preset)
     assert dialog.sampler.file.path == folder / "mine.sf2"
 
 
-def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
-    qtbot: QtBot, made, notes: Notes, patch: Patch, preset: PresetEntry
+def test_a_instrument_that_is_turned_meanwhile_waits_for_the_next_time(
+    qtbot: QtBot, made, notes: Notes, instrument: Instrument, preset: PresetEntry
 ) -> None:
     notes.last = 1
     dialog = made()
     dialog.save.click()
     qtbot.waitUntil(lambda: len(notes.rendered) == 1)
-    show(dialog, patch.with_value("knobs.decay", 3.0), preset)
+    show(dialog, instrument.with_value("knobs.decay", 3.0), preset)
     notes.gate.set()
     qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
-    assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
+    assert {note[0].knobs.decay for note in notes.rendered} == {instrument.knobs.decay}
     dialog.save.click()
     qtbot.waitUntil(lambda: notes.rendered[-1][0].knobs.decay == 3.0)
     qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())

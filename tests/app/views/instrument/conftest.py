@@ -8,16 +8,16 @@ import pytest
 from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QWidget
 
-from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Patch
+from app.instruments.instrument import Instrument
+from app.instruments.library import SHIPPED, read_instrument
 
 Notes = list[tuple[str, int]]
 
 
 @pytest.fixture(scope="session")
-def guitar() -> Patch:
+def guitar() -> Instrument:
     """Six strings, stereo, five macros, a body."""
-    return read_patch(SHIPPED / "classical_guitar.json")
+    return read_instrument(SHIPPED / "classical_guitar.json")
 
 
 @pytest.fixture

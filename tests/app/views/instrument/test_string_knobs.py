@@ -1,4 +1,4 @@
-"""The string's knobs show a patch and ask for changes of its fields."""
+"""The string's knobs show an instrument and ask for changes of its fields."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Patch, Pickup
-from app.patches.tuning import TuningChoice
+from app.instruments.instrument import Instrument, Pickup
+from app.instruments.library import SHIPPED, read_instrument
+from app.instruments.tuning import TuningChoice
 from app.views import theme
 from app.views.controls.sideways import Sideways
 from app.views.instrument.string_knobs import StringKnobs
@@ -20,18 +20,20 @@ Key = Qt.Key
 
 
 @pytest.fixture
-def knobs(qtbot: QtBot, guitar: Patch) -> StringKnobs:
+def knobs(qtbot: QtBot, guitar: Instrument) -> StringKnobs:
     made = StringKnobs()
     qtbot.addWidget(made)
     made.resize(1200, 110)
     made.show()
-    made.show_patch(guitar)
+    made.show_instrument(guitar)
     return made
 
 
-def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(knobs: StringKnobs, guitar: Patch) -> None:
+def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(
+    knobs: StringKnobs, guitar: Instrument
+) -> None:
     stereo = guitar.model_copy(update={"pickup": Pickup(points=(0.1, 0.6))})
-    knobs.show_patch(stereo)
+    knobs.show_instrument(stereo)
     metrics = QFontMetrics(theme.small_font(9, grows=False))
     for field, knob in knobs.knobs.items():
         assert metrics.horizontalAdvance(knob.accessibleName().upper()) <= knob.sizeHint().width(), field
@@ -44,14 +46,14 @@ def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(knobs
     assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
 
 
-def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
+def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs, guitar: Instrument) -> None:
     asked = reported(knobs.changed)
     press_keys(knobs.knobs["knobs.gauge"], Key.Key_Up)
     knobs.knobs["tuning.transpose"].value_asked.emit(2.6)  # by whole keys
     press_keys(knobs.knobs["tuning.transpose"], Key.Key_Down, held=SHIFT)
     knobs.shape.activated.emit(knobs.shape.findText("Triangle"))
     qtbot.mouseClick(knobs.knobs["knobs.decay"], LEFT)
-    knobs.show_patch(guitar.with_value("pluck.position", 0.4), guitar)
+    knobs.show_instrument(guitar.with_value("pluck.position", 0.4), guitar)
     qtbot.mouseDClick(knobs.knobs["pluck.position"], LEFT)  # back to what was saved
     assert asked == [
         ("knobs.gauge", pytest.approx(1.03 * guitar.knobs.gauge)),
@@ -65,7 +67,9 @@ def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs
     assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Rounded"]
 
 
-def test_what_a_patch_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs: StringKnobs, guitar: Patch) -> None:
+def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
+    knobs: StringKnobs, guitar: Instrument
+) -> None:
     keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
     changes = {
         "pluck": guitar.pluck.model_copy(update={"shape": "triangular"}),
@@ -78,12 +82,12 @@ def test_what_a_patch_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs:
         "damping.release_t60_s": "ring",
         "tuning.a4_hz": "reference pitch of its own",
     }
-    for patch, barred in ((guitar.model_copy(update=changes), set(why)), (guitar, set())):
-        knobs.show_patch(patch)
+    for instrument, barred in ((guitar.model_copy(update=changes), set(why)), (guitar, set())):
+        knobs.show_instrument(instrument)
         assert {field for field, knob in knobs.knobs.items() if not knob.isEnabled()} == barred
         for field, words in why.items():
             assert (words in knobs.knobs[field].toolTip()) == (field in barred)
-    knobs.show_patch(read_patch(SHIPPED / "timpani.json"))
+    knobs.show_instrument(read_instrument(SHIPPED / "timpani.json"))
     assert not knobs.shape.isEnabled(), "drums have no pluck to shape"
 
 

@@ -1,1 +1,0 @@
-"""A patch that is played: events come in, voices go out."""

@@ -1,0 +1,1 @@
+"""An instrument that is played: events come in, voices go out."""

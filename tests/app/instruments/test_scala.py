@@ -1,0 +1,282 @@
+"""Scala's files against an independent reading: random valid scales and mappings, remarks, and hostile text."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from app.instruments.tuning import Tuning, TuningChoice, read_scala
+
+REMARKS = (
+    "",
+    "",
+    "",
+    " ",
+    "\t",
+    " cents",
+    " E\\",
+    "\tD 294.33",
+    " ! a fifth",
+    "!5/4",
+    "  by ear, 1998",
+    " 3/2.",
+    "C#",
+    ", a fifth",
+    ": 3/2, or so",
+    "; 9",
+    "*",
+    "\\ E",
+    "^ by ear",
+)
+JUST = "! just.scl\njust\n 7\n 9/8\n 5/4\n 4/3\n 3/2\n 5/3\n 15/8\n 2/1\n"
+TWELVE = "\n".join(["twelve", "12", *(f"{100 * n}." for n in range(1, 13))])
+
+
+@dataclass
+class Made:
+    """A scale or a mapping as its text, and what it was made from."""
+
+    text: str
+    cents: list[float]
+    numbers: list[int]
+    hz: float
+    pattern: list[int | None]
+
+
+def noisy(lines: list[str], draw: random.Random, first: int) -> str:
+    """The lines with comments, empty lines and white space between them, from a line on."""
+    end = draw.choice(("\n", "\r\n", "\r"))
+    out: list[str] = []
+    for number, line in enumerate(lines):
+        while draw.random() < 0.2:
+            out.append(draw.choice(("! a comment", "!", "! 3/2", "!100.0")))
+        if number >= first and draw.random() < 0.1:
+            out.append(draw.choice(("", "  ", "\t")))
+        out.append(line)
+    return end.join(out) + draw.choice(("", end, end + end))
+
+
+def pitch(draw: random.Random) -> tuple[str, float]:
+    """The text of a pitch, and its cents by fractions."""
+    kind = draw.randrange(6)
+    if kind == 0:
+        number = draw.randrange(1, 9)
+        return str(number), 1200 * math.log2(number)
+    if kind == 1:  # beyond 64 bits
+        ratio = Fraction(3 ** draw.randrange(40, 90), 2 ** draw.randrange(63, 140))
+        bits = ratio.numerator.bit_length() - ratio.denominator.bit_length()
+        rest = ratio / Fraction(2) ** bits
+        return f"{ratio.numerator}/{ratio.denominator}", 1200 * (bits + math.log2(rest))
+    if kind == 2:
+        ratio = Fraction(draw.randrange(1, 200), draw.randrange(1, 200))
+        blank = draw.choice(("", "", " "))
+        return f"{ratio.numerator}{blank}/{blank}{ratio.denominator}", 1200 * math.log2(ratio)
+    if kind == 3:
+        whole = draw.randrange(-1300, 2600)
+        return f"{whole}.", float(whole)
+    thousandths = draw.randrange(-200_000, 1_300_000)
+    sign = "-" if thousandths < 0 else draw.choice(("", "+", ""))
+    return f"{sign}{abs(thousandths) // 1000}.{abs(thousandths) % 1000:03d}", thousandths / 1000
+
+
+def made_scale(draw: random.Random) -> tuple[str, list[float]]:
+    notes = [pitch(draw) for _ in range(draw.choice((0, 1, 2, 5, 7, 12, 12, 19, 31)))]
+    lines = [
+        draw.choice(("", "a scale", "12", "3/2 and more", "p\u00e9log")),
+        f"{draw.choice(('', ' ', chr(9)))}{len(notes)}{draw.choice(('', ' ', ' notes', ' ! of an octave'))}",
+        *(draw.choice(("", " ", "\t", "   ")) + text + draw.choice(REMARKS) for text, _ in notes),
+        *(["this is text below"] if draw.random() < 0.1 else []),
+    ]
+    return noisy(lines, draw, 2), [cents for _, cents in notes]
+
+
+def made_mapping(draw: random.Random) -> Made:
+    size = draw.choice((0, 0, 1, 2, 4, 7, 10, 12, 12, 19, 24, 61, 128))
+    pattern: list[int | None] = [draw.choice((None, draw.randrange(-5, 40), place)) for place in range(size)]
+    low, high = sorted((draw.randrange(128), draw.randrange(128)))
+    if draw.random() < 0.6:
+        low, high = 0, 127
+    middle, reference = draw.randrange(128), draw.randrange(128)
+    if size and pattern[(reference - middle) % size] is None:
+        pattern[(reference - middle) % size] = draw.randrange(24)
+    hz = round(draw.uniform(20, 900), draw.randrange(7))
+    numbers = [size, low, high, middle, reference, draw.choice((0, 7, 12, size, 24, -5))]
+    listed = list(pattern)
+    while listed and listed[-1] is None and draw.random() < 0.7:
+        listed.pop()
+    entries = [draw.choice("xX") if degree is None else str(degree) for degree in listed]
+    lines = [
+        draw.choice(("", " ", "\t")) + str(line) + draw.choice(("", "", " ", "\t! a remark", " (more)"))
+        for line in (*numbers[:5], hz, numbers[5], *entries)
+    ]
+    return Made(noisy(lines, draw, 0), [], numbers, hz, pattern)
+
+
+def cents_of_degree(degree: int, cents: list[float]) -> float:
+    """The pitch of a degree, one period after another."""
+    if not cents:
+        return 0.0
+    found, steps = 0.0, [0.0, *cents]
+    while degree >= len(cents):
+        degree, found = degree - len(cents), found + cents[-1]
+    while degree < 0:
+        degree, found = degree + len(cents), found - cents[-1]
+    return found + steps[degree]
+
+
+def degree_of_key(key: int, made: Made, notes: int) -> int | None:
+    """The degree of a key, one pattern after another."""
+    size, _, _, middle, _, octave = made.numbers
+    if size == 0:
+        return key - middle
+    place, moved = key - middle, 0
+    while place >= size:
+        place, moved = place - size, moved + (octave or notes)
+    while place < 0:
+        place, moved = place + size, moved - (octave or notes)
+    degree = made.pattern[place]
+    return None if degree is None else degree + moved
+
+
+def held_to(choice: TuningChoice, expected: dict[int, float | None]) -> None:
+    tuning = Tuning(choice)
+    for key, cents in expected.items():  # above 440 Hz
+        assert tuning.mapped(key) == (cents is not None), key
+        if cents is not None and abs(cents) < 228_000:
+            assert 1200 * math.log2(tuning.hz(key) / 440) == pytest.approx(cents, abs=1e-5), key
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_scales(seed: int) -> None:
+    draw = random.Random(seed)
+    for _ in range(40):
+        text, cents = made_scale(draw)
+        base = cents_of_degree(9, cents)
+        held_to(TuningChoice(scale=text), {key: cents_of_degree(key - 60, cents) - base for key in range(128)})
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_mappings(seed: int) -> None:
+    draw = random.Random(1000 + seed)
+    for _ in range(40):
+        made, (text, cents) = made_mapping(draw), made_scale(draw)
+        if draw.random() < 0.3:
+            text, cents = "", [100.0 * step for step in range(1, 13)]
+        reference = degree_of_key(made.numbers[4], made, len(cents))
+        assert reference is not None
+        base = 1200 * math.log2(made.hz / 440) - cents_of_degree(reference, cents)
+        expected: dict[int, float | None] = {}
+        for key in range(128):
+            degree = degree_of_key(key, made, len(cents))
+            expected[key] = None if degree is None else base + cents_of_degree(degree, cents)
+            if not made.numbers[1] <= key <= made.numbers[2]:
+                expected[key] = 100.0 * (key - 69)
+        held_to(TuningChoice(scale=text, keymap=made.text), expected)
+
+
+@pytest.mark.parametrize(
+    ("line", "cents"),
+    [
+        ("9/8 D 294.33", 203.910),
+        ("100.0 C#", 100),
+        ("100.0 cents", 100),
+        ("5/4   E\\", 386.314),
+        ("2", 1200),
+        ("2 3.", 1200),
+        ("-5.0", -5),
+        ("408.", 408),
+        (".5", 0.5),
+        ("10/20", -1200),
+        ("\t 3/2\t! 701.955", 701.955),
+        ("36893488147419103232/36472996377170786403", 19.845),
+    ],
+)
+def test_lines_of_the_formats_text(line: str, cents: float) -> None:
+    tuning = Tuning(TuningChoice(scale=f"one\n1\n{line}\n"))
+    assert 1200 * math.log2(tuning.hz(70) / tuning.hz(69)) == pytest.approx(cents, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["100,0", "2\\12", "2^(7/12)", "3/2*5/4", "2\\ 12", "3/x", "100,0,", "3/2/1", "3 / 2/1", "-3/2", "3/-2",
+     "-2", "0", "0/1",
+     "3/0", "2:1", "2^3", "1.2.3", "1e3.", "3/2.5", "1.5/2", "nan", "inf.", "fifth", "/2", ".", "\u0663/2",
+     "9" * 500 + "/2", "9" * 300 + "."],
+)  # fmt: skip
+def test_lines_that_are_no_pitch(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.scl"
+    path.write_text(f"one\n1\n{line}\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"a\.scl: scale: ") as caught:
+        read_scala(path)
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 300
+
+
+def test_beyond_the_keyboard_pitches_go_on() -> None:
+    tuning = Tuning(TuningChoice(scale=JUST, keymap="0\n0\n127\n60\n60\n300.\n0\n", transpose=48))
+    assert tuning.hz(88) == pytest.approx(300 * 2**10 * 15 / 8)  # key 136, degree 76
+
+
+def test_pitches_that_no_string_has_do_not_spoil_the_others() -> None:
+    tuning = Tuning(TuningChoice(scale="wide\n1\n18446744073709551616/1\n"))
+    assert tuning.hz(70) == pytest.approx(440 * 2.0**64)
+    assert all(0 < tuning.hz(key) < math.inf for key in range(-128, 256))
+
+
+@pytest.mark.parametrize(
+    ("place", "line", "words"),
+    [
+        (0, "-1", "size of map"),
+        (0, "20001", "size of map"),
+        (0, "3", "lists 4 keys"),
+        (1, "61", "first key 61 is above its last key 60"),
+        (2, "128", "last key"),
+        (3, "60.5", "middle key"),
+        (4, "9" * 5000, "reference key"),
+        (4, "61", "leaves out key 61"),
+        (5, "440,0", "reference frequency"),
+        (5, "1e999", "reference frequency"),
+        (5, "x", "reference frequency"),
+        (6, "an octave", "formal octave"),
+        (7, "1.5", "entry"),
+        (8, "y", "entry"),
+    ],
+)
+def test_a_mapping_names_the_number_that_is_wrong(place: int, line: str, words: str) -> None:
+    lines = ["4", "0", "60", "60", "60", "440.0", "7", "0", "x", "4", "5"]
+    TuningChoice(keymap="\n".join(lines))
+    lines[place] = line
+    with pytest.raises(ValueError, match=words):
+        TuningChoice(keymap="\n".join(lines))
+
+
+@pytest.mark.parametrize("raw", [b"\xef\xbb\xbfp\xc3\xa9log", b"p\xe9log \x96 d\xe9j\xe0\xa0vu\x85", b"caf\xe9", b""])
+def test_descriptions_of_any_encoding(raw: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.scl"
+    path.write_bytes(raw + b"\r\n 1\r\n 3/2\r\n\x1a")
+    tuning = Tuning(TuningChoice(scale=read_scala(path)))
+    assert tuning.hz(70) == pytest.approx(660)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_damaged_texts_have_one_clear_error_or_pitches(seed: int, tmp_path: Path) -> None:
+    draw = random.Random(seed)
+    alphabet = [*"0123456789./-+xX!\\,e \t\r\n\0", "9" * 400, "\u00e9", "1e400", "2147483648", "nan"]
+    for number in range(150):
+        path = tmp_path / f"a{number}.{('scl', 'kbm')[number % 2]}"
+        text = list(made_scale(draw)[0] if number % 2 == 0 else made_mapping(draw).text)
+        for _ in range(draw.randrange(1, 6)):
+            text.insert(draw.randrange(len(text) + 1), draw.choice(alphabet))
+            del text[draw.randrange(len(text))]
+        path.write_bytes("".join(text).encode("utf-8"))
+        try:
+            read = read_scala(path)
+        except ValueError as error:
+            assert str(error).startswith(str(path)) and str(error).isprintable() and len(str(error)) < 600
+            continue
+        tuning = Tuning(TuningChoice.model_validate({"scale" if number % 2 == 0 else "keymap": read}))
+        assert all(0 < tuning.hz(key) < math.inf for key in range(128))

@@ -1,0 +1,204 @@
+"""Frozen sounds: random events on many instruments sound as they did.
+
+`frozen/sounds.json` has what an independent player in Python made of the same events, before it was removed: the norm
+of the sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
+They were frozen again when fades lost their corners; with straight fades all agreed until then, to 3e-5, which silent
+modes make that rest from the start. Eight were frozen again when nothing touched a string for longer than a period;
+without that bound all agreed until then. Four were frozen again when both sides of a body came to bound the level of
+keys; with the left side alone all agreed until then.
+Its instruments are there as they were then, so that those of the factory may be voiced otherwise.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.instruments.instrument import Instrument, Pickup
+from app.instruments.library import read_instrument
+from app.player import events
+from app.player.events import KEYS, Bend, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn
+from engine.kernels import midi
+from engine.kernels.constants import QUANTUM
+from engine.presets import Preset
+from engine.values.string import Losses, Polarisations
+from tests.app.player.stage import RATE_HZ, Sound, Stage, changed
+from tests.engine.resonators.test_recorded import recorded
+
+GAINS = {"model": 1.0, "truth": -0.5}
+CLOSE = 1e-7
+FROZEN_INSTRUMENTS = Path(__file__).parent / "frozen"
+FROZEN = json.loads((FROZEN_INSTRUMENTS / "sounds.json").read_text())
+
+
+def off(name: str, sound: Sound) -> float:
+    """By how much a sound is another than the frozen one of this name: the largest of all its numbers."""
+    flat = sound.ravel()
+    norm = float(np.linalg.norm(flat))
+    directions = np.random.default_rng(0).standard_normal((8, len(flat)))
+    known = np.array(FROZEN[name])
+    return float(np.abs(np.array([norm / known[0] - 1, *(directions @ flat / norm - known[1:])])).max())
+
+
+def compared(
+    name: str,
+    instrument: Instrument,
+    preset: Preset,
+    played: Sequence[tuple[int, Event]],
+    quanta: int,
+    most: int = 40,
+) -> float:
+    return off(name, Stage(instrument, preset, gains=GAINS, most=most).run(played, quanta * QUANTUM))
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, Instrument]:
+    """Without variation from stroke to stroke and strings at rest, which the frozen sounds have not."""
+    paths = [path for path in FROZEN_INSTRUMENTS.glob("*.json") if path.stem != "sounds"]
+    return {path.stem: changed(read_instrument(path), pluck={"variation": 0.0}, sympathy_s_kg=0.0) for path in paths}
+
+
+CONTROLLERS = (
+    *(midi.SUSTAIN, midi.MOD_WHEEL, midi.SLIDE, midi.RESET, midi.NOTES_OFF),
+    *(midi.REGISTERED, midi.FINE_REGISTERED, midi.VALUE, midi.FINE_VALUE, midi.OTHER),
+)
+KNOBS = ("knobs.tension", "knobs.gauge", "knobs.decay", "knobs.stiffness", "damping.release_t60_s", "pluck.position")
+
+
+def drawn(
+    instrument: Instrument, other: Instrument, seed: int, seconds: float, count: int = 60
+) -> list[tuple[int, Event]]:
+    """Random events, in their order; keys are often struck again, and two events often share a frame."""
+    draw = np.random.default_rng(seed)
+    low, high = instrument.range
+    keys = draw.integers(low, high + 1, 5).tolist()
+    channels = {"poly": (0, 0, 1, KEYS), "guitar": (0, 1, 2, 3, 4, 9, KEYS), "mpe": (0, 1, 2, 3, KEYS)}[
+        instrument.mode
+    ]
+    frames = np.sort(draw.integers(1, round(seconds * RATE_HZ), count))
+    frames[::7] = frames[::7] // QUANTUM * QUANTUM
+    frames = np.sort(frames)
+    present, found = instrument, list[tuple[int, Event]]()
+    for number, frame in enumerate(frames.tolist()):
+        channel, kind = int(draw.choice(channels)), draw.random()
+        key, value = int(draw.choice(keys)), int(draw.integers(0, 128))
+        if number < 3 or kind < 0.4:
+            found.append((frame, NoteOn(key, max(1, value), channel)))
+        elif kind < 0.6:
+            found.append((frame, NoteOff(key, channel)))
+        elif kind < 0.75:
+            found.append((frame, Bend(float(draw.uniform(-1.2, 1.2)), channel)))
+        elif kind < 0.97:
+            number = int(draw.choice(CONTROLLERS))
+            chooses = number in (midi.REGISTERED, midi.FINE_REGISTERED)
+            found.append((frame, ControlChange(number, 0 if chooses else value, channel)))
+        elif kind < 0.98:
+            found.append((frame, ControlChange(midi.SOUND_OFF, 0, channel)))
+        else:
+            name = str(draw.choice(KNOBS))
+            turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
+            present = turned if draw.random() < 0.8 else other
+            found.append((frame, InstrumentTurned(present)))
+    return released_once(found)
+
+
+def released_once(played: list[tuple[int, Event]]) -> list[tuple[int, Event]]:
+    """With a release for each stroke, and resets of all that a channel has, as the frozen sounds know them."""
+    strokes, found = Counter[tuple[int, int]](), list[tuple[int, Event]]()
+    for frame, event in played:
+        if isinstance(event, NoteOn):
+            strokes[event.key, event.channel] += 1
+        elif isinstance(event, NoteOff):
+            found += [(frame, event)] * (strokes.pop((event.key, event.channel), 1) - 1)
+        elif isinstance(event, ControlChange) and event.number == midi.RESET:
+            event = replace(event, value=events.AT_REST)
+        found.append((frame, event))
+    return found
+
+
+TWO = Polarisations(angle_deg=30.0, second_heard=0.4, second_cents=3.0, conductance_s_kg=0.02)
+INSTRUMENTS = [
+    ("classical_guitar", {}),  # wheel on a knob
+    ("electric_bass", {}),  # velocity
+    ("concert_harp", {}),  # rings
+    ("cimbalom", {}),  # added to the motion
+    ("felt_on_wires", {"mod_wheel": "knobs.tension"}),
+    ("guitar_in_nineteen_tones", {}),
+    ("fretless_bass", {}),  # guitar, by length, wheel on the pluck, velocity
+    ("oud", {"mod_wheel": "damping.release_t60_s"}),  # guitar
+    ("sitar", {"pluck": {"stops": False}}),  # guitar, velocity, added
+    ("koto", {"mode": "mpe", "mod_wheel": "pluck.curve"}),
+    ("jazz_guitar", {"mode": "mpe"}),
+    ("flamenco_guitar", {"polarisations": TWO, "losses": Losses(), "mod_wheel": "knobs.decay"}),
+    ("cimbalom", {"polarisations": TWO, "pluck": {"release_ms": 3.0, "release_hard_ms": 0.7}}),
+]
+
+
+@pytest.mark.parametrize("number", range(len(INSTRUMENTS)), ids=[name for name, _ in INSTRUMENTS])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_events_sound_as_they_did(
+    shipped: dict[str, Instrument], preset: Preset, number: int, seed: int
+) -> None:
+    name, parts = INSTRUMENTS[number]
+    instrument = changed(shipped[name], **parts)
+    assert (
+        compared(f"{number} {name} {seed}", instrument, preset, drawn(instrument, shipped["kora"], seed, 0.4), 400)
+        < CLOSE
+    )
+
+
+@pytest.mark.parametrize(("name", "kind"), [("classical_guitar", "displacement"), ("fretless_bass", "velocity")])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_string_learned_from_a_recording_has_its_own_modes(
+    shipped: dict[str, Instrument], preset: Preset, name: str, kind: str, seed: int
+) -> None:
+    own = replace(recorded(), smooth_hz=(200.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8), pitch_hz=196.0)
+    learned = replace(preset, info=replace(preset.info, recorded=own))
+    pickup = Pickup(points=shipped[name].pickup.points, kind=kind)
+    instrument, other = (changed(shipped[each], pickup=pickup) for each in (name, "kora"))
+    assert compared(f"recorded {name} {seed}", instrument, learned, drawn(instrument, other, seed, 0.4), 400) < CLOSE
+
+
+def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument], preset: Preset) -> None:
+    stage = Stage(shipped["cimbalom"], preset, gains=GAINS)
+    for frame, key, velocity in ((0, 50, 90), (200, 57, 90), (5000, 50, 120), (5003, 57, 120), (6000, 62, 120)):
+        stage.player.handle(NoteOn(key, velocity), frame)
+    first = stage.run((), 20 * QUANTUM)
+    stage.player.cancel()
+    assert off("cancel", np.concatenate([first, stage.run((), 150 * QUANTUM)])) < CLOSE
+
+
+def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(
+    shipped: dict[str, Instrument], preset: Preset
+) -> None:
+    instrument = changed(shipped["damped_harp"], mod_wheel="knobs.tension")
+    draw, burst = np.random.default_rng(3), list[tuple[int, Event]]()
+    for number in range(500):
+        frame = 640 + number // 8
+        if number % 10 == 0:
+            burst.append((frame, NoteOn(40 + int(draw.integers(0, 25)), 80)))
+        elif number % 10 == 5:
+            burst.append((frame, NoteOff(40 + int(draw.integers(0, 25)))))
+        elif number % 3 == 0:
+            burst.append((frame, Bend(float(draw.uniform(-1, 1)))))
+        else:
+            burst.append((frame, ControlChange(int(draw.choice([midi.MOD_WHEEL, midi.SUSTAIN])), number % 128)))
+    assert compared("burst", instrument, preset, released_once(burst), 100) < CLOSE
+
+
+def test_the_oldest_make_room(shipped: dict[str, Instrument], preset: Preset) -> None:
+    played = [(1 + 480 * number, NoteOn(30 + 3 * number, 90)) for number in range(12)]
+    assert compared("oldest", shipped["concert_harp"], preset, played, 200, most=5) < CLOSE
+
+
+def test_the_same_events_give_the_same_samples(shipped: dict[str, Instrument], preset: Preset) -> None:
+    instrument = changed(shipped["oud"], pluck={"variation": 1.0})
+    played = drawn(instrument, shipped["kora"], 5, 0.2)
+    one, other = (Stage(instrument, preset, gains=GAINS).run(played, 100 * QUANTUM) for _ in range(2))
+    np.testing.assert_array_equal(one, other)

@@ -1,0 +1,146 @@
+"""Plucks and strings stay within their ranges, whatever the knobs, macros and wheels of an instrument stand at."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.instruments.drums import Drums
+from app.instruments.instrument import ASSIGNABLE, VELOCITIES, WHEEL, Fretted, Instrument
+from app.instruments.library import SHIPPED, list_instruments
+from app.player.drum_keys import DrumKeys
+from app.player.events import ControlChange, Event, InstrumentTurned, NoteOn
+from app.player.strings import KNOBS
+from app.player.table import wheeled
+from app.shared.parameters import OF_INSTRUMENTS
+from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
+from engine.kernels import constants as of
+from engine.kernels import strings
+from engine.kernels.midi import HARMONICS, MOD_WHEEL, SLIDE
+from engine.kernels.playing.plucks import vary
+from engine.pluck import Pluck
+from engine.presets import Preset
+from engine.strike import Strike
+from engine.values.ear import Ear
+from engine.voices.player import NoteReport
+from tests.app.player.stage import RATE_HZ, Stage, changed
+
+STROKES = 40
+INSTRUMENTS = {entry.instrument.name: entry.instrument for entry in list_instruments(SHIPPED)[0]}
+PLUCKING = [field for field in ASSIGNABLE if field.startswith("pluck.")]
+EVERY = pytest.mark.parametrize("instrument", INSTRUMENTS.values(), ids=INSTRUMENTS)
+
+
+def with_ends(instrument: Instrument, fields: list[str], draw: random.Random) -> Instrument:
+    """An instrument with some knobs at an end, and then all its macros; an end that another value forbids is left out."""
+    for field in fields:
+        try:
+            instrument = instrument.with_knob(field, draw.choice(OF_INSTRUMENTS[field].limits))
+        except ValueError:  # a softest pluck above the hardest
+            continue
+    for macro in range(len(instrument.macros)):
+        if draw.random() < 0.5:
+            instrument = instrument.turned(macro, draw.choice((0.0, 1.0)))
+    return instrument
+
+
+def at_ends(instrument: Instrument) -> Iterator[Instrument]:
+    """Each macro and each knob of the pluck at either end, then some at random together."""
+    draw = random.Random(instrument.name)
+    for macro, end in itertools.product(range(len(instrument.macros)), (0.0, 1.0)):
+        yield instrument.turned(macro, end)
+    for fields in ([field] for field in PLUCKING):
+        yield with_ends(instrument, fields, draw)
+    for _ in range(4):
+        yield with_ends(instrument, draw.sample(PLUCKING, 6), draw)
+
+
+@EVERY
+def test_every_stroke_of_every_knob_is_a_pluck(instrument: Instrument) -> None:
+    draw = random.Random(instrument.name)
+    for turned in at_ends(instrument):
+        for velocity in (*VELOCITIES, draw.randint(2, 126)):
+            pluck = turned.pluck.pluck(velocity)
+            own = pluck.position, pluck.amplitude_mm, pluck.width
+            for _ in range(STROKES):
+                stroke, key = draw.randrange(1_000_000), draw.randrange(128)
+                position, amplitude_mm, width = vary(*own, turned.pluck.variation, stroke, key)
+                Pluck(position, amplitude_mm, pluck.shape, width)
+        for wheel in (-1, 0, 127, 128):
+            wheeled(turned, wheel, "")
+
+
+@EVERY
+def test_no_knob_makes_a_string_or_a_blow_impossible(instrument: Instrument) -> None:
+    chosen, found = instrument.strings, np.empty(of.STRING)
+    if isinstance(chosen, Drums):
+        keys, (low, high) = DrumKeys(instrument, Ear(tuple(instrument.pickup.points))), instrument.range
+        for key, curve in itertools.product(range(low, high + 1), OF_INSTRUMENTS["pluck.curve"].limits):
+            drum = keys.of_key(key)
+            assert (drum is None) == (keys.tuned_to(key) is None)
+            assert drum is None or all(isinstance(drum.strike(each, curve), Strike) for each in VELOCITIES)
+        return
+    own = [chosen.string] if isinstance(chosen, Fretted) else [each.string for each in chosen.strings]
+    limits = [OF_INSTRUMENTS[f"knobs.{name}"].limits for name in KNOBS]
+    for string, knobs in itertools.product(own[:: max(len(own) - 1, 1)], itertools.product(*limits)):
+        strings.turned(np.array(string.row), np.array(knobs), found)
+        assert strings.possible(found), (knobs, found)
+
+
+def plucks(stage: Stage, *events: Event) -> list[NoteReport]:
+    """What the notes of events began with, each note with a quantum of its own."""
+    before = len(stage.begun)
+    for event in events:
+        stage.player.handle(event)
+        assert np.isfinite(stage.left(128)).all()
+    assert np.isfinite(stage.left(RATE_HZ // 2)).all()
+    return stage.begun[before:]
+
+
+def scattered(count: int) -> list[Event]:
+    draw = random.Random(count)
+    return [NoteOn(draw.randrange(40, 76), draw.randint(*VELOCITIES)) for _ in range(count)]
+
+
+@pytest.mark.parametrize("end", WIDTH_RANGE)
+def test_a_tone_at_its_end_plays_on(preset: Preset, end: float) -> None:
+    """Both widths are at an end of their range, from which strokes vary."""
+    instrument = INSTRUMENTS["Classical guitar"].with_values({"pluck.width": end, "pluck.width_hard": end})
+    found = plucks(Stage(instrument, preset), *scattered(60))
+    assert len(found) == 60
+    assert (max if end == WIDTH_RANGE[1] else min)(each.width for each in found) == end
+
+
+@pytest.mark.parametrize("mode", ["poly", "mpe"])
+def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset, mode: str) -> None:
+    extreme = INSTRUMENTS["Classical guitar"].with_values(
+        {"pluck.position": POSITION_RANGE[0], "pluck.hardest_mm": AMPLITUDE_MM_RANGE[1]}
+    )
+    fields = [field for field in WHEEL if field.startswith(("pluck.", "technique."))]
+    wild = [Pluck(at, mm, "gaussian", w) for at in POSITION_RANGE for mm in (0.0, 20.0) for w in WIDTH_RANGE]
+    for field in random.Random(1).sample(fields, 6):
+        stage = Stage(changed(extreme, pluck={"variation": 1.0}, mod_wheel=field, mode=mode), preset)
+        for value in (0, 127, 128):
+            switches = [ControlChange(number, value) for number in (MOD_WHEEL, SLIDE, HARMONICS)]
+            assert len({each.id for each in plucks(stage, *switches, *scattered(8))}) == 8
+        found = {each.id: each for each in plucks(stage, *(NoteOn(50, 90, pluck=pluck) for pluck in wild))}
+        assert [(each.position, each.width) for each in found.values()] == [(p.position, p.width) for p in wild]
+
+
+def test_a_knob_may_go_to_every_end_while_strings_ring(preset: Preset) -> None:
+    """Of the strings and of the pluck, with notes after each."""
+    instrument = INSTRUMENTS["Steel-string acoustic"]
+    stage, draw = Stage(instrument, preset), random.Random(2)
+    fields = [*PLUCKING, *(f"knobs.{name}" for name in KNOBS)]
+    knobs = [InstrumentTurned(with_ends(instrument, draw.sample(fields, 5), draw)) for _ in range(12)]
+    assert len(plucks(stage, *(event for knob in knobs for event in (knob, *scattered(3))))) == 36
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf"), -1.0, 1e300])
+def test_the_nearest_pluck_is_always_one(value: float) -> None:
+    made = Pluck(shape="rounded").nearest(position=value, amplitude_mm=value, width=value)
+    assert made.shape == "rounded" and POSITION_RANGE[0] <= made.position <= POSITION_RANGE[1]

@@ -1,0 +1,157 @@
+"""The strings of keys: their pitches, what bends, slides, dampers and knobs do to them, and which are impossible."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from app.instruments.instrument import Fretted, Instrument, Knobs, OpenString, StringSet
+from app.instruments.library import SHIPPED, read_instrument
+from app.instruments.tuning import TuningChoice
+from app.player.strings import KNOBS, Strings, decay_rates, on_string
+from app.shared.parameters import OF_INSTRUMENTS
+from engine.kernels import strings as law
+from engine.kernels.constants import D1, LENGTH, TENSION
+from engine.resonators import string as of_law
+from engine.resonators.family import inharmonicity
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
+from tests.app.player.conftest import STEEL
+from tests.app.player.stage import cents, changed, hz_of, string_of
+
+
+def made(string: StringParameters, place: int, value: float) -> StringParameters:
+    """The string with another value, by its place in the row."""
+    return replace(string, **{fields(string)[place].name: value})
+
+
+def in_tune(string: StringParameters, hz: float) -> bool:
+    return abs(cents(string.pitch_hz, hz)) < 1e-3
+
+
+def test_every_key_has_its_pitch_by_length_alone(instrument: Instrument) -> None:
+    for key in range(28, 89):
+        found = string_of(instrument, key)
+        assert in_tune(found.parameters, hz_of(key)) and 1 <= found.modes <= 99
+        assert replace(found.parameters, length_m=STEEL.length_m) == STEEL
+
+
+def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guitar: Instrument) -> None:
+    tuned = changed(guitar, tuning=TuningChoice(a4_hz=443.0))
+    strings = {key: string_of(tuned, key).parameters for key in (30, 40, 44, 45, 64, 80)}
+    assert all(in_tune(string, hz_of(key) * 443 / 440) for key, string in strings.items())
+    assert strings[30].tension_n < 0.5 * strings[40].tension_n
+    assert strings[30].length_m == pytest.approx(strings[40].length_m, rel=1e-3)
+
+
+def test_a_set_may_be_asked_for_a_string(guitar: Instrument) -> None:
+    own = ((50, 60.0), (55, 70.0), (59, 80.0))
+    strings = tuple(OpenString(note=note, string=replace(STEEL, tension_n=tension_n)) for note, tension_n in own)
+    chosen = changed(guitar, strings=StringSet(strings=strings))
+
+    def tension_n(key: int, string: int | None) -> float:
+        found = string_of(chosen, key, string).parameters
+        assert in_tune(found, hz_of(key))
+        return found.tension_n
+
+    by_key = {50: 60.0, 54: 60.0, 55: 70.0, 58: 70.0, 59: 80.0, 60: 80.0}  # open strings sound at their own keys
+    assert {key: tension_n(key, None) for key in by_key} == by_key
+    assert [tension_n(64, string) for string in (None, 0, 1, 2, 3)] == [80.0, 80.0, 70.0, 60.0, 80.0]
+    assert [tension_n(53, string) for string in (None, 0, 2)] == [60.0, 60.0, 60.0]  # 0 is too far above
+    assert tension_n(57, 0) == pytest.approx(80 * 2 ** (-4 / 12), rel=0.01)  # it is slackened
+
+
+@pytest.mark.parametrize("semitones", [-2, -0.5, 0.3, 2, 12])
+def test_bends_and_slides_reach_the_pitch(semitones: float) -> None:
+    ratio = 2 ** (semitones / 12)
+    by_tension = made(STEEL, TENSION, law.bent(STEEL.row, ratio))
+    by_length = made(STEEL, LENGTH, law.slid(STEEL.row, ratio))
+    assert in_tune(by_tension, ratio * STEEL.pitch_hz) and in_tune(by_length, ratio * STEEL.pitch_hz)
+    assert (by_tension.length_m, by_length.tension_n) == (STEEL.length_m, STEEL.tension_n)
+
+
+def test_a_bend_below_what_stiffness_alone_gives_needs_a_tension_below_zero() -> None:
+    assert law.bent(replace(STEEL, second_moment_m4=1e-9).row, 0.05) < 0
+
+
+def test_a_damper_adds_its_decay_to_every_partial() -> None:
+    added = of_law.decay_rates(made(STEEL, D1, law.damped(STEEL.row, 0.2)), 20) - of_law.decay_rates(STEEL, 20)
+    assert added.tolist() == pytest.approx([math.log(1000) / 0.2] * 20)
+
+
+def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is() -> None:
+    def turned(**knobs: float) -> StringParameters:
+        law.turned(STEEL.row, [getattr(Knobs(**knobs), name) for name in KNOBS], out := [0.0] * 8)
+        return StringParameters(*out)
+
+    thick = turned(gauge=1.5, density=1.2)
+    assert in_tune(made(thick, LENGTH, law.fretted(thick.row, 220.0)), 220.0)
+    assert thick.decay_rate(1) == pytest.approx(STEEL.decay_rate(1))
+    assert thick.second_moment_m4 == pytest.approx(1.5**4 * STEEL.second_moment_m4)
+    assert turned() == STEEL
+
+
+@pytest.mark.parametrize(("name", "key"), [("instrument", 57), ("guitar", 57), ("guitar", 30)])
+def test_tension_and_length_go_together_at_a_keys_pitch(name: str, key: int, request: pytest.FixtureRequest) -> None:
+    played: Instrument = request.getfixturevalue(name)
+    own = string_of(played, key)
+    for knob, value in (("tension", 4.0), ("length", 2.0)):
+        found = string_of(played.with_value(f"knobs.{knob}", value), key)
+        assert in_tune(found.parameters, own.pitch_hz)
+        assert found.parameters.tension_n == pytest.approx(4 * own.parameters.tension_n, rel=5e-3)
+        assert found.parameters.length_m == pytest.approx(2 * own.parameters.length_m, rel=5e-3)
+        assert found.shortened == pytest.approx(own.shortened, rel=5e-3)  # pulled as far
+        assert inharmonicity(found.parameters) == pytest.approx(inharmonicity(own.parameters) / 16, rel=1e-2)
+        rest = [replace(each.parameters, length_m=1.0, tension_n=1.0) for each in (found, own)]
+        assert rest[0] == rest[1]
+    same = string_of(played.with_values({"knobs.tension": 4.0, "knobs.length": 0.5}), key).parameters
+    found_m_n = (same.tension_n, same.length_m)
+    assert found_m_n == pytest.approx((own.parameters.tension_n, own.parameters.length_m))
+
+
+def test_a_tight_string_rises_less_in_tension_when_it_is_plucked_hard(instrument: Instrument) -> None:
+    rises = []
+    for played in (instrument, instrument.with_value("knobs.tension", 2.0)):
+        found = string_of(played, 57)
+        resonator = resonator_of(found.parameters, found.modes)
+        pluck = on_string(found, played.pluck.pluck(127))
+        rises.append(float(resonator.relative_tension_rise(resonator.to_modes(pluck.displacement(101)))))
+    assert rises[0] / rises[1] == pytest.approx(4.0, rel=0.02)  # 1 / T₀ℓ²
+
+
+SLACK = Fretted(string=replace(STEEL, tension_n=1e-3, second_moment_m4=0.0))
+ROD = StringSet(strings=(OpenString(note=60, string=replace(STEEL, second_moment_m4=1e-9)),))
+
+
+@pytest.mark.parametrize(
+    ("strings", "key", "error"),
+    [
+        (SLACK, 88, "key 88 of test.*length_m"),
+        (ROD, 31, "key 31.*no tension slackens its string so far; choose a higher key"),
+    ],
+)
+def test_an_impossible_key_is_named(
+    instrument: Instrument, strings: Fretted | StringSet, key: int, error: str
+) -> None:
+    found = Strings(changed(instrument, strings=strings, range=(28, 88)))
+    assert found.of_key(27) is found.of_key(89) is None, "beyond the range"
+    with pytest.raises(ValueError, match=error):
+        found.of_key(key)
+
+
+def test_each_tenth_of_the_mute_knob_shortens_a_string_alike() -> None:
+    instrument = read_instrument(SHIPPED / "steel_string_acoustic.json")
+    string, knob, t60_s = string_of(instrument, 40), OF_INSTRUMENTS["damping.mute"], []
+    own, modes = string.parameters, string.modes
+    squares = np.array([own.undamped_frequency(mode) ** 2 for mode in range(1, modes + 1)])
+    energies, times_s = np.arange(1.0, modes + 1) ** -2, np.geomspace(0.01, 20, 2000)
+    for tenth in range(11):
+        out = np.concatenate([squares, decay_rates(instrument, own, modes)])
+        law.mute(own.row, modes, 0, knob.value(tenth / 10), out)
+        left = (energies / out[modes:] * np.exp(-2 * np.outer(times_s, out[modes:]))).sum(1)
+        t60_s.append(3 * times_s[np.argmax(left < 0.01 * (energies / out[modes:]).sum())])
+    ratios = np.array(t60_s[1:]) / t60_s[:-1]
+    assert t60_s[0] > 20 * t60_s[-1] and 0.6 < ratios.min() < ratios.max() < 0.8
