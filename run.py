@@ -2,7 +2,7 @@
 """Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 to 3.14.
 
 python3 run.py                 open the app
-python3 run.py FILE ...        open it with these: presets, instruments, MIDI files, WAVs, whatever can be dropped on it
+python3 run.py FILE ...        open it with these: presets, instruments, MIDI files, whatever can be dropped on it
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --quick    the tests nearest to changed files, in a minute and a half
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills

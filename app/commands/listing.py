@@ -77,9 +77,9 @@ def instruments(
         say(problem)
     rows = []
     for entry in entries:
-        instrument = entry.instrument
-        facts = {"name": entry.name, "title": instrument.name, "category": instrument.category, "own": entry.own}
-        rows.append({**facts, "description": instrument.description, "file": str(entry.path)})
+        named = entry.instrument
+        facts = {"name": entry.name, "title": named.name, "category": named.category, "own": entry.own}
+        rows.append({**facts, "description": named.description, "file": str(entry.path)})
     _show(rows, json, but=("own", "file"))
 
 

@@ -219,7 +219,7 @@ class _Read:
         else:
             time_s = _number_within(data.pop("t"), (-LONGEST_S, LONGEST_S))
             ((kind, value),) = data.items()
-            kind = "instrument" if kind == "instrument" else kind  # until 0.2
+            kind = "instrument" if kind == "patch" else kind  # of earlier versions
             self.events.append(TimedEvent(time_s, self._event(kind, value)))
 
     def _event(self, kind: str, value: Any) -> Event:

@@ -54,7 +54,7 @@ class InstrumentSound(Value):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
-        instrument: the name of the instrument, of a recording the one with which it began; of several, all.
+        instrument: its name, of a recording the one with which it began; of several, all.
         preset: that plays it, of several the first one's.
         source: that is heard.
         difference_gain_db: the gain of the difference.

@@ -1,1 +1,1 @@
-"""Instruments: an instrument and all its choices, the places of instruments, and the tuning of their keys."""
+"""Instruments: checked values with all their choices, their files, and the tuning of their keys."""

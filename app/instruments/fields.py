@@ -110,7 +110,7 @@ class _OfRows(ModelMetaclass):
 
 
 class Rows(Value, metaclass=_OfRows):
-    """A part of an instrument with a field for each row `part.…` of the table of parameters, and what it adds to them.
+    """A part of an instrument with a field for each row `part.…` of the table of parameters, and its own fields.
 
     It states those that other code names when it makes one.
     """

@@ -1,4 +1,4 @@
-"""An instrument: everything that an instrument is, as one checked and immutable value.
+"""An instrument: everything that it is, as one checked and immutable value.
 
 Lengths, areas and tensions are those of physics, in SI units; places on the string are in its lengths, from 0 to 1.
 All values are checked against bounds here. The pitch of keys is in `tuning`, the files of instruments in `library`.
@@ -260,7 +260,7 @@ class Macro(Value):
     targets: Annotated[tuple[MacroTarget, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 
     def nearest(self, instrument: Instrument) -> float:
-        """The position, 0 … 1, that is nearest to an instrument's values: the mean over targets, each within its ends."""
+        """The position, 0 … 1, that is nearest to an instrument: the mean over targets, each within its ends."""
         places = [
             min(1.0, max(0.0, (instrument.value(target.field) - target.low) / (target.high - target.low)))
             for target in self.targets
@@ -365,7 +365,7 @@ class Instrument(Value):
         return float(value)
 
     def with_value(self, field: str, value: float) -> Instrument:
-        """The instrument with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""
+        """A copy with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""
         return self.with_values({field: value})
 
     def with_values(self, values: dict[str, float]) -> Instrument:

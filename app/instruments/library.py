@@ -1,6 +1,6 @@
 """The instruments: shipped ones and the user's own, each a small JSON file; listing, reading, saving, renaming.
 
-An instrument is known by its file's name without `.json`. That name is made from the instrument's own, and is never a path.
+An instrument is known by its file's name without `.json`. That name is made from its own, and is never a path.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def own_instruments() -> Path:
 
 def instrument_folders() -> tuple[Path, ...]:
     """The folders of instruments: the shipped one, the user's, and the user's of earlier versions."""
-    return SHIPPED, own_instruments(), user_folder() / "instruments"  # until 0.2
+    return SHIPPED, own_instruments(), user_folder() / "patches"  # of earlier versions
 
 
 def read_instrument(path: Path) -> Instrument:
@@ -87,9 +87,9 @@ def read_instrument(path: Path) -> Instrument:
 
 
 def list_instruments(*folders: Path) -> tuple[list[InstrumentEntry], list[str]]:
-    """The usable instruments, sorted by category and name, and a line for each file that cannot be used. Never raises.
+    """The usable instruments, by category and name, and a line for each file that cannot be used. Never raises.
 
-    Of two instruments of one name the later one is given a number, as a file that was copied has the name of the first.
+    Of two of one name the later one is given a number, as a file that was copied has the name of the first.
 
     Args:
         folders: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
@@ -220,6 +220,6 @@ def rename_instrument(entry: InstrumentEntry, name: str) -> InstrumentEntry:
 
 
 def file_stem(name: str) -> str:
-    """The name of an instrument's file, on every system: its letters and digits in lower case, the rest underscores."""
+    """The name of an instrument's file, on every system: letters and digits in lower case, the rest underscores."""
     stem = "_".join(re.findall(r"[^\W_]+", unicodedata.normalize("NFC", name.casefold()))) or "instrument"
     return f"{stem}_" if stem in DEVICES else stem

@@ -1,6 +1,6 @@
 """The bodies that an instrument may name: those of the engine, and the user's own impulse responses, by their files.
 
-The user's lie in a folder beside the instruments. A body is known by its file's name without the ending, never by a path.
+The user's lie in a folder beside the instruments. A body is known by its file's name without ending, never by a path.
 """
 
 from __future__ import annotations

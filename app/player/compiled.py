@@ -192,7 +192,7 @@ class InstrumentPlayer:
     def take(self, keys: StringKeys | DrumKeys, table: Table | None = None, frame: int = 0) -> None:
         """Play these keys, at once or from a frame on; strings that ring glide to them.
 
-        Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
+        Another instrument begins with its wheels at rest, for they may turn something else now; pedals stay.
 
         Args:
             table: of these keys, where it is there already.
@@ -304,5 +304,5 @@ class InstrumentPlayer:
 
 
 def is_another(instrument: Instrument, than: Instrument) -> bool:
-    """Return True if an instrument is another instrument. The same with a knob turned, or under a new name, is not."""
+    """Return True if an instrument is another one. The same with a knob turned, or under a new name, is not."""
     return instrument.name != than.name and instrument.model_copy(update={"name": than.name}) != than

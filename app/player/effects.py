@@ -60,7 +60,7 @@ def channels_of(instrument: Instrument, wheeled: bool = False) -> int:
 
 
 def body_curves(instrument: Instrument) -> NDArray[np.float64] | None:
-    """The curves of an instrument's body, whose resonances favour some keys, at whatever mix; None: it has no body."""
+    """The curves of an instrument's body, whose resonances favour some keys, at whatever mix; None: it has none."""
     body = _body(instrument.body.model_copy(update={"mix": 1.0}))[0]
     return None if body is None else curves_of(body)
 

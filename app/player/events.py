@@ -105,7 +105,7 @@ class PluckAt:
 
 
 def fixed_function(number: int) -> str:
-    """The function of a controller in every instrument, as "is the sustain pedal"; "" for one that may be assigned."""
+    """The function of a controller in every instrument, as "is the sustain pedal"; "": it may be assigned."""
     return _FIXED.get(number, "")
 
 

@@ -139,7 +139,7 @@ def both_sounds(learned: Learned, rate_hz: int) -> dict[str, NDArray[np.float32]
 
 
 def check_name(name: str) -> str:
-    """The stem of an instrument's files. Raises InstrumentError: the name is impossible, or one of the files is there."""
+    """The stem of an instrument's files. Raises InstrumentError: the name is impossible, or a file is there."""
     try:
         stem = file_stem(_NAME.validate_python(name))
     except ValueError as error:
@@ -155,7 +155,7 @@ def check_name(name: str) -> str:
 
 
 def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
-    """Write preset, body, instrument and report of an instrument; where one fails, none is left.
+    """Write preset, body, instrument and report of a string; where one fails, none is left.
 
     Raises:
         InstrumentError: the name is taken or impossible.

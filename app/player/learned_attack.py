@@ -48,7 +48,7 @@ def attack_of(instrument: Instrument, note: Note, recorded: RecordedNote) -> tup
 
 
 def with_attack(instrument: Instrument, preset: Preset, note: Note, f0_hz: float, level_db: float) -> Instrument:
-    """The instrument whose strokes have the recorded attack: at its level where that is nearer to the note, else off."""
+    """The instrument whose strokes have the recorded attack: at its level where that is nearer, else off."""
     body = _body_impulse(instrument)
     recorded = preset.info.recorded
     assert body is not None and recorded is not None and recorded.attack is not None

@@ -273,7 +273,7 @@ def _on_channel_of_keys(event: Event) -> Event:
 def midi_bytes(
     timed: Sequence[TimedEvent], instrument: Instrument | None = None, meter: Meter | None = None
 ) -> bytes:
-    """The bytes of a MIDI file of one track. Times are rounded to 1/960 of a beat; changes of the instrument are left out.
+    """The bytes of a MIDI file of one track. Times are rounded to 1/960 of a beat; turned knobs are left out.
 
     Args:
         instrument: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.

@@ -1,4 +1,4 @@
-"""The sound of an instrument's keys, prepared in the background: the instrument's preset, its table, body and room.
+"""The sound of an instrument's keys, prepared in the background: its preset, its table, body and room.
 
 Events go to the compiled player as numbers, which the device's next quantum takes up; its reports come back.
 """
@@ -61,7 +61,7 @@ class _Wanted:
 class Keys:
     """The keys of an instrument, and its notes. Every public method may be called from any thread.
 
-    A key waits for no knob. A turned instrument is played at once, as loud as through the body of the instrument before.
+    A key waits for no knob. A turned instrument is played at once, as loud as through the body before.
     Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:

@@ -1,8 +1,8 @@
 """The notes that ring: begun by events, switched between sources, heard from other points, and ended.
 
 All that plays is an event: a key, a message of MIDI or of a file, a pluck at a place. `Notes.handle` turns it into a
-note in the thread it comes in, and hands it to the mixer at once, before anything is drawn. Keys of an instrument go to the
-compiled player as numbers. A pluck of a single string has voices that are made here, for models of every kind.
+note in the thread it comes in, and hands it to the mixer at once, before anything is drawn. Keys of an instrument go
+to the compiled player as numbers. A pluck of a single string has voices that are made here, for models of every kind.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Notes:
         """Set what events play from now on, and where all notes are heard.
 
         Args:
-            single: the preset whose string is played by itself: notes of the instrument fade out. The instrument is loaded all
+            single: the preset whose string is played by itself: notes of the instrument fade out. It is loaded all
                 the same, so that its keys sound at once when it is played.
         """
         entry = None if single is None else self._find(single)

@@ -42,8 +42,8 @@ class Choices(Monitor, Listener, ShownString):
     """The choices that are restored at the next start.
 
     Attributes:
-        instrument: the instrument that is there, played or not; None: there is none.
-        single: the name of the preset whose string is played instead, at places along it; None: the instrument is played.
+        instrument: what is there to be played, even if it is not; None: there is none.
+        single: the preset whose string is played instead, at places along it; None: the instrument is played.
         seconds: how long the pluck is rendered.
         octave: by how many octaves the computer's keys are transposed.
         velocity: with which the computer's keys are struck, as in MIDI.
@@ -123,29 +123,29 @@ OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
     """The fields of these choices, read from those of earlier versions.
 
-    Until 0.2 instruments were instruments. Before there were slots, `heard` named the source itself. Without `single`,
-    `instrument` was a preset alone, too, with the instrument beside it as `kept`. Before that, `keys_play` said if the
-    instrument was played or the string of `preset`.
+    The last version called `instrument` `patch`. Before there were slots, `heard` named the source itself. Without
+    `single`, `instrument` was a preset alone, too, with the instrument beside it as `kept`. Before that, `keys_play`
+    said if `patch` was played or the string of `preset`.
     """
-    data = {"instrument" if name == "instrument" else name: value for name, value in data.items()}  # until 0.2
+    data = dict(data)
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
         data |= {"a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
-    if "instrument" in data and "single" not in data:
+    if "single" in data:
+        if "patch" in data:
+            data["instrument"] = data.pop("patch")
+    elif "instrument" in data:
         instrument, kept = data.pop("instrument"), data.pop("kept", None)
         if isinstance(instrument, dict) and not instrument.keys() - {"preset"}:
             data |= {"instrument": kept, "single": instrument.get("preset", "")}
         else:
             data |= {"instrument": instrument, "single": None}
-    elif "single" not in data and data.keys() & {"preset", "instrument", "keys_play"}:
+    elif data.keys() & {"preset", "patch", "keys_play"}:
         preset = data.pop("preset", "")
         place = data.pop("keys_play", "") == "place"
-        instrument = data.get("instrument")
+        instrument = data["instrument"] = data.pop("patch", None)
         data["single"] = preset if instrument is None or place else None
-        model = (
-            instrument.get("preset", Instrument.model_fields["preset"].default)
-            if isinstance(instrument, dict)
-            else preset
-        )
+        default = Instrument.model_fields["preset"].default
+        model = instrument.get("preset", default) if isinstance(instrument, dict) else preset
         if data["single"] is None and preset not in ("", model):
             data["string"] = None  # it is of another preset
     return data
@@ -158,8 +158,8 @@ def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
     saved, recorded and exported as it is heard.
 
     Args:
-        asked: the fields that were asked to change. Of these the instrument counts before listening points and pick-up,
-            which otherwise become those of the instrument.
+        asked: the fields that were asked to change. Of these the instrument counts before listening points and
+            pick-up, which otherwise become those of the instrument.
 
     Raises:
         ValueError: the instrument cannot be heard so.

@@ -1,7 +1,7 @@
 """The table of parameters: each one's identity, range, unit, words and use, declared once.
 
-Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of instruments and of the session's choices read it.
-It needs no engine but the ranges of a pluck, an amplifier, a body and a room.
+Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of instruments and of the choices read it. It
+needs no engine but the ranges of a pluck, an amplifier, a body and a room.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class Session:
         self.send(Chosen(values, by_user=False))
 
     def play_instrument(self) -> None:
-        """Make the instrument that is there the instrument: keys are pitches."""
+        """Play the instrument that is there: keys are pitches."""
         if self.choices.instrument is not None:
             self.update(single=None)
 

@@ -32,7 +32,7 @@ Key = tuple[int, int | None]  # of an instrument, and its string of the set, as 
 
 @dataclass(frozen=True)
 class Chosen:
-    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the instrument chooses the instrument.
+    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the instrument chooses this.
 
     Attributes:
         by_user: not by a note or by undo, so that undo can take it back.
@@ -139,7 +139,7 @@ class Stage:
         return min(max(drums.drums[0].note, low), high)
 
     def shown_key(self, instrument: Instrument) -> Key:
-        """The key whose string is shown: the one struck last, on its string, or the middle of the instrument's range."""
+        """The key whose string is shown: the one struck last, on its string, or the middle of the range."""
         (low, high), latest = instrument.range, self.key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 

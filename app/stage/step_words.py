@@ -1,4 +1,4 @@
-"""The change by a step of undo, in words: fields of pluck or instrument, or the chosen instrument."""
+"""The change by a step of undo, in words: fields of pluck or instrument, or another instrument."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHOICES = {  # fields of `Choices`
     "pickup": "pick-up",
     "string": "string",
 }
-INSTRUMENT = {  # other fields of an instrument than parameters, by their path; the rest are named by the last part of theirs
+INSTRUMENT = {  # fields that are no parameters, by their path; the rest are named by the last part of theirs
     "name": "name of the instrument",
     "preset": "model",
     "range": "range of keys",

@@ -1,4 +1,4 @@
-"""The instrument that keys play: chosen, changed, saved; and what the instrument's strip shows of it."""
+"""The instrument that keys play: chosen, changed, saved; and what its strip shows."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ class InstrumentDesk(BrowserDesk):
             self._session.update(played=entry.instrument)
 
     def audition(self, name: str) -> None:
-        """Choose an instrument, unless it is there already, maybe changed, and play a note in the middle of its range."""
+        """Choose an instrument, unless it is there already, maybe changed, and play a note amid its range."""
         if self.chosen != name:
             self.choose(name)
         self._session.play_instrument()
@@ -314,7 +314,7 @@ class InstrumentDesk(BrowserDesk):
             self._session.update(played=entry.instrument)
 
     def compare(self, saved: bool) -> None:
-        """Let keys play the instrument as it was saved, or as it is now. The choices stay; any change of them ends it."""
+        """Let keys play the instrument as it was saved, or as it is now. The choices stay; any change ends it."""
         entry = self.entry if saved else None
         self._performance.hear_instrument(None if entry is None else entry.instrument)
         self._panel.bar.show_comparing(entry is not None)

@@ -40,7 +40,7 @@ LOOK_MS = 20
 
 
 def with_instrument(settings: Settings) -> Settings:
-    """The settings, with the instrument FIRST where no instrument was ever chosen: keys play from the first start on."""
+    """The settings, with the instrument FIRST where none was ever chosen: keys play from the first start on."""
     if settings.choices.instrument is not None:
         return settings
     with contextlib.suppress(InstrumentError):  # without an instrument, keys pluck at ten places

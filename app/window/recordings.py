@@ -1,4 +1,4 @@
-"""Recordings of what is played through the instrument: the takes of a session, of which unsaved ones are kept on disk."""
+"""Recordings of what is played through the instrument: a session's takes; unsaved ones are kept on disk."""
 
 from __future__ import annotations
 

@@ -62,9 +62,9 @@ class Settings(Value):
     @model_validator(mode="before")
     @classmethod
     def _take_old(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "instrument_favourites" in data:  # until 0.2
+        if isinstance(data, dict) and "patch_favourites" in data:  # of earlier versions
             data = dict(data)
-            data["instrument_favourites"] = data.pop("instrument_favourites")  # until 0.2
+            data["instrument_favourites"] = data.pop("patch_favourites")
         return data
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import style
 import torch
 from matplotlib.figure import Figure
-from matplotlib.instruments import Instrument
+from matplotlib.patches import Patch
 
 from engine.presets import find_preset, load_preset
 from training.family.errors import StringError, measure, player
@@ -42,7 +42,7 @@ def family_errors(errors: Mapping[str, Sequence[StringError]], name: str) -> Fig
                 positions=places,
                 widths=WIDTH * 0.9,
                 whis=(0, 100),
-                instrument_artist=True,
+                patch_artist=True,
                 manage_ticks=False,
                 medianprops={"color": "black"},
             )
@@ -52,7 +52,7 @@ def family_errors(errors: Mapping[str, Sequence[StringError]], name: str) -> Fig
         axes.set_xticks(range(len(classes)), [f"{low:g} – {high:g}" for low, high in classes])
         axes.set_xlabel("relative rise of tension at the pluck")
         axes.set_ylabel("relative MSE, first second")
-        handles = [Instrument(color=style.COLOURS[i], label=f"{label} the family") for i, label in enumerate(errors)]
+        handles = [Patch(color=style.COLOURS[i], label=f"{label} the family") for i, label in enumerate(errors)]
         axes.legend(handles=handles, loc="upper left")
         total = sum(map(len, errors.values()))
         figure.suptitle(f"{name}: {total} strings outside its training data (box: quartiles, whiskers: all)")

@@ -107,7 +107,7 @@ def pitch_hz(string: Row) -> float:
 
 
 def turned(string: Row, knobs: Row, out: Out) -> None:
-    """The string with multipliers, as `app.instruments.instrument.Knobs` says; pitch and decay rates stay, nearly.
+    """The string with multipliers, those of an instrument's knobs; pitch and decay rates stay, nearly.
 
     Each number stays within its bounds: a knob turns no string into an impossible one.
     """

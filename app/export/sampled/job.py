@@ -42,8 +42,7 @@ class SampledReport:
         samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: of the whole over the instrument. An SFZ is softer where a note would clip; a SoundFont is raised to full
-            level.
+        gain_db: of the whole. An SFZ is softer where a note would clip; a SoundFont is raised to full level.
         peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 
@@ -87,8 +86,8 @@ def export_sampled(
     Until all samples are rendered, nothing else is changed.
 
     Args:
-        render: is called with instrument, key, velocity, the time held, duration and rate, and `advanced`, a function of
-            the seconds rendered that may raise. Returns float32 (frames, channels), ±1 being full scale.
+        render: is called with instrument, key, velocity, the time held, duration and rate, and `advanced`, which gets
+            the seconds rendered and may raise. Returns float32 (frames, channels), ±1 being full scale.
 
     Raises:
         ValueError: see `planned`.

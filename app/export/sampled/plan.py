@@ -43,7 +43,7 @@ class Zone:
 
     @property
     def stem(self) -> str:
-        """The name of its file without suffix: from numbers alone, so that no instrument's name becomes part of a path."""
+        """The name of its file without suffix: from numbers alone, so that no name becomes part of a path."""
         return f"key{self.key:03d}_vel{self.velocity:03d}"
 
 
@@ -95,7 +95,7 @@ class SampledPlan:
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """The zones by key, then by velocity. Keys that the instrument's tuning leaves out are silent, and have none."""
+        """The zones by key, then by velocity. Keys that the tuning leaves out are silent, and have none."""
         return tuple(self._zone(keys, velocities) for keys in self._key_spans() for velocities in self._layers())
 
     @property

@@ -148,7 +148,8 @@ class TransportBar(QFrame):
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
             f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
-            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_INSTRUMENT}",
+            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n"
+            f"{OF_THE_INSTRUMENT}",
             partial(self.change_asked.emit, "pickup"),
         )
         self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)

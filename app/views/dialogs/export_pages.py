@@ -269,9 +269,8 @@ class PerformancePage(ExportPage):
             played = subject.played
             notes = number_of(sum(isinstance(timed_event.event, NoteOn) for timed_event in played.events), "note")
             source_title = source_words(played.source, played.difference_gain_db)
-            self.what.setText(
-                f"{played.instrument.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {source_title}"
-            )
+            seconds = f"{played.events[-1].time_s:.1f} s"
+            self.what.setText(f"{played.instrument.name}: {notes} in {seconds}, then until silent; {source_title}")
             self._wav.follow(self.file)
             self.file.suggest(subject.name + self.file.suffix)
 
@@ -328,7 +327,7 @@ class ModelsPage(ExportPage):
 
 
 class SamplerPage(ExportPage):
-    """An instrument as an instrument for samplers: format, keys, layers, length, source, place."""
+    """An instrument for samplers: format, keys, layers, length, source, place."""
 
     title = "Sampler"
     missing = "There is no instrument to export: choose one first."

@@ -103,7 +103,7 @@ class MidiDialog(QDialog):
             learn.setToolTip(problem or f"Click, then move a control to assign it to {_learnable_name(field)}")
 
     def show_instrument(self, instrument: Instrument | None) -> None:
-        """Show the use that the played instrument makes of channels and wheels; None: there is no instrument."""
+        """Show the use that the played instrument makes of channels and wheels; None: there is none."""
         for field, box in self._of_instrument.items():
             box.setEnabled(instrument is not None)
             if instrument is not None:

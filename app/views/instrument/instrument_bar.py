@@ -212,7 +212,7 @@ class InstrumentBar(ChoiceBar):
         self._show_body(chosen)
 
     def show_instrument(self, instrument: Instrument, own: bool, changed: bool = False) -> None:
-        """Show an instrument; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
+        """Show an instrument; `own`: it is the user's and can be renamed; `changed`: it differs from its file."""
         self.show_name(instrument.name, *(("●  ", ", changed") if changed else ()))
         tip = f"{instrument.name}{' (changed)' if changed else ''}\n{instrument.description}".strip()
         self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))

@@ -55,7 +55,7 @@ def fret_share(fret: float, frets: int) -> float:
 class Neck(Playable):
     """A neck, or a fan of strings.
 
-    A click plays the string that was clicked. Keys of others play the highest string at or below them, as instruments do.
+    A click plays the string that was clicked. Keys of others play the highest string at or below them.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked. So chords can be strummed with one mouse.

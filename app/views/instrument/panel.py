@@ -1,4 +1,4 @@
-"""The instrument's strip: the instrument bar, the string's knobs (if shown), the keys or the neck, and what keys play.
+"""The instrument's strip: its bar, the string's knobs (if shown), the keys or the neck, and what keys play.
 
 In a low window the string's knobs take the place of the keys and the switches of techniques. So the strip is no
 higher with them.

@@ -1,4 +1,4 @@
-"""The shipped instruments: each can be played over all its keys, at every velocity, as physics and as an instrument."""
+"""The shipped instruments: each can be played over all its keys, at every velocity, as physics and in the app."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ EVERY = pytest.mark.parametrize("instrument", INSTRUMENTS.values(), ids=INSTRUME
 
 
 def with_ends(instrument: Instrument, fields: list[str], draw: random.Random) -> Instrument:
-    """An instrument with some knobs at an end, and then all its macros; an end that another value forbids is left out."""
+    """An instrument with some knobs at an end, then all macros; an end that another value forbids is left out."""
     for field in fields:
         try:
             instrument = instrument.with_knob(field, draw.choice(OF_INSTRUMENTS[field].limits))

@@ -95,7 +95,7 @@ def test_keys_play_what_was_chosen_last() -> None:
 @pytest.mark.parametrize("preset", ["many", "one"])
 def test_choices_from_before_the_instrument_are_understood(plays: str | None, preset: str) -> None:
     instrument = played_instrument(0.2)
-    old = {"preset": preset, "instrument": instrument.model_dump(), "string": STRING, "position": 0.4}
+    old = {"preset": preset, "patch": instrument.model_dump(), "string": STRING, "position": 0.4}
     choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
     assert (choices.instrument, choices.position) == (instrument, 0.4)
     assert choices.single == (preset if plays == "place" else None)

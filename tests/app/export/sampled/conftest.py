@@ -1,4 +1,4 @@
-"""An instrument that is rendered without a model, decaying sines at the instrument's own levels, and players of samples."""
+"""An instrument that is rendered without a model, decaying sines at its levels, and players of samples."""
 
 from __future__ import annotations
 
