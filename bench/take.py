@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.playing.sources import Sources
-from app.rendering import RenderRequest, Take
+from app.rendering import NoteSound, Take
 from app.rendering.job import RenderJob
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
@@ -63,7 +63,7 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     sources = Sources()
-    request = RenderRequest(path, Pluck(), SECONDS, EARS[0], SPEED)
+    request = NoteSound(path, Pluck(), SECONDS, EARS[0], SPEED)
     _finish(RenderJob(replace(request, seconds=0.1), sources.load, _say_nothing, helper))  # loads and compiles
     job = RenderJob(request, sources.load, _say_nothing, helper)
     rendered_s, _ = _finish(job)

@@ -11,7 +11,7 @@ from app.instruments.drums import Drums
 from app.player.compiled import InstrumentPlayer
 from app.player.events import NoteOn
 from app.playing.note import PluckVoices
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from app.rendering.subject import StringOf
 from app.shared.log import log_fault
 from engine.kernels import constants as of
@@ -50,7 +50,7 @@ class KeyNote:
     event: NoteOn
     path: Path
     begin_frame: int = 0
-    request: RenderRequest | None = None
+    request: NoteSound | None = None
     string: int | None = None
     gain: float = 1.0
     match: Mapping[str, float] = field(default_factory=lambda: AS_THEY_ARE)
@@ -74,7 +74,7 @@ class KeyNote:
                 pluck = self.event.pluck or self.instrument.pluck.pluck(self.event.velocity)
                 width = pluck.width if pluck.shape == "triangular" else report.width
                 pluck = pluck.nearest(position=report.position, amplitude_mm=report.amplitude_mm, width=width)
-                self.request = RenderRequest(StringOf(self.path, report.parameters), pluck, 0.0, self.ear)
+                self.request = NoteSound(StringOf(self.path, report.parameters), pluck, 0.0, self.ear)
             self.look()
         else:
             self._ended = True

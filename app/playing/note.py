@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from app.playing.ahead import AheadSamples
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER
 from engine.kernels.constants import QUANTUM
@@ -34,7 +34,7 @@ class PluckVoices:
         ahead_of_event: it was handed over before its event is due, and may be cancelled until then.
     """
 
-    request: RenderRequest
+    request: NoteSound
     sources: tuple[str, ...]
     from_s: float = 0.0
     begin_frame: int = 0

@@ -28,7 +28,7 @@ from app.playing.note import PluckVoices
 from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from app.rendering.subject import Subject, path_of
 from app.session.monitor import Monitor
 from app.shared.log import faultless
@@ -88,7 +88,7 @@ class Notes:
         self._monitor = Monitor()
         self._ear: Ear | None = None
         self.latest: PluckVoices | KeyNote | None = None
-        self._chosen: RenderRequest | None = None
+        self._chosen: NoteSound | None = None
         self._reach: PluckRange | None = None  # of a single string, which is played; None: an instrument is
         self._dry = False
         self._ahead = Ahead(self._hand_over, self._drop)
@@ -134,7 +134,7 @@ class Notes:
                 self._chosen = replace(self._chosen, ear=ear)
         self.keys.listen(ear)
 
-    def choose(self, request: RenderRequest | None) -> None:
+    def choose(self, request: NoteSound | None) -> None:
         """Choose the pluck that loops, seeks and the next pluck at a place start from."""
         with self._lock:
             self._chosen = request

@@ -24,7 +24,7 @@ from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
 
 if TYPE_CHECKING:
-    from app.rendering.note_sound import RenderRequest
+    from app.rendering.note_sound import NoteSound
     from engine.resonators.drum import DrumModes
     from engine.resonators.surface import Surface
 
@@ -155,7 +155,7 @@ class BlowTake(Sounding):
     pickup = "pressure"
     motions: Mapping[str, ModalMotion]
 
-    def __init__(self, request: RenderRequest, modes: DrumModes) -> None:
+    def __init__(self, request: NoteSound, modes: DrumModes) -> None:
         self.request, self.modes = request, modes
         self.head = head_of(modes)
         self.seconds = self.horizon_s = request.seconds

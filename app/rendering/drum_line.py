@@ -10,7 +10,7 @@ import numpy as np
 
 from app.player.drum_keys import DrumKeys, on_the_drum
 from app.rendering.blow import RATE_HZ, BlowTake, ModalMotion
-from app.rendering.note_sound import RenderRequest, Struck
+from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Loaded, path_of
 from app.rendering.take import Signal
@@ -22,7 +22,7 @@ from training.family.motion import Blocks, model_player, true_motion
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
 
 
-def begin_blow(request: RenderRequest, struck: Struck, loaded: Loaded) -> tuple[BlowTake, dict[str, DrumLine]]:
+def begin_blow(request: NoteSound, struck: Struck, loaded: Loaded) -> tuple[BlowTake, dict[str, DrumLine]]:
     """A take of a blow and the lines of its sources.
 
     Raises:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from app.rendering.blow import BlowTake
 from app.rendering.line import SourceLine
-from app.rendering.note_sound import RenderRequest
+from app.rendering.note_sound import NoteSound
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Loaded, Subject, path_of
 from app.rendering.take import SOURCES, Listened, Take
@@ -40,7 +40,7 @@ class RenderJob:
 
     def __init__(
         self,
-        request: RenderRequest,
+        request: NoteSound,
         load: Callable[[Subject], Loaded],
         say: Callable[..., None],
         helper: Executor,
@@ -56,7 +56,7 @@ class RenderJob:
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
-    def ask_again(self, request: RenderRequest) -> None:
+    def ask_again(self, request: NoteSound) -> None:
         """Take a request for the same motion: see `same_motion` for what may differ."""
         self.request = request
 
@@ -193,7 +193,7 @@ class RenderJob:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
 
-def _begin_pluck(request: RenderRequest, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
+def _begin_pluck(request: NoteSound, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
     info, name = loaded.preset.info, loaded.preset.name
     take = Take(name, info, request.pluck, request.seconds, request.ear, loaded.stride, model=loaded.model)
     lines = {name: SourceLine(take, name, loaded) for name in SOURCES}

@@ -42,6 +42,8 @@ class NoteSound:
         preset: the file, with another string for one of many.
         seconds: the duration; of a file that ends by its decay the longest.
         ear: listening points, pick-up and soloed mode; files and listening tests have all modes.
+        speed: of the picture's slow motion; 1 is real time.
+        others: presets that are drawn beside it for the same pluck, each as the source `OTHER` + its name.
         struck: a key of an instrument, without variation. Pluck and ear are then those of its string alone. None: no
             instrument has any part in the sound.
     """
@@ -50,6 +52,8 @@ class NoteSound:
     pluck: Pluck
     seconds: float
     ear: Ear
+    speed: float = 1.0
+    others: tuple[Path, ...] = ()
     struck: Struck | None = field(default=None, kw_only=True)
 
     @property
@@ -58,6 +62,16 @@ class NoteSound:
         if self.struck is None or isinstance(self.struck.instrument.strings, Drums):
             return self
         return replace(self, struck=None)
+
+    def same_motion(self, other: NoteSound | None) -> bool:
+        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
+        return other is not None and self._motion == other._motion
+
+    @property
+    def _motion(self) -> tuple[object, ...]:
+        if self.struck is not None:
+            return path_of(self.preset), self.struck, self.seconds
+        return self.preset, self.pluck, self.seconds
 
     def load(self, rate_hz: int | None = None) -> Preset:
         """Load the preset, of many strings at a rate where the sound gives none; None: its own.
@@ -83,26 +97,3 @@ class NoteSound:
             point_words = "heard at the bridge"
         kind = ", magnetic pick-up" if self.ear.pickup == "velocity" else ""
         return f"{title}{string_words}: {pluck_words}, {point_words}{kind}{remark}"
-
-
-@dataclass(frozen=True)
-class RenderRequest(NoteSound):
-    """The sound of a pluck or of a blow on a drum, and how it is drawn.
-
-    Attributes:
-        speed: of a string's slow motion; 1 is real time.
-        others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
-    """
-
-    speed: float = 1.0
-    others: tuple[Path, ...] = ()
-
-    def same_motion(self, other: RenderRequest | None) -> bool:
-        """Return True if only listening points, slow motion or other presets differ: model and truth move alike."""
-        return other is not None and self._motion == other._motion
-
-    @property
-    def _motion(self) -> tuple[object, ...]:
-        if self.struck is not None:
-            return path_of(self.preset), self.struck, self.seconds
-        return self.preset, self.pluck, self.seconds

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 from app.rendering.job import RenderJob
-from app.rendering.note_sound import RenderRequest
+from app.rendering.note_sound import NoteSound
 from app.rendering.subject import Loaded, Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, lower_priority
@@ -53,7 +53,7 @@ class RenderWorker:
         self._helper = ThreadPoolExecutor(1, "render-helper", lower_priority, (Rank.RENDERING,))
         self._worker = Worker("render-worker", self._hear, (PresetError,), rank=Rank.RENDERING, doing="Rendering")
 
-    def submit(self, request: RenderRequest) -> None:
+    def submit(self, request: NoteSound) -> None:
         """Replace a request that waits and abandon another motion being rendered; return at once."""
         self._worker.start(partial(self._render, request))
 
@@ -69,7 +69,7 @@ class RenderWorker:
             self._rendering = None
             self._say(signal_name, *values)
 
-    def _render(self, request: RenderRequest, job: Job) -> None:
+    def _render(self, request: NoteSound, job: Job) -> None:
         while not self._sounds() and time.monotonic() < self._patient_until_s:
             job.wait(LOOK_AGAIN_S)
         rendering = self._rendering

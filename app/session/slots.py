@@ -7,7 +7,6 @@ from pathlib import Path
 
 from app.player.effects import added_words
 from app.presets.library import Library, PresetEntry
-from app.rendering import RenderRequest
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
@@ -53,7 +52,7 @@ def sound_of(choices: Choices, preset: Path, struck: Struck | None = None) -> No
     return NoteSound(subject_of(choices, preset), choices.pluck, choices.seconds, choices.ear, struck=struck)
 
 
-def request_of(choices: Choices, library: Library) -> RenderRequest | None:
+def request_of(choices: Choices, library: Library) -> NoteSound | None:
     """The chosen pluck, with the other presets that slots hold.
 
     None where its preset is not in the library, and where drums are played: no string is plucked then.
@@ -64,7 +63,7 @@ def request_of(choices: Choices, library: Library) -> RenderRequest | None:
     others = [library.find(name) for name in dict.fromkeys(map(other_preset, (choices.a, choices.b)))]
     paths = tuple(other.path for other in others if other is not None)
     subject = subject_of(choices, entry.path)
-    return RenderRequest(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)
+    return NoteSound(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)
 
 
 def through_words(choices: Choices) -> tuple[str, ...]:

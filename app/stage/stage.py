@@ -18,7 +18,7 @@ from app.player.events import KEYS, NoteOn, PluckAt
 from app.player.strings import KeyString, Strings, on_string
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
-from app.rendering import BlowTake, RenderRequest, Take
+from app.rendering import BlowTake, NoteSound, Take
 from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
 from app.session.choices import OBSERVED, Choices, with_one_pickup
@@ -60,7 +60,7 @@ class Turned:
 class Asked:
     """The motion that is to be shown is another one; None: there is none."""
 
-    request: RenderRequest | None
+    request: NoteSound | None
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Stage:
     key: Key | None = None
     note: Note | None = None
     known: bool = True
-    request: RenderRequest | None = None
+    request: NoteSound | None = None
     take: Take | BlowTake | None = None
     ready: bool = False
     complete: bool = False
@@ -181,7 +181,7 @@ class Stage:
         return Struck(instrument, event) if isinstance(event, NoteOn) else None
 
     @property
-    def blow(self) -> RenderRequest | None:
+    def blow(self) -> NoteSound | None:
         """The motion of the latest blow on the drums that are played, as it is heard now; None: there is none."""
         request, note, instrument = self.request, self.note, self.choices.instrument
         if request is None or request.struck is None or not isinstance(note, KeyNote) or instrument is None:
@@ -275,10 +275,10 @@ def _struck(stage: Stage, note: KeyNote) -> Stage:
     if not isinstance(keys, DrumKeys) or keys.of_key(event.key) is None:
         return stage
     struck = Struck(note.instrument, event)
-    return _asked(stage, RenderRequest(note.path, choices.pluck, choices.seconds, choices.ear, struck=struck))
+    return _asked(stage, NoteSound(note.path, choices.pluck, choices.seconds, choices.ear, struck=struck))
 
 
-def _asked(stage: Stage, request: RenderRequest | None) -> Stage:
+def _asked(stage: Stage, request: NoteSound | None) -> Stage:
     """The stage that asks for a motion; of a string after one of a drum, it shows none until then."""
     struck, struck_before = (asked and asked.struck is not None for asked in (request, stage.request))
     if struck != struck_before:
@@ -296,7 +296,7 @@ def _rendered(stage: Stage, event: Rendered) -> Stage:
     return replace(stage, take=event.take, ready=True, complete=event.complete, lead=None, parked_s=parked_s)
 
 
-def _is_of(note: Note, request: RenderRequest) -> bool:
+def _is_of(note: Note, request: NoteSound) -> bool:
     """Return True if a note is of the pluck, or of a blow as the one, whose motion is asked for."""
     if request.struck is not None:
         return isinstance(note, KeyNote) and note.of_drum

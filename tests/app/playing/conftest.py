@@ -17,7 +17,7 @@ from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, read_info
 from engine.values.ear import Ear
@@ -90,12 +90,12 @@ class Lab:
         seconds: float = 1.0,
         ear: Ear = EAR,
         amplitude_mm: float = 3.0,
-    ) -> RenderRequest:
-        return RenderRequest(path or self.bank, Pluck(position, amplitude_mm), seconds, ear, 1.0, others)
+    ) -> NoteSound:
+        return NoteSound(path or self.bank, Pluck(position, amplitude_mm), seconds, ear, 1.0, others)
 
     def strike(
         self,
-        plucked: RenderRequest | Path | None = None,
+        plucked: NoteSound | Path | None = None,
         *,
         from_s: float = 0.0,
         alone: bool = False,
@@ -103,7 +103,7 @@ class Lab:
         **options: Any,
     ) -> PluckVoices:
         """Chooses a pluck and plays it: as an event, or from some time or frame on."""
-        request = plucked if isinstance(plucked, RenderRequest) else self.pluck_of(plucked, **options)
+        request = plucked if isinstance(plucked, NoteSound) else self.pluck_of(plucked, **options)
         self.notes.choose(request)
         if from_s or alone or begin_frame:
             note = self.notes.ring(from_s, begin_frame, alone)
@@ -122,7 +122,7 @@ class Lab:
         """(frames,), left."""
         return self.mixer.render(round(seconds * self.mixer.rate_hz))[:, 0]
 
-    def alone(self, pluck: RenderRequest, seconds: float, source: str = "model") -> np.ndarray:
+    def alone(self, pluck: NoteSound, seconds: float, source: str = "model") -> np.ndarray:
         """The sound of one source of a pluck in a mixer of its own, (frames,)."""
         mixer = Mixer(48_000)
         mixer.add(self.sources.load(pluck.preset).voice(source, pluck.pluck, pluck.ear, 48_000))

@@ -12,7 +12,7 @@ import pytest
 
 from app.playing.ahead import CARE, LEAST_S, Ahead, AheadSamples
 from app.playing.note import PluckVoices
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from app.rendering.motion import ModelMotion
 from engine.levels import FULL_SCALE_M
 from engine.models.koopman_var import KoopmanVar
@@ -48,7 +48,7 @@ class Ahead4k:
     ) -> AheadSamples:
         pluck = Pluck(0.4, amplitude_mm)
         voice = self.model.voice("model", pluck, EAR, RATE_HZ, seconds)
-        note = PluckVoices(RenderRequest(Path(), pluck, seconds, EAR), ("model",), from_s, voices={"model": voice})
+        note = PluckVoices(NoteSound(Path(), pluck, seconds, EAR), ("model",), from_s, voices={"model": voice})
         key = key or object()
         motion = self.motions[key] = ModelMotion(self.model.model, self.model.initial_m(pluck), seconds)
         samples = AheadSamples(voice, motion, key, from_s)

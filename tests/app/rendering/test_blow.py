@@ -15,7 +15,7 @@ from app.instruments.drums import Drums, PlayedDrum
 from app.instruments.instrument import Instrument
 from app.player.drum_keys import DrumKeys
 from app.player.events import NoteOn
-from app.rendering import RenderRequest, Take, drum_line
+from app.rendering import NoteSound, Take, drum_line
 from app.rendering.blow import RATE_HZ, BlowTake, Head
 from app.rendering.job import RenderJob
 from app.rendering.note_sound import Struck
@@ -81,11 +81,11 @@ def helper() -> Iterator[Executor]:
         yield pool
 
 
-def request_of(instrument: Instrument, velocity: int = 127, seconds: float = 0.25) -> RenderRequest:
-    return RenderRequest(PRESET, Pluck(), seconds, Ear((0.5,)), struck=Struck(instrument, NoteOn(60, velocity)))
+def request_of(instrument: Instrument, velocity: int = 127, seconds: float = 0.25) -> NoteSound:
+    return NoteSound(PRESET, Pluck(), seconds, Ear((0.5,)), struck=Struck(instrument, NoteOn(60, velocity)))
 
 
-def rendered(request: RenderRequest, helper: Executor) -> BlowTake:
+def rendered(request: NoteSound, helper: Executor) -> BlowTake:
     log = Log()
     job = RenderJob(request, lambda _: LOADED, log.say, helper)
     while not job.idle:

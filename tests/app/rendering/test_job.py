@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.playing.sources import Sources
-from app.rendering import SOURCES, BlowTake, RenderRequest, Take
+from app.rendering import SOURCES, BlowTake, NoteSound, Take
 from app.rendering.job import RenderJob
 from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
@@ -62,7 +62,7 @@ def job(sources: Sources) -> Iterator[Callable[..., RenderJob]]:
     helper = ThreadPoolExecutor(1)
 
     def made(preset: Any, **changes: Any) -> RenderJob:
-        request = replace(RenderRequest(preset, PLUCK, 0.25, Ear((0.37,)), 0.004), **changes)
+        request = replace(NoteSound(preset, PLUCK, 0.25, Ear((0.37,)), 0.004), **changes)
         return RenderJob(request, sources.load, Heard().say, helper)
 
     yield made

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from app.playing.sources import Sources
-from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import NoteSound, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import SourceLine
 from engine.models._diagonal import KoopmanState
@@ -70,8 +70,8 @@ def worker(heard: Heard, sources: Sources) -> Iterator[RenderWorker]:
     wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
 
 
-def request_of(preset: Path, **changes: object) -> RenderRequest:
-    return replace(RenderRequest(preset, Pluck(0.4, 3.0), 1.0, EAR, 0.004), **changes)  # type: ignore[arg-type]
+def request_of(preset: Path, **changes: object) -> NoteSound:
+    return replace(NoteSound(preset, Pluck(0.4, 3.0), 1.0, EAR, 0.004), **changes)  # type: ignore[arg-type]
 
 
 def test_the_latest_request_wins(small_preset: Path, heard: Heard, sources: Sources) -> None:

@@ -9,17 +9,17 @@ from typing import Any
 from app.instruments.library import SHIPPED, read_instrument
 from app.player.strings import Strings
 from app.playing.note import PluckVoices
-from app.rendering import RenderRequest
+from app.rendering import NoteSound
 from app.session.choices import Choices
 from app.stage.stage import Asked, Begun, Chosen, Parked, Rendered, Turned, first_stage, next_stage
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 
 HARP, GUITAR = (read_instrument(SHIPPED / f"{name}.json") for name in ("concert_harp", "classical_guitar"))
-REQUEST = RenderRequest(Path("one"), Pluck(0.3), 1.0, Ear((0.2,)))
+REQUEST = NoteSound(Path("one"), Pluck(0.3), 1.0, Ear((0.2,)))
 
 
-def note(request: RenderRequest = REQUEST, from_s: float = 0.0) -> Any:
+def note(request: NoteSound = REQUEST, from_s: float = 0.0) -> Any:
     return PluckVoices(request, ("model",), from_s)
 
 
@@ -45,6 +45,6 @@ def test_the_playhead_follows_the_note_of_the_motion_until_it_is_parked() -> Non
     assert next_stage(parked, Asked(REQUEST)).position_s(0.1) == 0.7 and not parked.audible
     turned = next_stage(parked, Turned(second))
     assert turned.lead is second and turned.position_s(0.1) == 0.4
-    other = RenderRequest(Path("one"), Pluck(0.6), 1.0, REQUEST.ear)
+    other = NoteSound(Path("one"), Pluck(0.6), 1.0, REQUEST.ear)
     assert next_stage(turned, Asked(other)).ready is False, "another motion is awaited"
     assert next_stage(turned, Begun(note(other))).lead is second, "its motion is another"
