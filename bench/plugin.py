@@ -28,8 +28,8 @@ from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Instance, Library, note_on
 from training.cli.console import ProgressReport
 
-INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")
-NOTES, VELOCITY = 30, 102
+INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp", "sitar")
+NOTES, VELOCITY = 36, 102
 BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 40
 
 
@@ -41,6 +41,7 @@ class PluginCost:
         modes: of the lowest note.
         app_faster, plugin_faster: than real time, at 48 kHz in blocks of 512.
         ratio: of the plug-in to the app.
+        busiest_block: share of a core of the plug-in's slowest block in two seconds from the strokes on.
     """
 
     instrument: str
@@ -49,6 +50,7 @@ class PluginCost:
     app_faster: float
     plugin_faster: float
     ratio: float
+    busiest_block: float
 
 
 def measure(report: ProgressReport) -> dict[str, Any]:
@@ -78,16 +80,18 @@ def _cost(name: str, instrument: Instrument, preset: Preset, instance: Instance)
     player.mixer.render(BLOCK_FRAMES)
     instance.render(BLOCK_FRAMES, [note_on(0, key, VELOCITY) for key in keys])
     next_block = instance.repeated(np.zeros((2, BLOCK_FRAMES), np.float32))
+    busiest_s = max(_taken_s(next_block, 1) for _ in range(2 * RATE_HZ // BLOCK_FRAMES))
     rounds = [(_taken_s(lambda: player.mixer.render(BLOCK_FRAMES)), _taken_s(next_block)) for _ in range(ROUNDS)]
     instance.destroy()
     app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
     string, sound_s = Strings(instrument).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
     modes = string.modes if string is not None else 0
-    return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s, app_s / plugin_s)
+    busiest = busiest_s * RATE_HZ / BLOCK_FRAMES
+    return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s, app_s / plugin_s, busiest)
 
 
-def _taken_s(render: Callable[[], object]) -> float:
+def _taken_s(render: Callable[[], object], blocks: int = BLOCKS) -> float:
     began_s = time.thread_time()
-    for _ in range(BLOCKS):
+    for _ in range(blocks):
         render()
     return time.thread_time() - began_s
