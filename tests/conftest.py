@@ -1,7 +1,5 @@
 """A small preset that needs no training, for every test that reads, renders or plays one."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

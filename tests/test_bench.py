@@ -1,7 +1,5 @@
 """The benchmarks' command line: every benchmark parses its options, and the documents name those that there are."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path
@@ -15,8 +13,8 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 
 
-def test_every_benchmark_parses_its_options_and_the_documents_name_no_other(capsys) -> None:  # type: ignore[no-untyped-def]
-    commands: dict[str, Any] = typer.main.get_command(bench).commands  # type: ignore[attr-defined]
+def test_every_benchmark_parses_its_options_and_the_documents_name_no_other(capsys):
+    commands: dict[str, Any] = typer.main.get_command(bench).commands
     for name in commands:
         assert main([name, "--help"]) == 0
         assert f"run.py bench {name}" in capsys.readouterr().out

@@ -52,14 +52,14 @@ def run(program: Path, *words: str, folder: Path) -> str:
     return done.stdout
 
 
-def test_its_command_line_renders_the_same_note(program: Path, tmp_path: Path) -> None:
+def test_its_command_line_renders_the_same_note(program, tmp_path):
     run(program, "render", "studio_any_string", "bundle.wav", *NOTE, folder=tmp_path)
     assert cli.main(["render", "studio_any_string", str(tmp_path / "source.wav"), *NOTE]) == 0
     bundle, source = (soundfile.read(tmp_path / f"{name}.wav")[0] for name in ("bundle", "source"))
     np.testing.assert_allclose(bundle, source, atol=2e-5)  # other instructions of the processor round differently
 
 
-def test_it_finds_its_compiled_kernels_where_it_was_moved(program: Path, tmp_path: Path) -> None:
+def test_it_finds_its_compiled_kernels_where_it_was_moved(program, tmp_path):
     kernels = program.parent / "_internal/engine/kernels/__pycache__"
     before = {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")}
     run(program, "-P", "-m", "engine.warm", folder=tmp_path)
@@ -67,12 +67,12 @@ def test_it_finds_its_compiled_kernels_where_it_was_moved(program: Path, tmp_pat
     assert {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")} == before
 
 
-def test_its_window_opens(program: Path, tmp_path: Path) -> None:
+def test_its_window_opens(program, tmp_path):
     run(program, "-P", "-c", WINDOW, folder=tmp_path)
     assert list(tmp_path.rglob("settings.json"))
 
 
-def test_it_says_that_it_builds_no_plugins(program: Path, tmp_path: Path) -> None:
+def test_it_says_that_it_builds_no_plugins(program, tmp_path):
     environment = {"PATH": "", "HOME": str(tmp_path)}
     done = subprocess.run([program, "plugin", "concert_harp"], env=environment, capture_output=True, text=True)
     assert done.returncode == 1

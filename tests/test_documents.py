@@ -1,7 +1,5 @@
 """What the documents show is there: links, commands and their options, tables, examples, notebooks, sizes."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
@@ -28,7 +26,7 @@ def text(name: str) -> str:
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
-def test_links_lead_somewhere(path: Path) -> None:
+def test_links_lead_somewhere(path):
     links = re.findall(r"\]\(([^)#\s]+)", path.read_text("utf-8"))
     local = [link for link in links if "://" not in link and link not in GENERATED]
     assert [link for link in local if not (path.parent / link).exists()] == []
@@ -37,11 +35,11 @@ def test_links_lead_somewhere(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "lines"), [("README.md", 120), ("RESULTS.md", 200), ("CHANGELOG.md", 60), ("docs/many-strings.md", 160)]
 )
-def test_documents_are_short(name: str, lines: int) -> None:
+def test_documents_are_short(name, lines):
     assert len(text(name).splitlines()) <= lines
 
 
-def test_sounds_and_pictures_are_small() -> None:
+def test_sounds_and_pictures_are_small():
     sounds, pictures = (ROOT / "docs" / name for name in ("sounds", "images"))
     assert sum(path.stat().st_size for path in sounds.iterdir() if path.is_file()) < 1.5e6
     assert all(path.stat().st_size < 6e5 for path in pictures.iterdir() if path.is_file())
@@ -66,7 +64,7 @@ def commands() -> Iterator[tuple[str, list[str]]]:
                     yield path.name, shlex.split(f"{first} {others}")
 
 
-def test_commands_and_their_options_exist() -> None:
+def test_commands_and_their_options_exist():
     found = list(commands())
     assert len(found) > 20
     for where, words in found:
@@ -79,7 +77,7 @@ def test_commands_and_their_options_exist() -> None:
         assert not set(used) - options, f"{where}: {command.name} has no option {set(used) - options}"
 
 
-def test_presets_and_instruments_that_are_named_exist() -> None:
+def test_presets_and_instruments_that_are_named_exist():
     shipped = {path.stem for path in (ROOT / "presets").glob("*.safetensors")}
     for where, words in commands():
         if words[0] in ("render", "compare", "predict"):
@@ -88,7 +86,7 @@ def test_presets_and_instruments_that_are_named_exist() -> None:
             assert not set(presets) - shipped, where
 
 
-def test_results_hold_the_tables_of_the_rows() -> None:
+def test_results_hold_the_tables_of_the_rows():
     from training.results import RESULTS, read_results
     from training.tables.compact import as_compact
 
@@ -96,7 +94,7 @@ def test_results_hold_the_tables_of_the_rows() -> None:
     assert tables == as_compact(read_results(RESULTS)), "write them again: table --into RESULTS.md"
 
 
-def test_the_table_of_the_readme_is_of_the_results() -> None:
+def test_the_table_of_the_readme_is_of_the_results():
     results = text("RESULTS.md")
     rows = re.findall(
         r"^\| ([\w ]+?)(?: \(ours\))? +\| (400|4000) +\| (.+?) \| (\S+) \| (\S+) \| (\d) \|$", text("README.md"), re.M
@@ -109,7 +107,7 @@ def test_the_table_of_the_readme_is_of_the_results() -> None:
         assert found[6].startswith(f"{ours} ({paper})"), found  # noise, 4 kHz
 
 
-def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
+def test_the_model_of_the_worked_example_is_a_linear_string():
     from engine.models.base import Physics
     from engine.values.string import StringParameters
 
@@ -134,7 +132,7 @@ def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_notebooks_run(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     matplotlib.use("agg")
     names: dict[str, Any] = {"__name__": "__main__"}
@@ -145,7 +143,7 @@ def test_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert list(tmp_path.glob("*.png"))
 
 
-def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
+def test_the_run_of_the_documents_is_a_configuration(tmp_path):
     from training.cell import load
 
     (example,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
@@ -154,7 +152,7 @@ def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
     assert load(str(path)).model == "koopman_var"
 
 
-def test_the_smallest_instrument_of_the_documents_is_one() -> None:
+def test_the_smallest_instrument_of_the_documents_is_one():
     from app.instruments.instrument import Instrument
 
     (example,) = re.findall(r"```json\n(.*?)```", text("docs/instruments.md"), re.DOTALL)
@@ -164,7 +162,7 @@ def test_the_smallest_instrument_of_the_documents_is_one() -> None:
 @pytest.mark.parametrize(
     ("page", "title"), [("instruments", "### Other fields"), ("drums", "## Write a drum by hand")]
 )
-def test_the_fields_that_a_page_names_exist(page: str, title: str) -> None:
+def test_the_fields_that_a_page_names_exist(page, title):
     from app.instruments.instrument import Instrument
 
     section = text(f"docs/{page}.md").partition(title)[2].partition("\n#")[0]

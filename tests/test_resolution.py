@@ -1,7 +1,5 @@
 """What run.py and extras install has wheels, resolved by uv for each Python and system of docs/install.md."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -49,7 +47,7 @@ def resolved(cells: Sequence[Cell]) -> dict[Cell, subprocess.CompletedProcess[st
     return found
 
 
-def test_every_python_and_system_installs_from_wheels() -> None:
+def test_every_python_and_system_installs_from_wheels():
     found = resolved([(python, system) for python in PYTHONS for system in SYSTEMS])
     assert {cell: done.stderr for cell, done in found.items() if done.returncode != 0} == {}
     installed = {line.split("==")[0] for done in found.values() for line in done.stdout.splitlines()}
@@ -58,7 +56,7 @@ def test_every_python_and_system_installs_from_wheels() -> None:
     assert sorted(name for name in installed - pinned if not name.startswith(CUDA)) == []
 
 
-def test_documents_name_these_pythons_and_systems() -> None:
+def test_documents_name_these_pythons_and_systems():
     readme, install = ((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/install.md"))
     assert [row for row in SYSTEMS.values() if row not in install] == []
     for text in (readme, install):

@@ -34,7 +34,7 @@ def run(*command: object, folder: Path, **variables: str) -> str:
     return done.stdout
 
 
-def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
+def test_a_wheel_has_presets_recipes_and_pictures(tmp_path):
     source, installed, elsewhere = (tmp_path / name for name in ("source", "installed", "elsewhere"))
     for name in ("engine", "training", "app", "presets"):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))

@@ -1,7 +1,5 @@
 """Plain English: a word list over strings, comments, names and Markdown; sentences and commit subjects."""
 
-from __future__ import annotations
-
 import ast
 import io
 import re
@@ -87,7 +85,7 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
             yield number, re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "`code`", line))
 
 
-def test_no_word_of_the_list_is_used() -> None:
+def test_no_word_of_the_list_is_used():
     found = []
     holding = (path for path in {*PROSE, *CODE} - {Path(__file__)} if WORDS.search(source(path)))
     for path in holding:  # a few files, whose tokens show where
@@ -101,7 +99,7 @@ def test_no_word_of_the_list_is_used() -> None:
     assert not found, "\n" + "\n".join(found)
 
 
-def test_no_name_has_a_word_of_the_list() -> None:
+def test_no_name_has_a_word_of_the_list():
     known = re.compile(rf"(?<![^\W_])({'|'.join(NAMES)})(?![^\W_])", re.IGNORECASE)
     found = {
         f"{path.relative_to(ROOT)}:{token.start[0]}: {token.string}"
@@ -134,7 +132,7 @@ def long_sentences(lines: Iterable[tuple[int, str]], longest: int) -> list[tuple
 
 
 @pytest.mark.parametrize("path", PROSE, ids=lambda path: path.name)
-def test_sentences_are_short(path: Path) -> None:
+def test_sentences_are_short(path):
     long = long_sentences(prose(path), LONGEST)
     assert not long, "\n" + "\n".join(f"{path.name}:{number}: {each}" for number, each in long)
 
@@ -154,7 +152,7 @@ def docstrings(name: str) -> Iterator[tuple[str, ast.AST, bool, ast.Constant]]:
 
 
 @pytest.mark.parametrize("name", PRODUCT)
-def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
+def test_docstrings_begin_with_a_noun_or_a_verb(name):
     found = []
     for file, node, own, text in docstrings(name):
         function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
@@ -164,7 +162,7 @@ def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PRODUCT)
-def test_sentences_of_docstrings_are_short(name: str) -> None:
+def test_sentences_of_docstrings_are_short(name):
     found = []
     for file, _, _, text in docstrings(name):
         plain = re.sub(r"``?[^`]*``?", lambda code: "`code`" + "\n" * code[0].count("\n"), text.value)
@@ -173,7 +171,7 @@ def test_sentences_of_docstrings_are_short(name: str) -> None:
     assert not found, "\n" + "\n".join(found)
 
 
-def test_commit_subjects_name_their_area_and_are_short() -> None:
+def test_commit_subjects_name_their_area_and_are_short():
     done = subprocess.run(
         ["git", "log", "--no-merges", "--format=%h %s", f"{SINCE}..HEAD"], cwd=ROOT, capture_output=True, text=True
     )

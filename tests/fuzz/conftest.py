@@ -1,7 +1,5 @@
 """How long the attack lasts: a moment in the suite, thousands of files with `run.py test --fuzz`."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """What reading a file costs: processor time, and memory beyond what the process held before."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

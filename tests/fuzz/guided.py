@@ -7,8 +7,6 @@ own. What is refused must be refused by that reader's own error, in one line; th
 hold is kept in the present folder, and its traceback is printed. Status 1 where there is any.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import subprocess

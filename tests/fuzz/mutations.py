@@ -1,7 +1,5 @@
 """Damaged files: bytes changed at random, and texts with values that are too many, too large, or of another kind."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random

@@ -1,7 +1,5 @@
 """Every reader of files: a whole file of its kind, how it is damaged, and the error that is the reader's own."""
 
-from __future__ import annotations
-
 import io
 import json
 import random

@@ -1,7 +1,5 @@
 """Any data to any reader: a value, or that reader's own error."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -33,13 +31,13 @@ VALUES = st.recursive(
 
 
 def fields_of(kind: type, *more: str) -> st.SearchStrategy[dict[str, Any]]:
-    known = getattr(kind, "model_fields", None) or kind.__dataclass_fields__  # type: ignore[attr-defined]
+    known = getattr(kind, "model_fields", None) or kind.__dataclass_fields__
     return st.dictionaries(st.sampled_from(sorted([*known, *more])) | st.text(max_size=8), VALUES, max_size=6)
 
 
 @pytest.mark.parametrize("kind", [PresetInfo, StringParameters, TrainingConfiguration])
 @given(data=st.data())
-def test_any_data_is_read_or_refused(kind: type, data: st.DataObject) -> None:
+def test_any_data_is_read_or_refused(kind, data):
     plain = data.draw(fields_of(kind))
     try:
         value = read(kind, plain, "there")
@@ -50,9 +48,7 @@ def test_any_data_is_read_or_refused(kind: type, data: st.DataObject) -> None:
 
 
 @given(facts=fields_of(Settings), choices=fields_of(Choices, "preset", "instrument", "keys_play"))
-def test_any_settings_file_lets_the_app_start(
-    tmp_path_factory: pytest.TempPathFactory, facts: dict[str, Any], choices: dict[str, Any]
-) -> None:
+def test_any_settings_file_lets_the_app_start(tmp_path_factory, facts, choices):
     path = tmp_path_factory.getbasetemp() / "settings.json"
     path.write_text(json.dumps({**facts, "choices": choices}))
     settings, notice = load_settings(path)
@@ -61,7 +57,7 @@ def test_any_settings_file_lets_the_app_start(
 
 @pytest.mark.parametrize("kind", [Instrument, SoundRecipe])
 @given(data=st.data())
-def test_any_document_is_checked(kind: type[Instrument | SoundRecipe], data: st.DataObject) -> None:
+def test_any_document_is_checked(kind, data):
     facts = data.draw(fields_of(kind))
     try:
         value = kind.model_validate(facts)
@@ -77,9 +73,7 @@ def test_any_document_is_checked(kind: type[Instrument | SoundRecipe], data: st.
     points=st.integers(-5, 20_000),
     rate_hz=st.floats(0.01, 1e9),
 )
-def test_a_string_within_bounds_can_be_computed(
-    factors: list[float], modes: int, points: int, rate_hz: float
-) -> None:
+def test_a_string_within_bounds_can_be_computed(factors, modes, points, rate_hz):
     """Whatever passes has tables of ordinary size, modes that oscillate, and finite motion."""
     plain = {name: value * by for (name, value), by in zip(write(StringParameters()).items(), factors, strict=True)}
     try:
@@ -98,13 +92,13 @@ def test_a_string_within_bounds_can_be_computed(
 
 
 @given(st.text(max_size=3_000))
-def test_a_message_is_one_printable_line(text: str) -> None:
+def test_a_message_is_one_printable_line(text):
     line = one_line(text)
     assert line.isprintable() and len(line) <= LONGEST_MESSAGE and one_line(line) == line
 
 
 @given(st.binary(max_size=300) | st.text(max_size=300))
-def test_json_is_plain_data_or_refused(text: bytes | str) -> None:
+def test_json_is_plain_data_or_refused(text):
     try:
         parse_json(text, "there")
     except SchemaError as error:

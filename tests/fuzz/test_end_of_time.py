@@ -5,10 +5,6 @@ where the string itself is long silent. `run.py test --fuzz` renders all presets
 before it; those whose end costs little are in the suite.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -33,7 +29,7 @@ PRESETS = sorted(SHIPPED.glob("*.safetensors"))
 
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
-def test_a_shipped_preset_is_silent_in_the_end(path: Path) -> None:
+def test_a_shipped_preset_is_silent_in_the_end(path):
     info = read_info(path)
     compiled = info.model in CHEAP and (info.rate_hz == 4000 or info.model == "dmd")
     if not (LONG or compiled or path.stem in RENDERED):
@@ -53,7 +49,7 @@ def test_a_shipped_preset_is_silent_in_the_end(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
-def test_a_shipped_preset_gives_its_place_free_where_it_is_played(path: Path) -> None:
+def test_a_shipped_preset_gives_its_place_free_where_it_is_played(path):
     """Compiled voices; all others have a last sample."""
     info = read_info(path)
     if not LONG and info.rate_hz != 4000:

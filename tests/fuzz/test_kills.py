@@ -1,7 +1,5 @@
 """Any order of kill and rerun ends with the same files: works are killed at random moments, and begun again."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import random
@@ -45,7 +43,7 @@ def context() -> Iterator[multiprocessing.context.BaseContext]:
 
 
 def begun(context: multiprocessing.context.BaseContext, name: str, folder: Path) -> multiprocessing.Process:
-    process = context.Process(target=getattr(works, name), args=(folder,))  # type: ignore[attr-defined]
+    process = context.Process(target=getattr(works, name), args=(folder,))
     process.start()
     return process
 
@@ -56,9 +54,7 @@ def emptied(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", works.WORKS)
-def test_a_killed_work_ends_as_if_it_had_not_been(
-    name: str, context: multiprocessing.context.BaseContext, tmp_path: Path, seed: int
-) -> None:
+def test_a_killed_work_ends_as_if_it_had_not_been(name, context, tmp_path, seed):
     folder, kills = tmp_path / "work", KILLS[name][LONG]
     if not kills:
         pytest.skip("run.py test --fuzz has it")

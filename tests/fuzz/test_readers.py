@@ -1,7 +1,5 @@
 """Hostile files to every reader: each is refused in one line by its own error, or does no harm, at little cost."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -69,9 +67,7 @@ def cost_of(target: Target, path: Path, costs: Costs | None = None) -> Costs:
 
 
 @EVERY
-def test_a_whole_file_is_read_and_a_damaged_or_huge_one_does_no_harm(
-    target: Target, folder: Path, tmp_path: Path, rounds: int, seed: int
-) -> None:
+def test_a_whole_file_is_read_and_a_damaged_or_huge_one_does_no_harm(target, folder, tmp_path, rounds, seed):
     """Only the first reading pays what is loaded once. The rest of a huge file takes no place on the disk."""
     whole, path = target.whole(tmp_path), folder / target.name
     path.write_bytes(whole)
@@ -93,7 +89,7 @@ def test_a_whole_file_is_read_and_a_damaged_or_huge_one_does_no_harm(
 
 @EVERY
 @given(data=st.binary(max_size=400))
-def test_any_bytes_are_read_or_refused(target: Target, tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+def test_any_bytes_are_read_or_refused(target, tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "any" / target.name
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(data)
@@ -106,13 +102,13 @@ def test_any_bytes_are_read_or_refused(target: Target, tmp_path_factory: pytest.
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
 @EVERY
-def test_a_pipe_keeps_nobody_waiting(target: Target, folder: Path) -> None:
+def test_a_pipe_keeps_nobody_waiting(target, folder):
     os.mkfifo(folder / target.name)
     reported: list[BaseException | None] = []
 
     def attempt() -> None:
         try:
-            reported.append(target.read(folder / target.name))  # type: ignore[func-returns-value, arg-type]
+            reported.append(target.read(folder / target.name))
         except BaseException as caught:
             reported.append(caught)
 
@@ -150,7 +146,7 @@ BOMBS: dict[str, tuple[str, bytes | str]] = {  # small files that would cost gig
 
 
 @pytest.mark.parametrize("kind", BOMBS)
-def test_a_small_file_that_would_cost_much_is_refused(kind: str, folder: Path) -> None:
+def test_a_small_file_that_would_cost_much_is_refused(kind, folder):
     name, content = BOMBS[kind]
     path, target, costs = folder / name, OF_NAME[name], Costs()
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -160,7 +156,7 @@ def test_a_small_file_that_would_cost_much_is_refused(kind: str, folder: Path) -
     assert (costs.largest_mb or 0) <= MOST_MB, costs
 
 
-def test_ordinary_dots_and_the_largest_song_are_read(folder: Path) -> None:
+def test_ordinary_dots_and_the_largest_song_are_read(folder):
     path = folder / "a.toml"
     path.write_text(f'a.b."c.d".e = [{", ".join(["0.5"] * 900)}]\nversion = "1.2.3.4.5.6.7.8"\n[x.y.z]\nk = 1e-3\n')
     assert read_toml(path)["a"]["b"]["c.d"]["e"] == [0.5] * 900
@@ -180,7 +176,7 @@ SETTINGS: dict[str, dict[str, object]] = {
 
 
 @pytest.mark.parametrize("kind", SETTINGS)
-def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(kind: str, folder: Path) -> None:
+def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(kind, folder):
     path, costs = folder / "settings.json", Costs()
     path.write_text(json.dumps(SETTINGS[kind]))
     with costs.reading():
@@ -190,7 +186,7 @@ def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(kind: str
     assert (costs.largest_mb or 0) <= MOST_MB, costs
 
 
-def test_numbers_of_many_digits_are_bounded_before_any_arithmetic() -> None:
+def test_numbers_of_many_digits_are_bounded_before_any_arithmetic():
     assert SoundRecipe.model_fields["preset_rate_hz"].metadata
     with pytest.raises(ValueError, match="preset_rate_hz"):
         SoundRecipe.model_validate({"preset_rate_hz": 10**400})
@@ -211,7 +207,7 @@ def lists_good(lister: Callable[[Path], tuple[list, list[str]]], folder: Path, p
 
 
 @pytest.mark.parametrize("kind", ["presets", "instruments"])
-def test_a_strangers_file_hides_no_other(kind: str, folder: Path, small_preset: Path, rounds: int, seed: int) -> None:
+def test_a_strangers_file_hides_no_other(kind, folder, small_preset, rounds, seed):
     facts = {**json.loads(INSTRUMENT.read_bytes()), "tuning": {"scale": SCALE.decode(), "keymap": KEYMAP.decode()}}
     whole, damage, lister, ending = {
         "presets": (small_preset.read_bytes(), damaged_preset, list_presets, "safetensors"),
@@ -228,9 +224,7 @@ def test_a_strangers_file_hides_no_other(kind: str, folder: Path, small_preset: 
     attacked(kind, rounds // 4, seed, attack, costs)
 
 
-def test_a_dropped_sound_is_a_recipe_a_recording_a_body_or_refused(
-    small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_dropped_sound_is_a_recipe_a_recording_a_body_or_refused(small_preset, tmp_path, rounds, seed, monkeypatch):
     """Its reader is chosen by what is in it."""
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
     library = Library([])
@@ -252,9 +246,7 @@ def test_a_dropped_sound_is_a_recipe_a_recording_a_body_or_refused(
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
-def test_pipes_and_folders_that_cannot_be_looked_into_hide_nothing(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, small_preset: Path
-) -> None:
+def test_pipes_and_folders_that_cannot_be_looked_into_hide_nothing(folder, monkeypatch, small_preset):
     for name in ("settings.json", "heard.csv", "x.safetensors"):
         os.mkfifo(folder / name)
     assert load_settings(folder / "settings.json")[0] == Settings()
@@ -271,7 +263,7 @@ def test_pipes_and_folders_that_cannot_be_looked_into_hide_nothing(
     assert usable_files()
 
 
-def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path: Path) -> None:
+def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path):
     for path, reported in ((tmp_path, "ordinary"), (Path("a\0b"), "name")):
         with pytest.raises(UnusableFile, match=reported):
             read_bounded(path, 10)

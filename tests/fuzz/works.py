@@ -3,8 +3,6 @@
 A process that has imported this has loaded all that the works need, so that its children begin at once.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """Data and runs that are small enough for a test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A run trained alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

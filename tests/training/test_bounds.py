@@ -1,9 +1,5 @@
 """Plans and configurations that would take for ever are refused when they are read, before data are made."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from engine.schema import SchemaError
@@ -46,7 +42,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_a_configuration_is_refused_by_file_and_field(kind: str, tmp_path: Path) -> None:
+def test_a_configuration_is_refused_by_file_and_field(kind, tmp_path):
     text, message = FAULTS[kind]
     path = tmp_path / "run.toml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -56,9 +52,7 @@ def test_a_configuration_is_refused_by_file_and_field(kind: str, tmp_path: Path)
     assert str(path) in reported and len(reported) <= 500 and reported.isprintable()
 
 
-def test_a_plan_of_sixteen_million_cells_is_refused_before_one_is_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_plan_of_sixteen_million_cells_is_refused_before_one_is_made(tmp_path, monkeypatch):
     monkeypatch.setattr("training.sweeping.plan.Cell", None)
     seeds = ", ".join(map(str, range(1000)))
     path = tmp_path / "plan.toml"

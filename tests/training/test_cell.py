@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 
@@ -21,7 +19,7 @@ EVERY_CELL = [
 ]
 
 
-def test_every_cell_of_the_tables_can_be_built_from_its_name() -> None:
+def test_every_cell_of_the_tables_can_be_built_from_its_name():
     assert len({cell.name for cell in EVERY_CELL}) == len({cell.title for cell in EVERY_CELL}) == len(EVERY_CELL)
     assert all(Cell.parse(cell.name) == cell for cell in EVERY_CELL)
     some = EVERY_CELL[::31]  # of every model, string, data set, horizon, recipe and seed
@@ -34,7 +32,7 @@ def test_every_cell_of_the_tables_can_be_built_from_its_name() -> None:
 
 @pytest.mark.parametrize("model", OF_CELLS)
 @pytest.mark.parametrize("recipe", ["ours", "paper", "published"])
-def test_a_recipe_starts_as_its_model_can(model: str, recipe: str) -> None:
+def test_a_recipe_starts_as_its_model_can(model, recipe):
     configuration = configuration_of(Cell(model, True, "noise", 16000, recipe=recipe))
     assert configuration.recipe.start in ("", *starts_of(model))
 
@@ -53,12 +51,12 @@ DIGESTS = {
 
 
 @pytest.mark.parametrize("cell", DIGESTS, ids=lambda cell: cell.name)
-def test_a_digest_is_for_good(cell: Cell) -> None:
+def test_a_digest_is_for_good(cell):
     """Rows are known by it: where this fails, a default has changed; leave it."""
     assert configuration_of(cell).digest == DIGESTS[cell]
 
 
-def test_a_digest_covers_what_a_run_has_by_default_and_its_seed_but_no_title(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_digest_covers_what_a_run_has_by_default_and_its_seed_but_no_title(monkeypatch):
     found = configuration_of(Cell("lru", True, "noise", 4000))
     assert replace(found, model_configuration={"state_size": 128}).digest == found.digest
     assert configuration_of(Cell("lru", True, "noise", 4000), {"count": 1000}).digest == found.digest
@@ -87,7 +85,7 @@ def test_a_digest_covers_what_a_run_has_by_default_and_its_seed_but_no_title(mon
         ("nylon_nonlinear_noise_4k_koopman_tension", "`family train` trains it"),
     ],
 )
-def test_a_name_that_is_no_cell_is_reported(name: str, words: str) -> None:
+def test_a_name_that_is_no_cell_is_reported(name, words):
     with pytest.raises(SchemaError, match=words):
         load(name)
 
@@ -100,6 +98,6 @@ def test_a_name_that_is_no_cell_is_reported(name: str, words: str) -> None:
         ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
     ],
 )
-def test_wrong_overrides_are_reported(data: dict[str, int], recipe: dict[str, int], words: str) -> None:
+def test_wrong_overrides_are_reported(data, recipe, words):
     with pytest.raises(SchemaError, match=words):
         configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)

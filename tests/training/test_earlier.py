@@ -1,7 +1,5 @@
 """Configurations of earlier versions keep their meaning."""
 
-from __future__ import annotations
-
 import pytest
 
 from engine.models import build_model
@@ -13,7 +11,7 @@ from training.results import RESULTS, read_results
 CELL = Cell("lru", True, "gaussian", 4000, 400)
 
 
-def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> None:
+def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today():
     now = configuration_of(CELL)
     plain = write(now)
     plain["recipe"] |= {"random_start": False, "koopman_terms": "text"}
@@ -35,7 +33,7 @@ def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> Non
         (Cell("lru", True, "noise", 4000, recipe="paper"), {"blind": False, "initialisation": ""}),
     ],
 )
-def test_the_flags_of_before_starts_had_one_name_are_read(cell: Cell, flags: dict[str, object]) -> None:
+def test_the_flags_of_before_starts_had_one_name_are_read(cell, flags):
     now = configuration_of(cell)
     plain = write(now)
     del plain["recipe"]["start"]
@@ -44,7 +42,7 @@ def test_the_flags_of_before_starts_had_one_name_are_read(cell: Cell, flags: dic
     assert (found.start, found.digest) == (now.start, now.digest)
 
 
-def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_the_value_that_they_had() -> None:
+def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_the_value_that_they_had():
     now = configuration_of(Cell("koopman_integrated", True, "gaussian", 16_000))
     assert now.digest in {row.digest for row in read_results(RESULTS)}
     gone = {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}

@@ -1,7 +1,5 @@
 """Eigenvalues of models before training: those of the string that they start from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -22,9 +20,7 @@ SIZES: list[tuple[str, int, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("model", "layers", "sizes"), SIZES, ids=[name for name, *_ in SIZES])
-def test_a_model_with_linear_dynamics_starts_with_the_strings_eigenvalues(
-    model: str, layers: int, sizes: dict[str, Any]
-) -> None:
+def test_a_model_with_linear_dynamics_starts_with_the_strings_eigenvalues(model, layers, sizes):
     resonator = resonator_of(StringParameters(), 5)
     built = build_model(model, sizes)
     how = "physics" if "physics" in built.initialisations else built.own_initialisation()

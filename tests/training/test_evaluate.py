@@ -1,10 +1,7 @@
 """Errors past the horizon of models whose errors are known: the truth itself, the linear string in closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -62,7 +59,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return load_dataset(DATA, tmp_path_factory.mktemp("cache"))
 
 
-def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
+def test_the_truth_has_no_error_to_any_time(data):
     model = Truth(data)
     found = evaluate_past_horizon(model, data, "test", 0.5, windows_s=[(0, HORIZON_S), (HORIZON_S, 0.525)])
     for sums in (found.string, found.sound):
@@ -78,7 +75,7 @@ def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
     assert model.training
 
 
-def test_a_gain_is_reported_and_over_the_horizon_it_is_the_figure_of_the_tables(data: Dataset) -> None:
+def test_a_gain_is_reported_and_over_the_horizon_it_is_the_figure_of_the_tables(data):
     model = Truth(data, gain=0.97)
     whole = evaluate_past_horizon(model, data, "validation", 0.1)
     assert whole.string.total().rel_mse == pytest.approx(9e-4, rel=1e-3)
@@ -94,7 +91,7 @@ def test_a_gain_is_reported_and_over_the_horizon_it_is_the_figure_of_the_tables(
         assert found.per_frame()[0][:60] == pytest.approx(table.per_frame()[0], rel=1e-4)
 
 
-def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
+def test_any_splitting_into_blocks_gives_the_same_errors(data):
     model = Truth(replace(data, scale_m=1.01 * data.scale_m), gain=0.99)
     windows_s = [(0, HORIZON_S), (HORIZON_S, 0.1)]
     whole, parts = (
@@ -112,7 +109,7 @@ def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
     assert np.allclose(at_once.t60_s, in_blocks.t60_s, rtol=1e-9, equal_nan=True)
 
 
-def test_some_trajectories_are_measured_and_progress_is_reported(data: Dataset) -> None:
+def test_some_trajectories_are_measured_and_progress_is_reported(data):
     reported: list[float] = []
     found = evaluate_past_horizon(
         Truth(data), data, "validation", 0.05, trajectories=slice(1), report=reported.append
@@ -127,7 +124,7 @@ def test_some_trajectories_are_measured_and_progress_is_reported(data: Dataset) 
         evaluate_partials(Truth(data), data, "test", [])
 
 
-def test_an_output_that_is_no_number_is_an_infinite_error(data: Dataset) -> None:
+def test_an_output_that_is_no_number_is_an_infinite_error(data):
     model = Truth(data, broken=200)
     windows_s = [(0, HORIZON_S), (0.06, 0.1)]
     found = evaluate_past_horizon(model, data, "test", 0.1, windows_s=windows_s)
@@ -139,7 +136,7 @@ def test_an_output_that_is_no_number_is_an_infinite_error(data: Dataset) -> None
     assert np.nanmin(partials.level_db[:, 1]) == math.inf
 
 
-def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) -> None:
+def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path):
     c = replace(DATA, tension_modulated=False)
     data = load_dataset(c, tmp_path)
     model = build_model("koopman_integrated")
@@ -166,7 +163,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
 
 
 @torch.no_grad()
-def test_kept_frames_of_a_stride_are_measured_alone(tmp_path: Path) -> None:
+def test_kept_frames_of_a_stride_are_measured_alone(tmp_path):
     every, some = (load_dataset(replace(DATA, stride=stride), tmp_path) for stride in (1, 5))
     physics = Physics(resonator_of(DATA.string, DATA.modes), DATA.rate_hz, every.scale_m)
     for name in ("koopman_integrated", "s5"):  # one knows any frame at once, one does not

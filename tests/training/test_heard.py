@@ -1,7 +1,5 @@
 """Listening to a preset, and the table beside presets that keeps what was heard: also a table from strangers."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil
@@ -30,7 +28,7 @@ def table(folder: Path, *lines: str) -> Path:
     return folder
 
 
-def test_a_model_is_heard_as_it_is_tuned_and_each_time_alike(small_preset: Path) -> None:
+def test_a_model_is_heard_as_it_is_tuned_and_each_time_alike(small_preset):
     """Its multiplier is untrained: the fundamental is right, the glide of a hard pluck is not."""
     shares: list[float] = []
     right = listen_to(load_preset(small_preset), shares.append)
@@ -49,14 +47,12 @@ def test_a_model_is_heard_as_it_is_tuned_and_each_time_alike(small_preset: Path)
     assert heard.distance_db > right.distance_db > 0
 
 
-def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
-    small_preset: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_that_runs_away_is_heard_with_its_earliest_time(small_preset, monkeypatch):
     import training.heard as module
 
     render, calls = module.render_voice, []
 
-    def away(program, source, *rest, **options):  # type: ignore[no-untyped-def]
+    def away(program, source, *rest, **options):
         if source is not None:
             calls.append(None)
             if len(calls) > 1:
@@ -69,7 +65,7 @@ def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
     assert heard.distance_db > 2 / 3 * 60
 
 
-def test_a_model_that_hums_on_is_heard_to(small_preset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_hums_on_is_heard_to(small_preset, monkeypatch):
     """Where its voice is made to end; one of a string without losses is not waited for."""
     preset = load_preset(small_preset)
     with torch.no_grad():
@@ -80,7 +76,7 @@ def test_a_model_that_hums_on_is_heard_to(small_preset: Path, monkeypatch: pytes
     assert listen_to(preset).hum_db is None
 
 
-def test_a_table_of_before_hums_were_measured_is_read(tmp_path: Path) -> None:
+def test_a_table_of_before_hums_were_measured_is_read(tmp_path):
     head, before = ",".join(COLUMNS[:-1]), line().rpartition(",")[0]
     (tmp_path / NAME).write_text(f"{head}\n{before}\n", encoding="utf-8")
     old = replace(GOOD, hum_db=None)
@@ -89,7 +85,7 @@ def test_a_table_of_before_hums_were_measured_is_read(tmp_path: Path) -> None:
     assert [row.count(",") for row in (tmp_path / NAME).read_text().splitlines()] == [len(COLUMNS) - 1] * 3
 
 
-def test_plucks_stay_within_what_was_trained(small_preset: Path) -> None:
+def test_plucks_stay_within_what_was_trained(small_preset):
     info = load_preset(small_preset).info
     assert [pluck.amplitude_mm for pluck in standard_plucks(info)] == list(AMPLITUDES_MM)
     narrow = replace(info, trained_range=replace(info.trained_range, peak_m=(2e-3, 5e-3)))
@@ -101,7 +97,7 @@ def test_plucks_stay_within_what_was_trained(small_preset: Path) -> None:
     assert standard_plucks(absurd)[0].amplitude_mm == 20.0
 
 
-def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path: Path) -> None:
+def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path):
     assert read_heard(tmp_path) == ({}, [])
     other = Heard("other", "b" * 64, 4.0, 1.0, 0.0, 0.0)
     again = replace(GOOD, sha256="c" * 64, level_db=-0.0001)
@@ -131,7 +127,7 @@ def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path:
         ('"' + line(), "values"),
     ],
 )
-def test_a_bad_line_is_reported_and_hides_no_other(tmp_path: Path, bad: str, reported: str) -> None:
+def test_a_bad_line_is_reported_and_hides_no_other(tmp_path, bad, reported):
     known, (problem,) = read_heard(table(tmp_path, bad, line()))
     assert known == {GOOD.sha256: GOOD}
     assert problem.startswith(f"{tmp_path / NAME}: line 2")
@@ -139,7 +135,7 @@ def test_a_bad_line_is_reported_and_hides_no_other(tmp_path: Path, bad: str, rep
     assert len(problem) < len(str(tmp_path)) + 300
 
 
-def test_markup_in_a_name_stays_text_and_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
+def test_markup_in_a_name_stays_text_and_lines_of_another_method_say_nothing(tmp_path):
     known, problems = read_heard(table(tmp_path, line(name="<img src=x>"), line(sha256="e" * 64, method=METHOD + 1)))
     assert problems == []
     assert {digest: each.name for digest, each in known.items()} == {GOOD.sha256: "<img src=x>"}
@@ -155,21 +151,21 @@ def test_markup_in_a_name_stays_text_and_lines_of_another_method_say_nothing(tmp
         (b" " * (LARGEST_BYTES + 1), "larger than"),
     ],
 )
-def test_a_file_that_is_no_table_is_reported_in_one_line(tmp_path: Path, content: bytes, reported: str) -> None:
+def test_a_file_that_is_no_table_is_reported_in_one_line(tmp_path, content, reported):
     (tmp_path / NAME).write_bytes(content)
     known, (problem,) = read_heard(tmp_path)
     assert known == {}
     assert reported in problem
 
 
-def test_many_bad_lines_are_reported_in_few(tmp_path: Path) -> None:
+def test_many_bad_lines_are_reported_in_few(tmp_path):
     known, problems = read_heard(table(tmp_path, *["a,b"] * 100, line()))
     assert known == {GOOD.sha256: GOOD}
     assert len(problems) == MOST_REPORTED + 1
     assert "97 more lines" in problems[-1]
 
 
-def test_a_folder_or_a_link_to_nowhere_in_its_place_is_no_table(tmp_path: Path) -> None:
+def test_a_folder_or_a_link_to_nowhere_in_its_place_is_no_table(tmp_path):
     if os.name != "nt":  # links need rights there
         (tmp_path / NAME).symlink_to(tmp_path / "gone")
         assert read_heard(tmp_path) == ({}, [])
@@ -181,7 +177,7 @@ def test_a_folder_or_a_link_to_nowhere_in_its_place_is_no_table(tmp_path: Path) 
         add_heard(tmp_path, [GOOD])
 
 
-def test_the_shipped_table_knows_every_shipped_preset() -> None:
+def test_the_shipped_table_knows_every_shipped_preset():
     """After a change of a preset: `learned-strings evaluate NAME --heard --write`."""
     from engine.presets import SHIPPED, preset_files
 
@@ -190,7 +186,7 @@ def test_the_shipped_table_knows_every_shipped_preset() -> None:
     assert [path.stem for path in preset_files() if preset_digest(path) not in known] == []
 
 
-def test_a_copy_keeps_what_was_heard_and_a_changed_file_does_not(small_preset: Path, tmp_path: Path) -> None:
+def test_a_copy_keeps_what_was_heard_and_a_changed_file_does_not(small_preset, tmp_path):
     copy = Path(shutil.copy(small_preset, tmp_path / "copy.safetensors"))
     add_heard(tmp_path, [replace(GOOD, sha256=preset_digest(small_preset))])
     known, _ = read_heard(tmp_path)

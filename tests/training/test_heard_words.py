@@ -1,7 +1,5 @@
 """Faults of a preset's sound, each by its name, the worst first."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -28,8 +26,8 @@ TRUE = Heard("x", "0" * 64, 4.0, 0.2, 0.5, 0.0, 1.0)
         ({"runs_away_s": 3.21, "pitch_cents": 400.0}, ["diverges after 3.2 s", "pitch 400 cents too high"]),
     ],
 )
-def test_faults_are_named_the_worst_first(changes: dict[str, float | None], named: list[str]) -> None:
-    heard = replace(TRUE, **changes)  # type: ignore[arg-type]
+def test_faults_are_named_the_worst_first(changes, named):
+    heard = replace(TRUE, **changes)
     assert faults(heard) == named
     word = heard_word(heard)
     assert word.startswith(named[0] if named else "true")

@@ -2,10 +2,7 @@
 
 Those that `fitting.test_fit` cuts and continues repeat themselves there."""
 
-from __future__ import annotations
-
 import hashlib
-from pathlib import Path
 
 import pytest
 import torch
@@ -13,7 +10,6 @@ import torch
 from engine.presets import load_preset
 from tests.training.fits import fit
 from training.cell import Cell, configuration_of
-from training.data.dataset import Dataset
 from training.family.preset import FamilyConfiguration, train_preset
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
@@ -36,9 +32,7 @@ def digest(model: torch.nn.Module) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_run_repeats_bit_for_bit(
-    kind: str, small_dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_repeats_bit_for_bit(kind, small_dataset, tmp_path, monkeypatch):
     monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 5)
     cell = Cell.parse(f"nylon_nonlinear_gaussian_4k_{kind}")
     assert cell is not None
@@ -47,7 +41,7 @@ def test_a_run_repeats_bit_for_bit(
     assert first == second
 
 
-def test_a_model_of_many_strings_repeats_bit_for_bit(tmp_path: Path) -> None:
+def test_a_model_of_many_strings_repeats_bit_for_bit(tmp_path):
     made = FamilyConfiguration(
         "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
     )

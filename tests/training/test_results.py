@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import errno
 import subprocess
 import threading
@@ -39,7 +37,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "results.csv"
 
 
-def test_a_start_that_knows_the_string_is_no_black_box() -> None:
+def test_a_start_that_knows_the_string_is_no_black_box():
     known = {"koopman": (PURSUIT, "physics"), "koopman_integrated": ("averaging",), "lru": ("physics",)}
     for model, starts in known.items():
         assert all(row(model=model, initialisation=how).structured for how in starts)
@@ -47,7 +45,7 @@ def test_a_start_that_knows_the_string_is_no_black_box() -> None:
     assert not any(row(model="koopman_integrated", initialisation=how).structured for how in unknowing)
 
 
-def test_rows_come_back_as_they_were_with_all_digits(path: Path) -> None:
+def test_rows_come_back_as_they_were_with_all_digits(path):
     rows = [
         row("a", epochs=3, seconds=1.5, rel_mae=1 / 3, rel_mse=1.23456789e-7, rel_mse_q4=1e-12),
         row("b", status="diverged", rel_mae=None, message='the loss is nan, "too big"'),
@@ -63,7 +61,7 @@ def git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=RESULTS.parent, capture_output=True, text=True, check=True).stdout
 
 
-def test_every_row_is_of_a_commit_of_the_history_or_says_that_it_is_not() -> None:
+def test_every_row_is_of_a_commit_of_the_history_or_says_that_it_is_not():
     try:
         if git("rev-parse", "--is-shallow-repository").strip() != "false":
             pytest.skip("the history is not whole")
@@ -76,7 +74,7 @@ def test_every_row_is_of_a_commit_of_the_history_or_says_that_it_is_not() -> Non
     assert unsaid == []
 
 
-def test_the_order_of_adding_does_not_matter(tmp_path: Path) -> None:
+def test_the_order_of_adding_does_not_matter(tmp_path):
     rows = [row(digest, finished=f"2026-01-0{day}T00:00:00Z") for day, digest in enumerate("abcab", 1)]
     for number, order in enumerate([rows, rows[::-1], rows[2:] + rows[:2]]):
         for each in order:
@@ -105,9 +103,7 @@ FAILED = row(status="failed", rel_mae=None, message="no memory", finished="2027-
         ([DONE, MEASURED_AGAIN], MEASURED_AGAIN),
     ],
 )
-def test_of_two_rows_of_a_run_the_better_stays_and_adding_it_again_changes_nothing(
-    path: Path, added: list[Row], left: Row
-) -> None:
+def test_of_two_rows_of_a_run_the_better_stays_and_adding_it_again_changes_nothing(path, added, left):
     for each in added:
         add_rows(path, [row("b"), each])
     assert read_results(path) == [left, row("b")]
@@ -117,7 +113,7 @@ def test_of_two_rows_of_a_run_the_better_stays_and_adding_it_again_changes_nothi
     assert path.read_bytes() == before
 
 
-def test_many_writers_lose_no_row(path: Path) -> None:
+def test_many_writers_lose_no_row(path):
     def write(part: int) -> None:
         for number in range(5):
             add_rows(path, [row(f"{part}{number}")])
@@ -130,7 +126,7 @@ def test_many_writers_lose_no_row(path: Path) -> None:
     assert {r.digest for r in read_results(path)} == {f"{part}{number}" for part in range(4) for number in range(5)}
 
 
-def test_a_file_that_another_holds_is_waited_for(path: Path) -> None:
+def test_a_file_that_another_holds_is_waited_for(path):
     add_rows(path, [row("a")])
     writer = threading.Thread(target=add_rows, args=[path, [row("b")]])
     with FileLock(f"{path}.lock"):
@@ -142,7 +138,7 @@ def test_a_file_that_another_holds_is_waited_for(path: Path) -> None:
     assert [r.digest for r in read_results(path)] == ["a", "b"]
 
 
-def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_the_file_as_it_was(path, monkeypatch):
     add_rows(path, [row("a")])
     before = path.read_bytes()
 
@@ -179,9 +175,7 @@ def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.M
         ((",done,", ",perhaps,"), "line 3.status: must be 'done', 'diverged' or 'failed', found 'perhaps'"),
     ],
 )
-def test_what_is_no_results_file_is_reported_with_its_place_and_left_alone(
-    path: Path, text: str | bytes | tuple[str, str], message: str
-) -> None:
+def test_what_is_no_results_file_is_reported_with_its_place_and_left_alone(path, text, message):
     add_rows(path, [row("a", rel_mae=0.5), row("b")])
     if isinstance(text, tuple):  # a wrong value in the last line
         first, second, third = path.read_text(encoding="utf-8").splitlines()
@@ -195,7 +189,7 @@ def test_what_is_no_results_file_is_reported_with_its_place_and_left_alone(
     assert path.read_bytes() == before
 
 
-def test_a_file_of_an_earlier_version_lacks_columns(path: Path) -> None:
+def test_a_file_of_an_earlier_version_lacks_columns(path):
     add_rows(path, [row(rel_mae=None)])
     lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
     kept = [place for place, name in enumerate(COLUMNS) if name not in ("rel_mae", "hardware")]

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +27,7 @@ def read(path: Path) -> list[list[str]]:
         return list(csv.reader(file))
 
 
-def test_the_log_has_a_line_per_epoch_also_after_an_older_checkpoint(tmp_path: Path) -> None:
+def test_the_log_has_a_line_per_epoch_also_after_an_older_checkpoint(tmp_path):
     path = tmp_path / "run" / "log.csv"
     log = TrainingLog(path)
     for epoch in (1, 2, 3, 4):
@@ -48,8 +46,8 @@ def test_the_log_has_a_line_per_epoch_also_after_an_older_checkpoint(tmp_path: P
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])
-def test_the_trained_range_is_that_of_the_draws(kind: str) -> None:
-    found = trained_range(DatasetConfiguration(kind, 4000, 5, largest_tension_rise=0.5))  # type: ignore[arg-type]
+def test_the_trained_range_is_that_of_the_draws(kind):
+    found = trained_range(DatasetConfiguration(kind, 4000, 5, largest_tension_rise=0.5))
     widths = {"gaussian": {"gaussian": (0.02, 0.1)}, "noise": None}
     assert found.width == widths.get(kind, {"gaussian": (0.03, 0.3), "raised_cosine": (0.03, 0.3)})
     assert found.peak_m == ((5e-4, 1e-2) if kind == "pluck" else (1e-3, 1e-2))
@@ -75,7 +73,7 @@ def run_row(
     return row
 
 
-def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
+def test_a_row_reports_what_its_preset_measures(tmp_path):
     made = configuration()
     row = run_row(made, tmp_path)
     preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")
@@ -108,9 +106,7 @@ def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
     assert preset.info.horizon_steps == 420
 
 
-def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path, monkeypatch):
     row = run_row(configuration(), tmp_path)
     with monkeypatch.context() as instrumented:
         instrumented.setattr("training.run.fit_seeds", lambda *_, **__: pytest.fail("trained again"))
@@ -122,9 +118,7 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(
         run_row(configuration(), tmp_path)
 
 
-def test_a_preset_that_is_elsewhere_is_written_again_and_its_row_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_preset_that_is_elsewhere_is_written_again_and_its_row_stays(tmp_path, monkeypatch):
     """As `train` leaves a run in which `sweep` finds it, on another day and machine."""
     monkeypatch.setattr("training.provenance.commit", lambda: "first")
     row = run_row(configuration(), tmp_path, preset=tmp_path / "elsewhere.safetensors")
@@ -138,7 +132,7 @@ def test_a_preset_that_is_elsewhere_is_written_again_and_its_row_stays(
     assert own.read_bytes() == (tmp_path / "elsewhere.safetensors").read_bytes()
 
 
-def test_a_run_that_diverges_is_a_row_that_says_so(tmp_path: Path) -> None:
+def test_a_run_that_diverges_is_a_row_that_says_so(tmp_path):
     wild = configuration(peak_learning_rate=1e30, clip_norm=1e30, schedule="constant")
     row = run_row(wild, tmp_path)
     assert row.status == "diverged" and "lower peak_learning_rate" in row.message

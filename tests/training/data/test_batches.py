@@ -1,7 +1,3 @@
-from __future__ import annotations
-
-from pathlib import Path
-
 import torch
 
 from engine.resonators.sine_transform import analysis_matrix
@@ -21,7 +17,7 @@ def modal(dataset: Dataset, displacement: torch.Tensor) -> torch.Tensor:
     return displacement.double() @ torch.from_numpy(analysis_matrix(c.grid_points, c.modes)) * dataset.scale_m
 
 
-def test_all_frames_of_the_horizon_are_the_data(small_dataset: Dataset) -> None:
+def test_all_frames_of_the_horizon_are_the_data(small_dataset):
     data = TrainingData(small_dataset, CPU)
     batch = data.draw(PLAIN, ROWS, 120, 0)
     assert data.count == 16
@@ -31,7 +27,7 @@ def test_all_frames_of_the_horizon_are_the_data(small_dataset: Dataset) -> None:
     )
 
 
-def test_random_frames_cover_the_horizon_in_order(small_dataset: Dataset) -> None:
+def test_random_frames_cover_the_horizon_in_order(small_dataset):
     data = TrainingData(small_dataset, CPU)
     recipe = Recipe(epochs=1, steps_per_batch=20)
     first, second = (data.draw(recipe, ROWS, 400, iteration).frames for iteration in (0, 1))
@@ -40,7 +36,7 @@ def test_random_frames_cover_the_horizon_in_order(small_dataset: Dataset) -> Non
         assert torch.equal((frames - 1) // 20, torch.arange(20))
 
 
-def test_mirrored_and_inverted_strings_move_as_their_first_frames_do(small_dataset: Dataset) -> None:
+def test_mirrored_and_inverted_strings_move_as_their_first_frames_do(small_dataset):
     c = small_dataset.configuration
     batch = TrainingData(small_dataset, CPU).draw(Recipe(epochs=1, steps_per_batch=0), ROWS, 100, 0)
     begun = modal(small_dataset, batch.initial)
@@ -49,7 +45,7 @@ def test_mirrored_and_inverted_strings_move_as_their_first_frames_do(small_datas
     torch.testing.assert_close(modal(small_dataset, batch.target), truth[:, batch.frames], rtol=1e-4, atol=2e-8)
 
 
-def test_an_epoch_holds_every_trajectory_once_and_repeats_by_its_number() -> None:
+def test_an_epoch_holds_every_trajectory_once_and_repeats_by_its_number():
     recipe = Recipe(epochs=1, batch_size=6)
     found = batches(recipe, 20, 3)
     assert [len(rows) for rows in found] == [6, 6, 6, 2]
@@ -58,7 +54,7 @@ def test_an_epoch_holds_every_trajectory_once_and_repeats_by_its_number() -> Non
     assert not torch.equal(found[0], batches(recipe, 20, 4)[0])
 
 
-def test_fixed_batches_keep_their_trajectories_and_change_their_order() -> None:
+def test_fixed_batches_keep_their_trajectories_and_change_their_order():
     recipe = Recipe(epochs=1, batch_size=5, fixed_batches=True)
     table = [list(range(first, first + 5)) for first in range(0, 20, 5)]
     orders = [[rows.tolist() for rows in batches(recipe, 20, epoch)] for epoch in range(8)]
@@ -66,7 +62,7 @@ def test_fixed_batches_keep_their_trajectories_and_change_their_order() -> None:
     assert len({str(order) for order in orders}) > 1
 
 
-def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path: Path) -> None:
+def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path):
     configuration = DatasetConfiguration("pluck", 4000, 5, steps=450, stride=9, count=20)
     dataset = load_dataset(configuration, tmp_path)
     data = TrainingData(dataset, CPU)

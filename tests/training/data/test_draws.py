@@ -10,7 +10,7 @@ from training.data import draws
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "noise"])
-def test_draws_follow_the_protocol(kind: str) -> None:
+def test_draws_follow_the_protocol(kind):
     drawn = draws.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
     peaks = drawn.max(1)
     assert drawn.shape == (500, 101)
@@ -27,7 +27,7 @@ def test_draws_follow_the_protocol(kind: str) -> None:
     assert np.array_equal(drawn, again)
 
 
-def test_random_plucks_are_a_musicians() -> None:
+def test_random_plucks_are_a_musicians():
     drawn = draws.draw_plucks(600, 401, torch.Generator().manual_seed(0))
     peaks = drawn.max(1)
     assert drawn.shape == (600, 401) and (drawn[:, [0, -1]] == 0).all() and drawn.min() >= 0

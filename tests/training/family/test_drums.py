@@ -1,7 +1,5 @@
 """Errors of models of many strings on drums: small, kept and continued."""
 
-from pathlib import Path
-
 import pytest
 
 from engine.presets import SHIPPED, load_preset
@@ -29,7 +27,7 @@ def errors() -> list[DrumError]:
     return found
 
 
-def test_the_model_of_strings_plays_drums(errors: list[DrumError]) -> None:
+def test_the_model_of_strings_plays_drums(errors):
     model, series, linear = (summary(errors, name, RATE_HZ, 0) for name in ("model", "series", "linear"))
     assert model.geometric_mean is not None and model.geometric_mean < 1e-11
     assert model.worst is not None and model.worst < 1e-6
@@ -37,16 +35,16 @@ def test_the_model_of_strings_plays_drums(errors: list[DrumError]) -> None:
     assert linear.geometric_mean is not None and linear.geometric_mean > 1e-2
 
 
-def test_a_drum_is_the_same_for_ever() -> None:
+def test_a_drum_is_the_same_for_ever():
     first, again = draw_drum(8), draw_drum(8)
     assert first.drum == again.drum
     assert (first.amplitudes_m == again.amplitudes_m).all()
 
 
-def test_a_measurement_continues(tmp_path: Path) -> None:
+def test_a_measurement_continues(tmp_path):
     calls: list[int] = []
 
-    def counted(struck, rate_hz):  # type: ignore[no-untyped-def]
+    def counted(struck, rate_hz):
         calls.append(rate_hz)
         return linear_motion(struck, rate_hz)
 

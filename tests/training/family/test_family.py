@@ -1,9 +1,6 @@
 """A family of strings: what is drawn lies in it, and what is learned holds on others."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import pytest
 import torch
@@ -18,7 +15,7 @@ from training.family import errors as family_errors
 from training.family.fit import FitCase, errors, fit_curves, geometric_mean
 from training.family.motion import linear_motion, untrained
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
-from training.family.strings import COLUMNS, FAMILY, Column, draw_string, solve, string_of
+from training.family.strings import COLUMNS, FAMILY, draw_string, solve, string_of
 
 RATE_HZ, STEPS = 48_000, 1_200
 
@@ -29,7 +26,7 @@ def cases(split: str, count: int) -> list[FitCase]:
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_strings_lie_in_their_column(column: Column) -> None:
+def test_strings_lie_in_their_column(column):
     ranges = FAMILY[column]
     for number in range(40):
         plucked = draw_string(column, "test", number)
@@ -43,14 +40,14 @@ def test_strings_lie_in_their_column(column: Column) -> None:
         assert 1 <= plucked.resonator.modes <= 99
 
 
-def test_a_string_sounds_as_it_is_reported() -> None:
+def test_a_string_sounds_as_it_is_reported():
     eigenvalues = resonator_of(string_of(110.0, 1e-4, 8.0, 0.5), 60).eigenvalues()
     bright = round(3000 / 110) - 1
     found = [eigenvalues[0].imag / (2 * math.pi), *(math.log(1000) / -eigenvalues[mode].real for mode in (0, bright))]
     assert found == pytest.approx([110.0, 8.0, 0.5], rel=1e-9)
 
 
-def test_splits_share_no_string_and_a_number_is_a_string_for_ever() -> None:
+def test_splits_share_no_string_and_a_number_is_a_string_for_ever():
     pitches = [
         draw_string("inside", split, n).pitch_hz for split in ("train", "validation", "test") for n in range(9)
     ]
@@ -59,7 +56,7 @@ def test_splits_share_no_string_and_a_number_is_a_string_for_ever() -> None:
     assert (again.amplitudes_m == draw_string("inside", "test", 3).amplitudes_m).all()
 
 
-def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
+def test_curves_are_found_from_nothing_and_hold_on_other_strings():
     """A sixth of a second of six strings is enough to find the twelfths of backward error analysis."""
     train, validation = cases("train", 6), cases("validation", 4)
     model = build_model("koopman_tension", {"modes": 25, "degree": 2})
@@ -80,7 +77,7 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
         assert abs(float(at_rest) - 1 / 12) < 0.01
 
 
-def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
+def test_a_preset_of_many_strings_is_whole(tmp_path):
     c = FamilyConfiguration(
         "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
     )
@@ -91,7 +88,7 @@ def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
     assert read_configuration().initialisation == "kicks"
 
 
-def test_players_are_as_good_as_they_should_be() -> None:
+def test_players_are_as_good_as_they_should_be():
     players = {
         "series": family_errors.player(untrained("series")),
         "kicks": family_errors.player(untrained("kicks")),
@@ -103,7 +100,7 @@ def test_players_are_as_good_as_they_should_be() -> None:
     assert means == sorted(means)
 
 
-def test_a_string_that_has_fallen_silent_says_so() -> None:
+def test_a_string_that_has_fallen_silent_says_so():
     """Of a geometric mean over strings long after their pluck, zeros of silent ones would be all there is."""
     players, seed = {"linear": linear_motion}, 176  # of a string that is damped and one that rings
     early, late = (

@@ -1,11 +1,8 @@
 """The shelf: a preset for each shipped string, with what its file says of it, whatever the system's encoding."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 from engine.presets import STRINGS, find_preset, read_described_string, read_info
 from training.family.shelf import TITLES
@@ -15,7 +12,7 @@ WRITE += "from training.family.shelf import put_on_shelf;"
 WRITE += "put_on_shelf(load_preset(find_preset('studio_any_string')), Path(sys.argv[1]))"
 
 
-def test_descriptions_are_those_of_the_files_where_the_system_has_another_encoding(tmp_path: Path) -> None:
+def test_descriptions_are_those_of_the_files_where_the_system_has_another_encoding(tmp_path):
     plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # ASCII where Python leaves it at that
     subprocess.run([sys.executable, "-c", WRITE, str(tmp_path)], env={**os.environ, **plain}, check=True)
     for name, title in TITLES.items():

@@ -1,9 +1,6 @@
 """Beyond which ends of the family the shipped model's error grows: where the app warns, and where it does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -63,9 +60,7 @@ CASES = [*((*each, True) for each in GROWS_BEYOND), *((*each, False) for each in
 
 
 @pytest.mark.parametrize(("shape", "name", "trained", "beyond", "grows"), CASES)
-def test_the_error_grows_where_the_app_warns_and_nowhere_else(
-    model: KoopmanTension, shape: Shape | None, name: str, trained: Any, beyond: Any, grows: bool
-) -> None:
+def test_the_error_grows_where_the_app_warns_and_nowhere_else(model, shape, name, trained, beyond, grows):
     ranges = replace(HARD, t60_s=(20.0, 20.1)) if grows and name == "bright_t60_s" else HARD
     inside, outside = (error(model, replace(ranges, **{name: each}), shape) for each in (trained, beyond))
     assert (outside > GROWS * inside) == grows

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -62,7 +60,7 @@ LEARNING = [
 
 
 @pytest.mark.parametrize(("model", "recipe"), LEARNING)
-def test_every_model_learns(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
+def test_every_model_learns(small_dataset, runs, model, recipe):
     seen: list[FitProgress] = []
     horizon = 40 if model not in ("fgru", "frnn") else 12  # they take every frame one after the other
     configuration = small(model, recipe, horizon, epochs=4, patience=0, first_horizon=horizon // 2)
@@ -77,7 +75,7 @@ def test_every_model_learns(small_dataset: Dataset, runs: Path, model: str, reci
     assert measured.rel_mae == pytest.approx(found.validation.total().rel_mae, rel=1e-5)
 
 
-def test_the_bound_of_the_gradient_can_leave_the_eigenvalues_out(small_dataset: Dataset, runs: Path) -> None:
+def test_the_bound_of_the_gradient_can_leave_the_eigenvalues_out(small_dataset, runs):
     """The first moments of one step with a tiny bound: those of nu_log and theta_log alone are not scaled down."""
     largest = {}
     for bounded in (True, False):
@@ -92,7 +90,7 @@ def test_the_bound_of_the_gradient_can_leave_the_eigenvalues_out(small_dataset: 
     assert sum(moment > 1e-8 for moment in largest[False]) == 2
 
 
-def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs: Path) -> None:
+def test_training_that_only_harms_leaves_the_start(small_dataset, runs):
     """The start is epoch 0: a result is never worse."""
     configuration = small("koopman_integrated", epochs=2, peak_learning_rate=1.0, start="averaging")
     seen: list[FitProgress] = []
@@ -113,17 +111,13 @@ CUTS: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("model", "changes"), CUTS, ids=[f"{model}-{[*changes.items()]}" for model, changes in CUTS])
-def test_a_run_that_is_cut_anywhere_is_the_whole_run(
-    small_dataset: Dataset, runs: Path, model: str, changes: dict[str, Any]
-) -> None:
+def test_a_run_that_is_cut_anywhere_is_the_whole_run(small_dataset, runs, model, changes):
     check_cuts(small(model, **changes), small_dataset, runs)
     if "batch_statistics_until" in changes:  # of four epochs of two batches
         assert int(weights(runs / "whole")["layers.0.normalization.num_batches_tracked"]) == 4
 
 
-def test_a_polish_is_too_and_lowers_the_error(
-    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_polish_is_too_and_lowers_the_error(small_dataset, runs, monkeypatch):
     monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 10)
     polished = small("koopman", latent_epochs=4, latent_polish=2)  # one of them in the last epoch's midst
     check_cuts(polished, small_dataset, runs)
@@ -153,9 +147,7 @@ def check_cuts(configuration: TrainingConfiguration, small_dataset: Dataset, run
     assert all(torch.equal(left[name], right[name]) for left, right in pairs for name in left)
 
 
-def test_a_checkpoint_within_an_epoch_goes_on_within_it(
-    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_checkpoint_within_an_epoch_goes_on_within_it(small_dataset, runs, monkeypatch):
     monkeypatch.setattr(module, "TELL_EVERY_S", -1.0)
     configuration = small("lru", batch_size=3)  # six steps an epoch
     whole: list[FitProgress] = []
@@ -177,7 +169,7 @@ def test_a_checkpoint_within_an_epoch_goes_on_within_it(
     assert all(torch.equal(left[name], right[name]) for name in left)
 
 
-def test_a_checkpoint_of_another_version_or_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:
+def test_a_checkpoint_of_another_version_or_configuration_is_refused(small_dataset, runs):
     fit(small("koopman_var"), small_dataset, runs)
     with pytest.raises(ValueError, match="was trained with other settings; delete it to start again"):
         fit(small("koopman_var", epochs=5), small_dataset, runs)
@@ -201,14 +193,12 @@ def test_a_checkpoint_of_another_version_or_configuration_is_refused(small_datas
         ),
     ],
 )
-def test_what_cannot_be_trained_is_refused_before(small_dataset: Dataset, make: Any, words: str) -> None:
+def test_what_cannot_be_trained_is_refused_before(small_dataset, make, words):
     with pytest.raises(ValueError, match=words):
         make(small_dataset)
 
 
-def test_early_stopping_ends_when_nothing_gets_better(
-    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_early_stopping_ends_when_nothing_gets_better(small_dataset, runs, monkeypatch):
     monkeypatch.setattr(module, "learning_rate_at", lambda recipe, share: 0.0)
     seen: list[FitProgress] = []
     found = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
@@ -217,21 +207,19 @@ def test_early_stopping_ends_when_nothing_gets_better(
     assert len(seen) == 3 and again.epochs == 3  # a run that has ended stays ended
 
 
-def test_patience_begins_when_there_is_a_prediction(small_dataset: Dataset, runs: Path) -> None:
+def test_patience_begins_when_there_is_a_prediction(small_dataset, runs):
     """Not while Koopman's encoder learns the fitted latents."""
     found = fit(small("koopman", epochs=8, latent_epochs=5, latent_polish=1, patience=3), small_dataset, runs)
     assert found.epochs >= 5
     assert math.isfinite(found.validation.total().rel_mae)
 
 
-def test_the_mean_of_the_weights_is_what_is_kept(small_dataset: Dataset, runs: Path) -> None:
+def test_the_mean_of_the_weights_is_what_is_kept(small_dataset, runs):
     found = fit(small("koopman_var", average_decay=0.99), small_dataset, runs)
     assert not torch.equal(found.model.state_dict()["decoder.weight"], weights(runs)["decoder.weight"])
 
 
-def test_a_loss_or_an_error_that_is_no_number_is_a_divergence(
-    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_loss_or_an_error_that_is_no_number_is_a_divergence(small_dataset, runs, monkeypatch):
     with pytest.raises(Diverged, match=r"the loss is nan in epoch \d; lower peak_learning_rate"):
         fit(small("frnn", peak_learning_rate=1e30, clip_norm=1e30), small_dataset, runs / "frnn")
     overflowing = SimpleNamespace(total=lambda: RelativeError(math.inf, 1e10))
@@ -241,7 +229,7 @@ def test_a_loss_or_an_error_that_is_no_number_is_a_divergence(
             fit(small(model), small_dataset, runs / model)
 
 
-def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
+def test_dmd_is_computed_at_once(small_dataset, runs):
     seen: list[FitProgress] = []
     found = fit(small("dmd"), small_dataset, runs, report=seen.append)
     assert isinstance(found.model, DMD)
@@ -249,7 +237,7 @@ def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
     assert found.validation.total().rel_mae < 0.3  # 10 ms of a string that is nearly linear
 
 
-def test_learning_rate_and_horizon_follow_the_recipe() -> None:
+def test_learning_rate_and_horizon_follow_the_recipe():
     cycle = Recipe(epochs=1, peak_learning_rate=1.0, start_share=0.1, warm_up=0.25)
     rates = [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)]
     assert rates == pytest.approx([0.1, 0.55, 1, 0.5, 0])
@@ -276,9 +264,7 @@ class Shifted(torch.nn.Module):
         ("relative_mse", (4.0, 0.01), (0.75**2 + 99**2) / 2),  # soft strings count as loud ones
     ],
 )
-def test_the_loss_of_a_model_without_latents_is_its_prediction_alone(
-    kind: Any, targets: tuple[float, float], expected: float
-) -> None:
+def test_the_loss_of_a_model_without_latents_is_its_prediction_alone(kind, targets, expected):
     target = torch.stack([torch.full((2, 3), value) for value in targets])
     model: Any = Shifted()  # which says 1
     loss, error = training_loss(
@@ -288,7 +274,7 @@ def test_the_loss_of_a_model_without_latents_is_its_prediction_alone(
     assert float(error) == pytest.approx(sum((value - 1) ** 2 for value in targets) / 2)
 
 
-def test_a_coupling_without_a_rate_stays(small_dataset: Dataset, runs: Path) -> None:
+def test_a_coupling_without_a_rate_stays(small_dataset, runs):
     kept = fit(small("koopman_integrated", coupling_rate=0.0), small_dataset, runs / "kept").model
     moved = fit(small("koopman_integrated", coupling_rate=1.0), small_dataset, runs / "moved").model
     start = new_model(small("koopman_integrated"), small_dataset.scale_m)
@@ -306,9 +292,7 @@ BY_RECIPE = [(name, "published" if name in ("s5", "frnn") else "ours") for name 
 
 @pytest.mark.parametrize(("model", "recipe"), BY_RECIPE)
 @pytest.mark.usefixtures("mapped")
-def test_a_seed_trained_with_others_is_the_seed_alone(
-    small_dataset: Dataset, runs: Path, model: str, recipe: str
-) -> None:
+def test_a_seed_trained_with_others_is_the_seed_alone(small_dataset, runs, model, recipe):
     """The losses of 50 steps agree to 1e-5; a learning rate of the paper's size, or rounding would grow."""
     horizon = 12 if model in ("fgru", "frnn") else 40
     epochs = 25 if model not in ("fgru", "frnn") else 4
@@ -338,7 +322,7 @@ def test_a_seed_trained_with_others_is_the_seed_alone(
 
 
 @pytest.mark.usefixtures("mapped")
-def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_seeds_of_one_run_take_one_pass(small_dataset, runs, monkeypatch):
     passes = []
     together = module.together.backward
     monkeypatch.setattr(
@@ -349,7 +333,7 @@ def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monk
 
 
 @pytest.mark.usefixtures("mapped")
-def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs: Path) -> None:
+def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset, runs):
     """One seed is a checkpoint ahead: the other catches up, and both end as without the cut, to rounding."""
     configurations = [small("koopman_var", seed=n) for n in range(2)]
     ahead = runs / "cut" / "0"
@@ -363,9 +347,7 @@ def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs
             torch.testing.assert_close(cut[name], weight, rtol=1e-4, atol=1e-6)
 
 
-def test_a_seed_that_diverges_leaves_the_others(
-    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_seed_that_diverges_leaves_the_others(small_dataset, runs, monkeypatch):
     backward = module.backward
     first: list[object] = []
 

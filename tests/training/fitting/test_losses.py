@@ -1,7 +1,6 @@
 """The terms of the Koopman loss, written out."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 import torch
@@ -34,7 +33,7 @@ def mean_square(values: torch.Tensor) -> float:
 
 
 @pytest.mark.parametrize("terms", ["text", "published"])
-def test_the_loss_is_the_sum_of_its_terms(terms: Any) -> None:
+def test_the_loss_is_the_sum_of_its_terms(terms):
     """Written out with real numbers; published: as `lindyn_loss` of rodrigodzf/physmodjax takes its means."""
     model, batch = model_and_batch()
     loss, prediction = training_loss(model, batch, replace(RECIPE, koopman_terms=terms))
@@ -61,7 +60,7 @@ def test_the_loss_is_the_sum_of_its_terms(terms: Any) -> None:
     assert float(loss.detach()) == pytest.approx(predicted + others, rel=1e-9)
 
 
-def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:
+def test_frames_that_were_drawn_twice_are_compared_with_themselves():
     """As many frames as the last one's number need not be all of them."""
     model = build_model("lru", {"layers": 0, "state_size": 4})
     model.initialise("paper", Physics(resonator_of(StringParameters(), 6), 4_000), torch.Generator().manual_seed(1))
@@ -75,9 +74,7 @@ def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:
 
 @pytest.mark.parametrize("terms", ["text", "published"])
 @pytest.mark.parametrize("name", ["koopman", "koopman_var", "koopman_integrated"])
-def test_parts_of_a_batch_have_its_gradients_and_error(
-    name: str, terms: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parts_of_a_batch_have_its_gradients_and_error(name, terms, monkeypatch):
     model = build_model(name, {"grid_points": 101}).double()
     physics = Physics(resonator_of(StringParameters(), 6), 4_000)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(1))

@@ -1,7 +1,5 @@
 """An integrated phase's start from the displacement alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +26,7 @@ STEPS = 450
 
 def integrated_phase(state_size: int = 5) -> IntegratedPhase:
     model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=state_size))
-    model.initialise("random", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
+    model.initialise("random", None, torch.Generator().manual_seed(0))
     return model
 
 
@@ -44,7 +42,7 @@ def motions_of(omega: torch.Tensor, sigma: torch.Tensor, coupling: torch.Tensor,
     return Modes(torch.eye(len(omega), dtype=torch.float64), motions, (), ())
 
 
-def test_what_follows_its_equation_is_found_exactly() -> None:
+def test_what_follows_its_equation_is_found_exactly():
     omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
     coupling = torch.tensor([[0.003, 0.01, 0.02], [0.01, 0.04, 0.05], [-0.02, -0.06, -0.1]]).double()
     found = fit_phases(motions_of(omega, sigma, coupling, 2000), seed=0)
@@ -53,7 +51,7 @@ def test_what_follows_its_equation_is_found_exactly() -> None:
     torch.testing.assert_close(found.starts, torch.ones(3, dtype=torch.complex128), rtol=0, atol=1e-6)
 
 
-def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
+def test_a_negative_frequency_is_the_same_motion_as_a_positive_one():
     times, starts = np.arange(1.0, 50.0), np.linspace(0.1, 1, 49)
     integrals = np.outer(times, [1.0, 0.5])
 
@@ -72,7 +70,7 @@ def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
 
 
 @pytest.mark.parametrize("state_size", [5, 7])
-def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset: Dataset, state_size: int) -> None:
+def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset, state_size):
     model = integrated_phase(state_size)
     model.store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
@@ -80,7 +78,7 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset: Dataset, s
     torch.testing.assert_close(model.theta_log[:5].exp(), torch.from_numpy(linear.imag), rtol=2e-3, atol=0)
 
 
-def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
+def test_a_run_starts_there(small_dataset, runs):
     recipe = Recipe(epochs=1, start=PHASES, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
     configuration = TrainingConfiguration(
         "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration={"state_size": 5}
@@ -94,7 +92,7 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
     )
 
 
-def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
+def test_what_cannot_start_so_is_refused(small_dataset):
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
         integrated_phase(4).store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
@@ -114,16 +112,14 @@ def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
         ("koopman", "paper", 1, "a pursuit needs some, any other start none"),
     ],
 )
-def test_a_start_is_one_of_the_models(model: str, start: str, latent_epochs: int, words: str) -> None:
+def test_a_start_is_one_of_the_models(model, start, latent_epochs, words):
     data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
     with pytest.raises(ValueError, match=words):
         TrainingConfiguration("A test", model, data, Recipe(epochs=1, start=start, latent_epochs=latent_epochs))
 
 
 @pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
-def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_found(
-    small_dataset: Dataset, sizes: dict[str, int]
-) -> None:
+def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_found(small_dataset, sizes):
     configuration = TrainingConfiguration(
         "A test",
         "koopman_integrated",
@@ -137,7 +133,7 @@ def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_f
 
 @pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
 @pytest.mark.parametrize("rate_hz", [4000, 16000])
-def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(model: str, rate_hz: int) -> None:
+def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(model, rate_hz):
     blind, hinted = (
         configuration_of(Cell(model, True, "gaussian", rate_hz, recipe=name)) for name in ("blind", "hinted")
     )
@@ -158,9 +154,7 @@ def blind_weights(cell: Cell, dataset: Dataset, runs: Path) -> StringModel:
 
 
 @pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
-def test_the_same_displacement_of_another_claimed_string_gives_the_same_weights(
-    small_dataset: Dataset, runs: Path, model: str
-) -> None:
+def test_the_same_displacement_of_another_claimed_string_gives_the_same_weights(small_dataset, runs, model):
     cell = Cell(model, True, "gaussian", 4000, recipe="blind")
     c = small_dataset.configuration
     string = replace(c.string, length_m=1.3, tension_n=20.0, density_kg_m3=7850.0, damping_d3_kg_m_s=0.0)
@@ -174,7 +168,7 @@ def test_the_same_displacement_of_another_claimed_string_gives_the_same_weights(
         assert torch.equal(weights, other.state_dict()[name]), name
 
 
-def test_the_number_of_modes_is_found_and_no_claim_of_more_changes_it(small_dataset: Dataset, runs: Path) -> None:
+def test_the_number_of_modes_is_found_and_no_claim_of_more_changes_it(small_dataset, runs):
     cell = Cell("koopman_integrated", True, "gaussian", 4000, recipe="blind")
     amplitudes = torch.nn.functional.pad(small_dataset.amplitudes, (0, 2))  # two more that never move
     c = replace(small_dataset.configuration, modes=7)

@@ -1,7 +1,5 @@
 """Koopman's start by matching pursuit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -13,7 +11,6 @@ from engine.models.koopman_var import KoopmanVar
 from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import resonator_of
 from training.configuration import Recipe
-from training.data.dataset import Dataset
 from training.fitting.modes import found_modes, known_modes
 from training.fitting.pursuit import pursue
 
@@ -24,15 +21,13 @@ SINES = torch.from_numpy(synthesis_matrix(101, 5))
 def koopman(state_size: int = 40) -> Koopman:
     sizes = KoopmanConfiguration(state_size=state_size, encoder_widths=(24,), decoder_widths=(24, 24))
     model = Koopman(sizes)
-    model.initialise("paper", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
+    model.initialise("paper", None, torch.Generator().manual_seed(0))
     return model
 
 
 @pytest.mark.parametrize(("blind", "largest"), [(False, 1e-3), (True, 3e-3)])
 @torch.no_grad()
-def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(
-    small_dataset: Dataset, blind: bool, largest: float
-) -> None:
+def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(small_dataset, blind, largest):
     model = koopman()
     latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0), blind=blind)
     parts = latents.targets.double() @ latents.mixing.T
@@ -47,7 +42,7 @@ def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(
 
 
 @torch.no_grad()
-def test_its_loss_is_the_error_of_the_prediction(small_dataset: Dataset) -> None:
+def test_its_loss_is_the_error_of_the_prediction(small_dataset):
     """In coordinates as on the string: any encoder will do."""
     model = koopman()
     latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))
@@ -59,7 +54,7 @@ def test_its_loss_is_the_error_of_the_prediction(small_dataset: Dataset) -> None
     assert float((found - truth[:, 1:]).square().mean()) == pytest.approx(float(error), rel=0.03)
 
 
-def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> None:
+def test_a_mirrored_string_has_mirrored_coordinates(small_dataset):
     """A model that does not care for its input is as wrong about a string as about its mirror image."""
     latents = pursue(koopman(), small_dataset, STEPS, torch.Generator().manual_seed(0))
     amplitudes = small_dataset.split("train")[:, 0] / small_dataset.scale_m
@@ -71,7 +66,7 @@ def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> N
 
 @pytest.mark.parametrize("blind", [False, True])
 @torch.no_grad()
-def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Dataset, blind: bool) -> None:
+def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset, blind):
     modes = (found_modes if blind else known_modes)(small_dataset, STEPS)
     alike = modes.shapes @ SINES.T / 50
     torch.testing.assert_close(alike.abs(), torch.eye(5, dtype=torch.float64), rtol=0, atol=2e-3)
@@ -85,14 +80,14 @@ def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Datas
 
 
 @torch.no_grad()
-def test_a_mode_that_seems_to_grow_decays_all_the_same(small_dataset: Dataset) -> None:
+def test_a_mode_that_seems_to_grow_decays_all_the_same(small_dataset):
     """Koopman keeps the logarithm of the decay."""
     swelling = torch.linspace(0.5, 1.5, small_dataset.amplitudes.shape[1])[:, None]
     grown = replace(small_dataset, amplitudes=small_dataset.amplitudes * swelling)
     assert all(float(grid.real.max()) < 0 for grid in found_modes(grown, STEPS).grids)
 
 
-def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> None:
+def test_other_models_and_strided_data_are_refused(small_dataset):
     with pytest.raises(ValueError, match="needs the model 'koopman'"):
         pursue(KoopmanVar(KoopmanVarConfiguration()), small_dataset, STEPS, torch.Generator())
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
@@ -100,7 +95,7 @@ def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> No
         pursue(koopman(), strided, STEPS, torch.Generator())
 
 
-def test_a_polish_holds_weights_down_by_the_recipes_decay_and_reports_the_error_alone(small_dataset: Dataset) -> None:
+def test_a_polish_holds_weights_down_by_the_recipes_decay_and_reports_the_error_alone(small_dataset):
     def polished(weight_decay: float) -> tuple[float, float]:
         model = koopman()
         latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))

@@ -1,7 +1,5 @@
 """Steps that a GPU records: which can be, and what becomes of them."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +12,6 @@ from engine.models import build_model
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe
 from training.data.batches import TrainingData
-from training.data.dataset import Dataset
 from training.fitting import recorded, together
 from training.fitting.fit import Steps, TrainingState, take_step
 from training.fitting.losses import backward
@@ -38,7 +35,7 @@ class _Apart(TorchDispatchMode):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_step_asks_nothing_of_the_host(name: str, small_dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_asks_nothing_of_the_host(name, small_dataset, monkeypatch):
     """On tensors without values, which no host can read."""
     monkeypatch.setattr(together, "MAPPED_ON", ("meta",))
     data = TrainingData(small_dataset, META)
@@ -68,15 +65,13 @@ def test_a_step_asks_nothing_of_the_host(name: str, small_dataset: Dataset, monk
         ("published", {"batch_size": 5}, False),  # 16 trajectories: the last batch has one
     ],
 )
-def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(
-    small_dataset: Dataset, recipe: str, changes: dict[str, Any], repeats: bool
-) -> None:
-    cell = Cell("koopman_var", True, "gaussian", 4000, 400, recipe)  # type: ignore[arg-type]
+def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(small_dataset, recipe, changes, repeats):
+    cell = Cell("koopman_var", True, "gaussian", 4000, 400, recipe)
     made = configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, {"batch_size": 4, **changes})
     assert TrainingState(made, small_dataset, CPU).repeats_itself is repeats
 
 
-def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch):
     """Each call is one time; what the recording itself runs is not a further one."""
     seen: list[str] = []
     stream = SimpleNamespace(wait_stream=lambda other: None)
@@ -99,9 +94,7 @@ def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch: pytest.
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device")
 @pytest.mark.parametrize("name", MODELS)
-def test_a_repeated_step_is_the_launched_one(
-    name: str, small_dataset: Dataset, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_repeated_step_is_the_launched_one(name, small_dataset, monkeypatch):
     monkeypatch.setattr(recorded, "PRECISION", "highest")
     cells = [Cell(name, True, "gaussian", 4000, 20, "paper", seed) for seed in range(2)]
     changes = {"batch_size": 4, "schedule": "one_cycle"}

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest
@@ -16,13 +14,13 @@ def draw(*shape: int, seed: int = 0) -> Tensor:
 def descend(optimiser: torch.optim.Optimizer, loss: Callable[[], Tensor], steps: int) -> float:
     for _ in range(steps):
         optimiser.zero_grad()
-        loss().backward()  # type: ignore[no-untyped-call]
+        loss().backward()
         optimiser.step()
     return float(loss().detach())
 
 
 @pytest.mark.parametrize(("kind", "turns"), [(SOAP, True), (torch.optim.AdamW, False)])
-def test_a_turned_problem_has_the_turned_solution(kind: type[torch.optim.Optimizer], turns: bool) -> None:
+def test_a_turned_problem_has_the_turned_solution(kind, turns):
     """What Adam does depends on the axes; in the gradients' own basis it does not."""
     left, right, wanted = draw(9, 6), draw(5, 7, seed=1), draw(9, 7, seed=2)
     turn, other = (torch.linalg.qr(draw(n, n, seed=n)).Q for n in (6, 5))
@@ -30,14 +28,14 @@ def test_a_turned_problem_has_the_turned_solution(kind: type[torch.optim.Optimiz
     found = []
     for a, b in problems:
         weights = torch.zeros(6, 5, dtype=torch.float64, requires_grad=True)
-        optimiser = kind([{"params": [weights]}], lr=0.05)  # type: ignore[call-arg]
+        optimiser = kind([{"params": [weights]}], lr=0.05)
         descend(optimiser, lambda a=a, w=weights, b=b: (a @ w @ b - wanted).square().sum(), 3 * EVERY + 2)
         found.append(weights.detach())
     deviation = (turn @ found[0] @ other.T - found[1]).norm() / found[1].norm()
     assert (deviation < 1e-4) == turns
 
 
-def test_vectors_take_adams_step_and_weights_decay() -> None:
+def test_vectors_take_adams_step_and_weights_decay():
     wanted = draw(8)
     found = []
     for kind in (SOAP, torch.optim.AdamW):
@@ -50,7 +48,7 @@ def test_vectors_take_adams_step_and_weights_decay() -> None:
 
 
 @pytest.mark.parametrize("shape", [(6, 5), (3, 2, 5), (5, 3, 2)])
-def test_it_gets_further_than_adam_where_the_axes_are_correlated(shape: tuple[int, ...]) -> None:
+def test_it_gets_further_than_adam_where_the_axes_are_correlated(shape):
     mixing = torch.linalg.qr(draw(30, 30)).Q * torch.logspace(0, 1.5, 30, dtype=torch.float64)
     mixing = mixing @ torch.linalg.qr(draw(30, 30, seed=1)).Q
     wanted = draw(30, seed=2)
@@ -62,7 +60,7 @@ def test_it_gets_further_than_adam_where_the_axes_are_correlated(shape: tuple[in
     assert losses[0] < losses[1]
 
 
-def test_a_gradient_of_zero_or_of_no_number_at_first_changes_nothing() -> None:
+def test_a_gradient_of_zero_or_of_no_number_at_first_changes_nothing():
     """The loss has it; eigenvectors of it there are none."""
     still = torch.ones(4, 3, requires_grad=True)
     descend(SOAP([{"params": [still]}], 0.1), lambda: (still * 0).sum(), EVERY + 2)

@@ -1,7 +1,5 @@
 """Synthetic notes, made once: the solver's string with a body, noise and a second polarisation."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.training.recording.synthetic import SyntheticNote, synthetic_note

@@ -1,10 +1,7 @@
 """Fits against notes whose poles and glide are known, cut anywhere, and of takes that share them."""
 
-from __future__ import annotations
-
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +20,7 @@ def poles_of(learned: LearnedNote, number: int) -> list[Any]:
 
 @pytest.mark.parametrize("polarisations", [1, 2])
 @pytest.mark.parametrize("seed", range(2))
-def test_a_fit_has_the_pitch_decay_and_level_of_every_partial(seed: int, polarisations: int) -> None:
+def test_a_fit_has_the_pitch_decay_and_level_of_every_partial(seed, polarisations):
     """A glide and the frequencies at rest trade against each other: their sum is what sounds."""
     cents, decay, level_db = {1: (0.6, 0.02, 0.03), 2: (1.2, 0.2, 0.3)}[polarisations]
     truth, note, series = modelled_note(seed, polarisations)
@@ -40,7 +37,7 @@ def test_a_fit_has_the_pitch_decay_and_level_of_every_partial(seed: int, polaris
     assert error.esr < (5e-4 if polarisations == 1 else 1e-2)
 
 
-def test_a_fit_without_a_glide_has_none_and_fits_worse() -> None:
+def test_a_fit_without_a_glide_has_none_and_fits_worse():
     _, note, series = modelled_note(0, 1)
     gliding, still = (fit_note(note, series, free=0, poles_a_partial=1, glides=each) for each in (True, False))
     samples, t = note.fitted(), np.arange(len(note.fitted())) / note.rate_hz
@@ -49,7 +46,7 @@ def test_a_fit_without_a_glide_has_none_and_fits_worse() -> None:
     assert errors[0] < 0.1 * errors[1]
 
 
-def test_a_fit_that_is_cut_after_any_step_ends_bit_for_bit_as_the_whole(tmp_path: Path) -> None:
+def test_a_fit_that_is_cut_after_any_step_ends_bit_for_bit_as_the_whole(tmp_path):
     notes = [modelled_note(1, 2, seconds=0.3, loudness=each)[1:] for each in (1.0, 0.5)]
     settings: dict[str, Any] = {"free": 1, "seconds": 0.25}
     whole = fit_takes(notes, **settings)
@@ -90,7 +87,7 @@ def test_a_fit_that_is_cut_after_any_step_ends_bit_for_bit_as_the_whole(tmp_path
 
 
 @pytest.mark.parametrize("cents", [-4.0, 3.0])
-def test_soft_and_loud_takes_share_their_poles_but_not_pitch_glide_and_level(cents: float) -> None:
+def test_soft_and_loud_takes_share_their_poles_but_not_pitch_glide_and_level(cents):
     made = [modelled_note(2, 1), modelled_note(2, 1, cents=cents, loudness=0.3)]
     first, second = fit_takes([(note, series) for _, note, series in made], free=0)
     assert [pole.partial for pole in first.poles] == [pole.partial for pole in second.poles]

@@ -1,17 +1,15 @@
 """The gate refuses what cannot be fitted, warns of what is unusual, and the verdict judges the fit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from tests.training.recording.sounds import CHANGES, Sound, cases, membrane, noise
-from tests.training.recording.synthetic import SyntheticNote, synthetic_note
+from tests.training.recording.sounds import CHANGES, cases, membrane, noise
+from tests.training.recording.synthetic import synthetic_note
 from training.recording.gate import second_series
-from training.recording.learn import Learned, NotFound, Refused, examined, learn, require_found
+from training.recording.learn import NotFound, Refused, examined, learn, require_found
 from training.recording.note import note_of
 from training.recording.numbering import peaks_of, series_at
 from training.recording.preset import Source
@@ -90,9 +88,7 @@ CHANGED: dict[str, tuple[Change, set[str], set[str]]] = {  # what must be found,
 
 
 @pytest.mark.parametrize("name", CHANGED)
-def test_what_cannot_be_fitted_is_refused_and_what_is_unusual_is_a_warning(
-    synthetic: SyntheticNote, name: str
-) -> None:
+def test_what_cannot_be_fitted_is_refused_and_what_is_unusual_is_a_warning(synthetic, name):
     change, found, refused_kinds = CHANGED[name]
     findings = examined(change(synthetic.samples), RATE_HZ)
     assert found <= {each.kind for each in findings.findings}
@@ -104,11 +100,11 @@ UNJUDGED = ("noise", "sweep", "speech", "drum")
 
 
 @pytest.mark.parametrize("name", ["reversed", "a loop", "two attacks"])
-def test_silence_behind_what_is_edited_hides_nothing(synthetic: SyntheticNote, name: str) -> None:
+def test_silence_behind_what_is_edited_hides_nothing(synthetic, name):
     assert refused(np.append(CHANGED[name][0](synthetic.samples), np.zeros(30_000)))
 
 
-def test_random_notes_of_random_strings_are_kept_and_random_sounds_of_none_are_not() -> None:
+def test_random_notes_of_random_strings_are_kept_and_random_sounds_of_none_are_not():
     """Others may pass: the verdict on their fit refuses them."""
     judged = [case for case in cases({}, 4, 40_000) if case.kind not in UNJUDGED]
     wrong = [f"{case.base}, {case.kind}" for case in judged if (refused(*case.sound) == set()) != case.is_note]
@@ -116,11 +112,11 @@ def test_random_notes_of_random_strings_are_kept_and_random_sounds_of_none_are_n
 
 
 @pytest.mark.parametrize("kind", [kind for kind in CHANGES if kind != "three changes"])
-def test_a_note_is_kept_as_users_record_it(synthetic: SyntheticNote, kind: str) -> None:
+def test_a_note_is_kept_as_users_record_it(synthetic, kind):
     assert refused(*CHANGES[kind](np.random.default_rng(1), (synthetic.samples, RATE_HZ))) == set()
 
 
-def test_a_note_that_soon_dies_away_is_not_reversed() -> None:
+def test_a_note_that_soon_dies_away_is_not_reversed():
     t = np.arange(RATE_HZ) / RATE_HZ
     sound = sum(np.sin(2 * np.pi * 700 * k * t) * np.exp(-30 * t) / k for k in range(1, 7))
     note = np.concatenate([np.zeros(RATE_HZ // 5), 0.3 * sound])
@@ -129,7 +125,7 @@ def test_a_note_that_soon_dies_away_is_not_reversed() -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, -2e-4])
-def test_silence_behind_a_note_changes_nothing(synthetic: SyntheticNote, value: float) -> None:
+def test_silence_behind_a_note_changes_nothing(synthetic, value):
     samples = synthetic.samples[:90_000]
     control, behind = (examined(each, RATE_HZ) for each in (samples, np.append(samples, np.full(33_000, value))))
     assert behind.series == control.series and behind.findings == control.findings == ()
@@ -137,7 +133,7 @@ def test_silence_behind_a_note_changes_nothing(synthetic: SyntheticNote, value: 
 
 
 @pytest.mark.parametrize("hz", [500.0, 640.0, 810.0])
-def test_a_second_note_of_few_partials_is_heard(synthetic: SyntheticNote, hz: float) -> None:
+def test_a_second_note_of_few_partials_is_heard(synthetic, hz):
     other = synthetic_note(3, f0_range_hz=(hz, 1.001 * hz), highest_hz=2_500.0).samples
     assert refused(synthetic.samples + 10 ** (-10 / 20) * other) & {"chord", "off the law"}
 
@@ -158,14 +154,14 @@ def together(first: np.ndarray, second: np.ndarray, level_db: float) -> np.ndarr
 
 @pytest.mark.parametrize("interval", [3 / 2, 2 ** (7 / 12), 4 / 3, 5 / 4, 2 ** (3 / 12)])
 @pytest.mark.parametrize(("hz", "strum_s"), [(110.0, 0.0), (330.0, 0.03)])
-def test_a_soft_second_note_is_heard_at_each_interval(hz: float, interval: float, strum_s: float) -> None:
+def test_a_soft_second_note_is_heard_at_each_interval(hz, interval, strum_s):
     first, second = string(hz, 8, 2.0), string(interval * hz, 6, 4.0, 0.09 + strum_s)
     assert refused(together(first, second, -10)) == {"chord"}
     assert refused(together(first, second, -90)) == set()
 
 
 @pytest.mark.parametrize("low, high", [(2, 3), (3, 4)])
-def test_two_notes_that_were_numbered_as_one_are_heard(low: int, high: int) -> None:
+def test_two_notes_that_were_numbered_as_one_are_heard(low, high):
     sound = together(string(55.0 * low, 8, 3.0), string(55.0 * high, 8, 3.0), -3)
     note = note_of(sound, RATE_HZ)
     below = series_at(peaks_of(note.part(0.06, 0.76), RATE_HZ, note.noise_power), 55.0, 0.0)
@@ -173,18 +169,18 @@ def test_two_notes_that_were_numbered_as_one_are_heard(low: int, high: int) -> N
     assert found is not None and found.reason.startswith(f"two notes sound, at {low * 55}")
 
 
-def test_an_offset_before_the_attack_is_no_hum() -> None:
+def test_an_offset_before_the_attack_is_no_hum():
     sound, rate_hz = membrane(np.random.default_rng(3))
     lead = 1e-6 * np.random.default_rng(0).standard_normal(rate_hz // 3)
     assert refused(np.append(lead, sound + 0.1 * np.abs(sound))) & {"chord", "off the law"}
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_drum_is_refused(seed: int) -> None:
+def test_a_drum_is_refused(seed):
     assert refused(*membrane(np.random.default_rng(seed)))
 
 
-def test_a_note_without_peaks_in_the_end_is_examined() -> None:
+def test_a_note_without_peaks_in_the_end_is_examined():
     t = np.arange(RATE_HZ) / RATE_HZ
     sound = np.concatenate([np.zeros(4_000), 0.3 * np.sin(2 * np.pi * 300 * t) * np.exp(-60 * t)])
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(sound))
@@ -192,20 +188,20 @@ def test_a_note_without_peaks_in_the_end_is_examined() -> None:
         assert "chord" not in refused(each)
 
 
-def test_a_refusal_says_what_to_do(synthetic: SyntheticNote) -> None:
+def test_a_refusal_says_what_to_do(synthetic):
     clipped = np.clip(4 * synthetic.samples, -0.5, 0.5)
     with pytest.raises(Refused, match=r"clipped\.wav: .*lower the input gain"):
         learn([(examined(clipped, RATE_HZ), Source("clipped.wav", "0" * 64, RATE_HZ, len(clipped)))])
 
 
-def test_the_verdict_is_of_the_fit(learned: Learned) -> None:
+def test_the_verdict_is_of_the_fit(learned):
     require_found([learned])
     assert learned.verdict.found and learned.verdict.words.startswith("string found: error 0.0")
     assert learned.verdict.esr < learned.verdict.linear_esr
 
 
 @pytest.mark.parametrize("sound", [noise(np.random.default_rng(0), 1), membrane(np.random.default_rng(30))])
-def test_in_drums_and_noise_no_string_is_found(sound: Sound) -> None:
+def test_in_drums_and_noise_no_string_is_found(sound):
     samples = sound[0][:RATE_HZ]
     source = Source("drum.wav", "0" * 64, RATE_HZ, len(samples))
     learned = learn([(examined(samples, RATE_HZ), source)], anyway=True)

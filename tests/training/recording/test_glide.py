@@ -1,7 +1,5 @@
 """The glide against its definition, and found in the phases of partials."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -18,7 +16,7 @@ def glide(seed: int, pitch: float = 0.0) -> Glide:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed: int) -> None:
+def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed):
     one = glide(seed, pitch=2e-3)
     np.testing.assert_allclose(one.times(one.tau(T)), T, atol=1e-12)
     slope = (one.tau(T + 1e-6) - one.tau(T - 1e-6)) / 2e-6
@@ -28,7 +26,7 @@ def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed: int)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_gliding_tone_does_not_glide_in_warped_time(seed: int) -> None:
+def test_a_gliding_tone_does_not_glide_in_warped_time(seed):
     one, rate_hz = glide(seed), 8_000
     t = np.arange(rate_hz) / rate_hz
     found, times = warped(np.sin(2 * math.pi * 440 * one.tau(t)), rate_hz, one)
@@ -38,7 +36,7 @@ def test_a_gliding_tone_does_not_glide_in_warped_time(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_phases_of_partials_show_the_glide_that_they_share(seed: int) -> None:
+def test_the_phases_of_partials_show_the_glide_that_they_share(seed):
     """Up to what is constant: each partial is off its place in the series by some cents."""
     one, random = glide(seed), np.random.default_rng([seed, 1])
     t, bands = np.arange(150) / 120, []

@@ -1,7 +1,5 @@
 """Intervals of partials, and their frequencies at rest, against the truth of solved strings and of statistics."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -20,7 +18,7 @@ from training.recording.report import partials_in
 FIGURES = ("hz", "decay", "level_db")
 
 
-def test_intervals_of_random_strings_hold_the_truth_and_are_narrow() -> None:
+def test_intervals_of_random_strings_hold_the_truth_and_are_narrow():
     """Strings with a body, noise and a second polarisation; `bench recordings --synthetic 200` is the whole of it."""
     held, widths = [], []
     for seed in (11, 3_002):
@@ -48,7 +46,7 @@ def test_intervals_of_random_strings_hold_the_truth_and_are_narrow() -> None:
     assert np.median(widths, axis=0)[1] < 0.3
 
 
-def test_the_covariance_of_white_noise_is_that_of_least_squares() -> None:
+def test_the_covariance_of_white_noise_is_that_of_least_squares():
     random = np.random.default_rng(0)
     columns = random.standard_normal((400, 3, 2)) @ np.array([1, 1j])
     draws = [covariance(columns, 0.1 * (random.standard_normal((400, 2)) @ np.array([1, 1j]))) for _ in range(60)]
@@ -58,7 +56,7 @@ def test_the_covariance_of_white_noise_is_that_of_least_squares() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_figures_of_beating_poles_are_those_of_their_sound(seed: int) -> None:
+def test_figures_of_beating_poles_are_those_of_their_sound(seed):
     random = np.random.default_rng(seed)
     poles = [
         Pole(complex(-random.uniform(2, 6), 2 * math.pi * hz), complex(*random.uniform(0.2, 1, 2)))
@@ -76,7 +74,7 @@ def test_figures_of_beating_poles_are_those_of_their_sound(seed: int) -> None:
     assert found[2] == pytest.approx(10 * math.log10(total), abs=0.01)
 
 
-def test_the_energy_gives_the_end_of_a_glide() -> None:
+def test_the_energy_gives_the_end_of_a_glide():
     """A slow glide that a fit took for a part of the frequency belongs to the rest again."""
     poles = {k: [Pole(complex(-k, 2 * math.pi * 100 * k), 1 / k**2 + 0j, k)] for k in range(1, 7)}
     t = np.linspace(0, 2.5, 500)
@@ -90,7 +88,7 @@ def test_the_energy_gives_the_end_of_a_glide() -> None:
     assert rests[1].cents < rests[6].cents and rests[1].error > rests[6].error
 
 
-def test_a_pitch_that_rises_is_not_taken_for_a_law() -> None:
+def test_a_pitch_that_rises_is_not_taken_for_a_law():
     """Nor is a partial that hardly decays taken for the end of a glide."""
     falls = {k: [Pole(complex(-k, 2 * math.pi * 100 * k), 1 / k**2 + 0j, k)] for k in range(1, 7)}
     rising = at_rest(Glide(np.array([-12.0, -7.0, -6.0]) * CENTS), falls)
@@ -99,5 +97,5 @@ def test_a_pitch_that_rises_is_not_taken_for_a_law() -> None:
     assert at_rest(Glide(np.array([5.0, 5.0, 5.0]) * CENTS), rings)[1].cents == 0
 
 
-def test_shares_of_tension_add_up() -> None:
+def test_shares_of_tension_add_up():
     assert sum(share_of_tension(k)[0] for k in range(1, 100)) == pytest.approx(1, abs=0.02)

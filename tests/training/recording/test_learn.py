@@ -1,17 +1,13 @@
 """What is learned of a note against its truth, its baselines, and its recording."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from engine.presets import load_preset
 from engine.resonators.recorded import RecordedString
-from tests.training.recording.synthetic import SyntheticNote
 from training.recording.learn import Learned, combined, examined, learn
 from training.recording.physics import Partial
 from training.recording.preset import Source, recorded_note, recorded_string, write_preset
@@ -23,13 +19,13 @@ def recorded_of(learned: Learned) -> RecordedString:
     return recorded_string(note, learned.physics, learned.strung, learned.source, {}, figures(learned.report))
 
 
-def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -> None:
+def test_the_own_note_is_met_far_better_than_by_linear_poles(learned):
     errors = learned.report.errors
     assert errors.esr < 2e-3 and errors.log_spectral_distance_db < 4
     assert errors.esr < 0.5 * learned.verdict.linear_esr
 
 
-def test_a_note_survives_its_preset(learned: Learned, tmp_path: Path) -> None:
+def test_a_note_survives_its_preset(learned, tmp_path):
     recorded = recorded_of(learned)
     write_preset(tmp_path / "own.safetensors", "Own", learned.strung, recorded)
     info = load_preset(tmp_path / "own.safetensors").info
@@ -43,7 +39,7 @@ def test_a_note_survives_its_preset(learned: Learned, tmp_path: Path) -> None:
     assert float(np.sum((truth - found) ** 2) / np.sum(truth**2)) == pytest.approx(learned.report.errors.esr, rel=0.3)
 
 
-def test_modes_of_the_recorded_pitch_are_the_notes(learned: Learned) -> None:
+def test_modes_of_the_recorded_pitch_are_the_notes(learned):
     recorded = recorded_of(learned)
     resonator = recorded.resonator(learned.strung.string, 2 * len(recorded.cents))
     hz = resonator.omega / (2 * math.pi)
@@ -52,7 +48,7 @@ def test_modes_of_the_recorded_pitch_are_the_notes(learned: Learned) -> None:
         assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / lower.hz)) < 0.5
 
 
-def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
+def test_progress_may_cancel(synthetic):
     class Cancelled(Exception):
         pass
 
@@ -64,7 +60,7 @@ def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
         learn([(examined(synthetic.samples, synthetic.rate_hz), Source("a", "0", 44_100, 1))], progress=stop)
 
 
-def test_one_recording_alone_combines_to_itself_and_takes_to_their_medians(learned: Learned) -> None:
+def test_one_recording_alone_combines_to_itself_and_takes_to_their_medians(learned):
     own = combined([learned], {"kind": "guitar"})
     assert own == replace(recorded_of(learned), settings={"kind": "guitar"})
     physics = learned.physics

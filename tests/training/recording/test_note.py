@@ -1,11 +1,8 @@
 """What is no recording of a note is refused with the reason and the remedy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from tests.training.recording.synthetic import SyntheticNote
 from training.recording.note import RecordingError, note_of
 
 
@@ -19,26 +16,26 @@ from training.recording.note import RecordingError, note_of
         (np.ones(44_100), 4_000, "record at 44100"),
     ],
 )
-def test_reasons_are_given(samples: np.ndarray, rate_hz: int, words: str) -> None:
+def test_reasons_are_given(samples, rate_hz, words):
     with pytest.raises(RecordingError, match=words):
         note_of(samples, rate_hz)
 
 
-def test_high_rates_are_converted_and_channels_combined(synthetic: SyntheticNote) -> None:
+def test_high_rates_are_converted_and_channels_combined(synthetic):
     twice = np.repeat(synthetic.samples, 4)  # a crude 176.4 kHz
     note = note_of(np.stack([twice, twice], 1), 4 * synthetic.rate_hz)
     assert note.rate_hz == synthetic.rate_hz
     assert note.onset == pytest.approx(0.1 * note.rate_hz, abs=0.005 * note.rate_hz)
 
 
-def test_the_louder_of_two_unlike_channels_is_taken(synthetic: SyntheticNote) -> None:
+def test_the_louder_of_two_unlike_channels_is_taken(synthetic):
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(synthetic.samples))
     note = note_of(np.stack([noise, synthetic.samples], 1), synthetic.rate_hz)
     assert np.allclose(note.samples, synthetic.samples - synthetic.samples.mean())
 
 
 @pytest.mark.parametrize("rate_hz", [88_200, 96_000, 64_000])
-def test_a_high_rate_has_the_tones_of_a_low_one_and_nothing_folded(rate_hz: int) -> None:
+def test_a_high_rate_has_the_tones_of_a_low_one_and_nothing_folded(rate_hz):
     def recorded(hz: float, at_hz: int) -> np.ndarray:
         time_s = np.arange(at_hz // 2) / at_hz
         return np.sin(2 * np.pi * hz * time_s) * np.hanning(len(time_s) + 1)[:-1]

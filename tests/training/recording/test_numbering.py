@@ -1,7 +1,5 @@
 """Pitch and numbering of partials, blind over all pitches."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -32,7 +30,7 @@ def cents(found_hz: float, f0_hz: float) -> float:
 
 
 @pytest.mark.parametrize("f0_hz", [27.5, 65.4, 110.0, 330.0, 988.0, 3_520.0])
-def test_pitch_and_stiffness_are_found_blind(f0_hz: float) -> None:
+def test_pitch_and_stiffness_are_found_blind(f0_hz):
     stiffness = 1e-5 if f0_hz < 500 else 1e-4
     series = number_note(note_of(stiff_note(f0_hz, stiffness), RATE_HZ))
     assert series is not None and cents(series.f0_hz, f0_hz) < 12
@@ -42,7 +40,7 @@ def test_pitch_and_stiffness_are_found_blind(f0_hz: float) -> None:
 
 
 @pytest.mark.parametrize(("f0_hz", "missing"), [(98.0, (1, 3, 6, 9, 12)), (196.0, (2, 4, 6, 8)), (147.0, (1, 5, 10))])
-def test_missing_partials_do_not_move_it_by_an_octave(f0_hz: float, missing: tuple[int, ...]) -> None:
+def test_missing_partials_do_not_move_it_by_an_octave(f0_hz, missing):
     """As where the string is plucked at a node, and where the first partial is not radiated."""
     series = number_note(note_of(stiff_note(f0_hz, 4e-5, missing), RATE_HZ))
     assert series is not None and cents(series.f0_hz, f0_hz) < 12
@@ -51,7 +49,7 @@ def test_missing_partials_do_not_move_it_by_an_octave(f0_hz: float, missing: tup
 
 
 @pytest.mark.parametrize("seed", range(40, 45))
-def test_a_solved_string_of_any_pitch_with_a_body_is_numbered(seed: int) -> None:
+def test_a_solved_string_of_any_pitch_with_a_body_is_numbered(seed):
     """Its law holds every loud partial: second polarisation, body, noise and glide do not mislead it."""
     made = synthetic_note(seed, seconds=1.0, f0_range_hz=(30, 1_000), highest_hz=9_000)
     series = number_note(note_of(made.samples, made.rate_hz))
@@ -64,7 +62,7 @@ def test_a_solved_string_of_any_pitch_with_a_body_is_numbered(seed: int) -> None
 
 
 @pytest.mark.parametrize(("f0_hz", "body_hz"), [(2_815.0, 97.0), (1_200.0, 100.0), (588.0, 196.0), (392.0, 196.0)])
-def test_a_body_is_no_low_string_below_a_high_note(f0_hz: float, body_hz: float) -> None:
+def test_a_body_is_no_low_string_below_a_high_note(f0_hz, body_hz):
     """Also where every partial of the note would be one of that low string."""
     sound = stiff_note(f0_hz, 2e-5)
     t = np.arange(len(sound) - 4_000) / RATE_HZ
@@ -74,7 +72,7 @@ def test_a_body_is_no_low_string_below_a_high_note(f0_hz: float, body_hz: float)
 
 
 @pytest.mark.parametrize("off_cents", [-40, -15, 20])
-def test_a_string_is_followed_as_it_glides(off_cents: float) -> None:
+def test_a_string_is_followed_as_it_glides(off_cents):
     peaks = peaks_of(stiff_note(110.0, 4e-5)[8_000:40_000], RATE_HZ)
     series = followed(peaks, series_at(peaks, 110.0 * 2 ** (-off_cents / 1200), 4e-5))
     assert cents(series.f0_hz, 110.0) < 2

@@ -1,7 +1,5 @@
 """The physics of notes: of strings that are known, and of partials that a body pulls."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
@@ -13,7 +11,7 @@ from engine.resonators.string import resonator_of
 from training.family.strings import string_of
 from training.recording.fit import LearnedNote
 from training.recording.glide import CENTS, Glide
-from training.recording.physics import BUILDS, Kind, LearnedPhysics, corrections, physics_of, pluck_place, strung
+from training.recording.physics import BUILDS, LearnedPhysics, corrections, physics_of, pluck_place, strung
 from training.recording.refine import Pole
 
 F0_HZ, SIGMA = 110.0, 2.0
@@ -30,14 +28,14 @@ def pulled_note(first_cents: float) -> LearnedNote:
 
 
 @pytest.mark.parametrize(("first_cents", "lowest"), [(0.0, 10 * SIGMA), (-62.0, SIGMA)])
-def test_other_keys_do_not_take_the_decay_of_a_partial_that_the_body_pulls(first_cents: float, lowest: float) -> None:
+def test_other_keys_do_not_take_the_decay_of_a_partial_that_the_body_pulls(first_cents, lowest):
     found = physics_of(pulled_note(first_cents))
     assert found.f0_hz == pytest.approx(F0_HZ, rel=1e-3)
     assert found.smooth_decay[0] == pytest.approx(lowest)
     assert found.smooth_decay[-1] == pytest.approx(SIGMA)
 
 
-def test_a_slow_polarisation_that_the_fit_has_among_its_free_poles_is_the_strings() -> None:
+def test_a_slow_polarisation_that_the_fit_has_among_its_free_poles_is_the_strings():
     """Its partial's second pole went to a resonance of the body, as on a guitar's G."""
     note = pulled_note(0.0)
     slow, body = Pole(complex(-0.5, 2 * math.pi * F0_HZ * 0.998), 0.02 + 0j, 0), F0_HZ * 0.96
@@ -50,7 +48,7 @@ def test_a_slow_polarisation_that_the_fit_has_among_its_free_poles_is_the_string
     assert own["second_ratio"][0] == pytest.approx(10)
 
 
-def test_a_partial_keeps_a_pole_of_the_body_where_it_has_no_other() -> None:
+def test_a_partial_keeps_a_pole_of_the_body_where_it_has_no_other():
     note = pulled_note(-62.0)
     assert physics_of(note).partials[0].poles == note.poles[:1]
 
@@ -80,7 +78,7 @@ def heard(request: pytest.FixtureRequest) -> Heard:
     return Heard(resonator, stiffness, place, physics_of(note))
 
 
-def test_a_string_gives_its_pitch_inharmonicity_losses_and_the_place_of_its_pluck(heard: Heard) -> None:
+def test_a_string_gives_its_pitch_inharmonicity_losses_and_the_place_of_its_pluck(heard):
     physics, omega = heard.physics, heard.resonator.omega
     first_hz = float(physics.f0_hz * math.sqrt(1 + physics.stiffness))
     assert abs(1200 * math.log2(2 * math.pi * first_hz / omega[0])) < 0.01
@@ -92,7 +90,7 @@ def test_a_string_gives_its_pitch_inharmonicity_losses_and_the_place_of_its_pluc
 
 
 @pytest.mark.parametrize("kind", BUILDS)
-def test_in_every_gauge_the_string_sounds_and_glides_alike(heard: Heard, kind: Kind) -> None:
+def test_in_every_gauge_the_string_sounds_and_glides_alike(heard, kind):
     modes = len(heard.resonator.omega)
     for own in (strung(heard.physics, kind), strung(heard.physics, kind, 0.9, 0.7)):
         resonator = resonator_of(own.string, modes)

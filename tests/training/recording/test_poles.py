@@ -1,7 +1,5 @@
 """Poles: their start by a subspace, their spectra by an FFT, their steps by finite differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -17,7 +15,7 @@ FREE = Pole(complex(-20, 2 * math.pi * 180), 0.3 - 0.2j, 0)
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_subspace_has_the_poles_of_exponentials(count: int, seed: int) -> None:
+def test_a_subspace_has_the_poles_of_exponentials(count, seed):
     random = np.random.default_rng(seed)
     turns = np.linspace(-2.5, 2.5, count) + random.uniform(-0.3, 0.3, count)
     z = np.exp(-random.uniform(1e-3, 5e-2, count) + 1j * turns)
@@ -36,7 +34,7 @@ def fit() -> Fit:
 
 
 @pytest.mark.parametrize(("pole", "most"), [(GLIDING, 1e-10), (FREE, 2e-2)])
-def test_the_spectrum_of_a_pole_is_its_sounds(fit: Fit, pole: Pole, most: float) -> None:
+def test_the_spectrum_of_a_pole_is_its_sounds(fit, pole, most):
     """In closed form; of poles that do not glide by a sum over some samples."""
     bins = slice(1, fit.highest)
     index = np.arange(bins.start, bins.stop)
@@ -49,7 +47,7 @@ def test_the_spectrum_of_a_pole_is_its_sounds(fit: Fit, pole: Pole, most: float)
 
 
 @pytest.mark.parametrize("pole", [GLIDING, FREE])
-def test_the_columns_of_a_pole_are_the_slopes_of_its_spectrum(fit: Fit, pole: Pole) -> None:
+def test_the_columns_of_a_pole_are_the_slopes_of_its_spectrum(fit, pole):
     bins = slice(1, fit.highest)
     linear, bent = fit.columns([pole], bins)
     present = fit.part([pole], bins)
@@ -59,7 +57,7 @@ def test_the_columns_of_a_pole_are_the_slopes_of_its_spectrum(fit: Fit, pole: Po
         np.testing.assert_allclose(bent[:, column], slope, atol=1e-3 * np.abs(slope).max())
 
 
-def test_of_a_partials_poles_two_are_its_polarisations_the_lower_one_first() -> None:
+def test_of_a_partials_poles_two_are_its_polarisations_the_lower_one_first():
     def pole(cents: float, decay: float, amplitude: float) -> Pole:
         return Pole(complex(-decay, 2 * math.pi * 200 * 2 ** (cents / 1200)), complex(amplitude), 1)
 
@@ -72,7 +70,7 @@ def test_of_a_partials_poles_two_are_its_polarisations_the_lower_one_first() -> 
     assert polarisations([main, below, far]) == [below, main]
 
 
-def test_a_short_note_with_the_largest_glide_is_refined() -> None:
+def test_a_short_note_with_the_largest_glide_is_refined():
     """Time that is stretched by it ends with the spectrum."""
     time_s = np.arange(22_050) / 44_100
     sound = np.exp(-3 * time_s) * np.cos(2 * math.pi * 100 * time_s)

@@ -1,7 +1,5 @@
 """Errors and decays of the report against sounds whose errors and decays are known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,7 +12,7 @@ T60_S = {125.0: 1.5, 500.0: 1.0, 2_000.0: 0.6, 8_000.0: 0.3}
 T = np.arange(2 * RATE_HZ) / RATE_HZ
 
 
-def test_an_octave_decays_as_its_tone_and_one_that_is_noise_has_no_decay() -> None:
+def test_an_octave_decays_as_its_tone_and_one_that_is_noise_has_no_decay():
     tones = [np.exp(-math.log(1000) / t60 * T) * np.sin(2 * math.pi * hz * T) for hz, t60 in T60_S.items()]
     noise = 1e-4 * np.random.default_rng(0).standard_normal(len(T))
     found = {band.hz: band for band in bands_of(np.sum(tones, axis=0) + noise, 0.1 * tones[1], RATE_HZ, 1e-8)}
@@ -25,7 +23,7 @@ def test_an_octave_decays_as_its_tone_and_one_that_is_noise_has_no_decay() -> No
 
 
 @pytest.mark.parametrize("frames", [-30.0, 0.0, 20.5])
-def test_errors_ignore_one_gain_and_one_delay_and_nothing_else(frames: float) -> None:
+def test_errors_ignore_one_gain_and_one_delay_and_nothing_else(frames):
     def sound(shift: float) -> np.ndarray:
         t = T[:30_000] - shift / RATE_HZ
         return np.asarray(np.exp(-3 * t) * np.sin(2 * math.pi * 200 * t) * (1 - np.exp(-200 * np.maximum(t, 0))))

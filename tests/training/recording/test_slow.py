@@ -1,7 +1,5 @@
 """Decays that a recording shows, and those that it does not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -27,13 +25,13 @@ def pole_of(decay: float, hz: float, amplitude: float) -> Pole:
     return Pole(complex(-decay, 2 * math.pi * hz), complex(amplitude), 1)
 
 
-def test_a_decay_that_shows_stays() -> None:
+def test_a_decay_that_shows_stays():
     fit = fit_of([pole_of(0.2, 100.0, 0.5)], 2.5)
     settle_slow(Takes([fit]))
     assert fit.poles[0][0].decay == pytest.approx(0.2, rel=0.02)
 
 
-def test_a_decay_that_does_not_show_is_settled() -> None:
+def test_a_decay_that_does_not_show_is_settled():
     loud, beside = pole_of(6.0, 100.0, 0.5), pole_of(0.05, 100.3, 1e-3)
     fit = fit_of([loud], 0.5)
     fit.poles[0] = [loud, beside]
@@ -42,7 +40,7 @@ def test_a_decay_that_does_not_show_is_settled() -> None:
     assert 0.5 < fit.poles[0][1].decay <= FALL / 0.5
 
 
-def test_takes_settle_alike() -> None:
+def test_takes_settle_alike():
     loud, beside = pole_of(6.0, 100.0, 0.5), pole_of(0.05, 100.3, 1e-3)
     fits = [fit_of([loud], 0.5), fit_of([replace(loud, a=0.2 + 0j)], 0.5)]
     for fit in fits:

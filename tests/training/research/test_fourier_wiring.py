@@ -12,7 +12,6 @@ from engine.resonators.sine_transform import synthesis_matrix
 from tests.engine.tensors import convolved
 from tests.training.fitting.test_phases import motions_of
 from training.cell import Cell, configuration_of
-from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import phases
 from training.fitting.start import begin
@@ -63,25 +62,25 @@ def frnn(string: StringModes, width: int = 8, depth: int = 3) -> FRNN:
 
 
 @pytest.mark.parametrize("count", [4, 5])
-def test_an_frnn_is_a_linear_string(count: int) -> None:
+def test_an_frnn_is_a_linear_string(count):
     string = modes(count=count)
     assert relative_error(frnn(string), string, 300) < 1e-7
 
 
-def test_an_fgru_is_a_linear_string() -> None:
+def test_an_fgru_is_a_linear_string():
     """Except its first frame, which it has no state for yet."""
     assert relative_error(fgru(modes()), modes(), 300, skipped=1) < 1e-4
     assert relative_error(fgru(modes()), modes(), 10) < 1e-2
 
 
-def test_an_fgru_follows_the_squares() -> None:
+def test_an_fgru_follows_the_squares():
     """The mean over a period is what the closed form has: what swings within one is left."""
     string = modes(2e-4)
     assert relative_error(fgru(string), string, 300) < 0.02
     assert relative_error(fgru(modes()), string, 300) > 0.1
 
 
-def test_a_shared_coupling_is_found_again() -> None:
+def test_a_shared_coupling_is_found_again():
     string = modes(1e-3)
     everyone, others, own = shared_coupling(string.coupling, string.squares)
     found = everyone[:, None] * others * (1 + own * torch.eye(5))
@@ -89,7 +88,7 @@ def test_a_shared_coupling_is_found_again() -> None:
     assert own == pytest.approx(0.5, abs=0.02)
 
 
-def test_kernels_pass_spread_and_gather() -> None:
+def test_kernels_pass_spread_and_gather():
     shape = torch.rand(POINTS, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     kernels = Kernels(POINTS, 4)
     kernels.add_shifted(0, 1, 2.0, lag=-3)
@@ -108,14 +107,14 @@ def test_kernels_pass_spread_and_gather() -> None:
     assert float(found[7, 3]) == pytest.approx(3 * float(shape[-1]))
 
 
-def test_a_mean_motion_is_the_linear_strings_own() -> None:
+def test_a_mean_motion_is_the_linear_strings_own():
     omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
     found = mean_motions(motions_of(omega, sigma, torch.zeros(3, 3).double(), 400))
     torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
     assert not found.coupling.any()
 
 
-def test_a_mean_motion_is_between_those_of_soft_and_loud_strings() -> None:
+def test_a_mean_motion_is_between_those_of_soft_and_loud_strings():
     omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
     coupling = torch.tensor([[0.002, 0.002], [0.002, 0.004]]).double()
     found = mean_motions(motions_of(omega, sigma, coupling, 400)).log_eigenvalues
@@ -125,9 +124,7 @@ def test_a_mean_motion_is_between_those_of_soft_and_loud_strings() -> None:
 
 
 @pytest.mark.parametrize(("model", "largest"), [("fgru", 0.02), ("frnn", 0.5)])
-def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
-    small_dataset: Dataset, model: str, largest: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(small_dataset, model, largest, monkeypatch):
     """FGRU's frequencies follow the squares; FRNN is the linear string that is nearest."""
     monkeypatch.setattr(phases, "STORES", dict(phases.STORES))
     wiring.use()

@@ -1,7 +1,5 @@
 """A plan of runs that are small enough for a test."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """A sweep where there is no app: on a machine that has torch and what `piece.sh` installs."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -37,7 +35,7 @@ add_rows(Path("rows.csv"), [read(Row, row, "row") for row in ended["rows"]])
 """
 
 
-def test_engine_and_training_alone_sweep(tmp_path: Path) -> None:
+def test_engine_and_training_alone_sweep(tmp_path):
     environment = {"PYTHONPATH": str(CODE), "LEARNED_STRINGS_COMMIT": "abc", "PATH": ""}
     subprocess.run([sys.executable, "-P", "-c", RUN], cwd=tmp_path, env=environment, check=True, timeout=300)
     rows = read_results(tmp_path / "rows.csv")

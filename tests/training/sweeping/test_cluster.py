@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import sys
 from concurrent.futures import wait
 from typing import Any
@@ -11,8 +9,8 @@ from engine.schema import write
 from tests.training.sweeping.test_sweep import alone_rows, measured
 from training.sweeping import cluster as module
 from training.sweeping.cluster import cluster_workers
-from training.sweeping.sweep import Options, sweep
-from training.sweeping.task import Task, WorkersError
+from training.sweeping.sweep import sweep
+from training.sweeping.task import WorkersError
 
 
 @pytest.fixture
@@ -20,20 +18,20 @@ def distributed() -> Any:
     return pytest.importorskip("distributed", reason="Dask is not installed (the extra learned-strings[cluster])")
 
 
-def test_a_cluster_without_the_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_without_the_extra_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     remedy = r"a cluster needs Dask .* install the extra learned-strings\[cluster\] .*, or leave --scheduler out$"
     with pytest.raises(WorkersError, match=remedy), cluster_workers("tcp://127.0.0.1:9"):
         pass
 
 
-def test_a_scheduler_that_is_not_there_is_reported(distributed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_reported(distributed, monkeypatch):
     monkeypatch.setattr(module, "CONNECT_S", 0.2)
     with pytest.raises(WorkersError, match="no Dask scheduler answers there"), cluster_workers("tcp://127.0.0.1:9"):
         pass
 
 
-def test_the_workers_of_a_cluster_do_the_same(distributed: Any, plan, options: Options, alone: Options) -> None:
+def test_the_workers_of_a_cluster_do_the_same(distributed, plan, options, alone):
     made = plan(seeds="0")
     with (
         distributed.LocalCluster(
@@ -47,7 +45,7 @@ def test_the_workers_of_a_cluster_do_the_same(distributed: Any, plan, options: O
     assert measured(options.results) == alone_rows(made, alone)
 
 
-def test_a_cluster_that_ends_cancels_its_tasks(distributed: Any, plan, options: Options, task: Task) -> None:
+def test_a_cluster_that_ends_cancels_its_tasks(distributed, plan, options, task):
     with distributed.LocalCluster(
         n_workers=0, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 
@@ -47,7 +45,7 @@ def change(path: Path, old: str, new: str) -> str:
     return str(path)
 
 
-def test_the_order_is_of_value(path: Path) -> None:
+def test_the_order_is_of_value(path):
     """Block, seed, the non-linear string first, the short horizon first, then as named; each run once."""
     plan = load_plan(str(path))
     first = [
@@ -65,7 +63,7 @@ def test_the_order_is_of_value(path: Path) -> None:
     assert plan.runs[8].configuration.recipe.seed == 1
 
 
-def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> None:
+def test_a_trial_differs_from_the_cells_that_it_is_named_after(path):
     real = load_plan(str(path))
     trial = load_plan(change(path, "[[block]]", "[data]\ncount = 20\n[recipe_fields]\nepochs = 3\n\n[[block]]"))
     assert trial.trial
@@ -96,7 +94,7 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> No
         (BLOCKS, "block = []", "there is no [[block]]"),
     ],
 )
-def test_what_cannot_be_is_reported_with_its_place(path: Path, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_is_reported_with_its_place(path, old, new, message):
     with pytest.raises(SchemaError) as error:
         load_plan(change(path, old, new))
     assert str(error.value).startswith(str(path))
@@ -104,7 +102,7 @@ def test_what_cannot_be_is_reported_with_its_place(path: Path, old: str, new: st
 
 
 @pytest.mark.parametrize("name", ["nothing", "nothing.toml"])
-def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name: str) -> None:
+def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name):
     with pytest.raises(SchemaError, match=f"no plan '{name}'; give a .toml file or one of: published, tables, tiny"):
         load_plan(name)
 
@@ -114,7 +112,7 @@ def counts_of(name: str) -> Counter[tuple[str, int, str]]:
     return Counter((run.configuration.model, run.configuration.steps, run.recipe) for run in runs)
 
 
-def test_committed_plans_are_whole() -> None:
+def test_committed_plans_are_whole():
     assert plan_names() == ["published", "tables", "tiny"]
     assert load_plan("tiny").trial
     # what the paper is judged by: strings, data sets and five seeds; then long runs and the paper's text

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from training.sweeping.processes import Layout, fitted
@@ -25,11 +23,9 @@ def set_machine(monkeypatch: pytest.MonkeyPatch, cores: int, memory_bytes: int, 
         (2**40, 100, {"workers": 20}, 20),
     ],
 )
-def test_workers_fit_the_machine(
-    monkeypatch: pytest.MonkeyPatch, memory_bytes: int, tasks: int, options: dict[str, int], count: int
-) -> None:
+def test_workers_fit_the_machine(monkeypatch, memory_bytes, tasks, options, count):
     set_machine(monkeypatch, 8, memory_bytes)
-    found, threads = fitted(tasks, **options), options.get("threads", 1)  # type: ignore[arg-type]
+    found, threads = fitted(tasks, **options), options.get("threads", 1)
     assert (found.device, found.threads, len(found.environments)) == ("cpu", threads, count)
     assert {environment["OMP_NUM_THREADS"] for environment in found.environments} == {str(threads)}
     with pytest.raises(ValueError, match="no CUDA device can be used here"):
@@ -37,7 +33,7 @@ def test_workers_fit_the_machine(
 
 
 @pytest.mark.parametrize(("visible", "gpus"), [(None, ["0", "1"]), ("3, MIG-7", ["3", "MIG-7"])])
-def test_several_runs_share_a_gpu(monkeypatch: pytest.MonkeyPatch, visible: str | None, gpus: list[str]) -> None:
+def test_several_runs_share_a_gpu(monkeypatch, visible, gpus):
     set_machine(monkeypatch, 12, 2**40, gpus=2)
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     if visible:

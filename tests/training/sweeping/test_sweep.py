@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import multiprocessing
 import threading
 import time
@@ -80,7 +78,7 @@ class Script:
 # --- the queue
 
 
-def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, options: Options) -> None:
+def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, options):
     """A run that is under way then has no row: it continues from its checkpoint."""
     made, begun = plan(), time.monotonic()
     ends = replace(options, ends_s=begun + 0.2)
@@ -103,7 +101,7 @@ def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, option
     assert sweep(made, nobody, replace(options, ends_s=begun), Record()) == rows
 
 
-def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options: Options) -> None:
+def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options):
     made = plan()
     together = threading.Barrier(3)
 
@@ -120,7 +118,7 @@ def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, 
     assert read_results(options.results) == sorted(rows, key=lambda row: row.name)
 
 
-def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(plan, options: Options) -> None:
+def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(plan, options):
     made = plan()
     worst, unlucky = made.runs[0].name, made.runs[2].name
 
@@ -144,7 +142,7 @@ def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(pl
     assert again.started == [worst]
 
 
-def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, options: Options) -> None:
+def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, options):
     made = plan(seeds="0, 1, 2")
     at_once = replace(options, seeds_at_once=True)
     unlucky = made.runs[1].name
@@ -163,7 +161,7 @@ def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, 
     assert sorted(row.name for row in rows if row.status == "failed") == sorted(pieces[1])
 
 
-def test_what_diverged_is_a_result(plan, options: Options) -> None:
+def test_what_diverged_is_a_result(plan, options):
     diverged = Script(lambda run, tries: row_of(run, status="diverged", rel_mae=None, message="the loss is nan"))
     assert {row.status for row in sweep(plan(), diverged, options, Mock())} == {"diverged"}
     nothing = Script(lambda run, tries: "not to be run")
@@ -172,7 +170,7 @@ def test_what_diverged_is_a_result(plan, options: Options) -> None:
     assert is_finished(row_of(plan().runs[0])) and not is_finished(None)
 
 
-def test_workers_that_are_gone_end_the_sweep(plan, options: Options) -> None:
+def test_workers_that_are_gone_end_the_sweep(plan, options):
     left: Future[dict[str, Any]] = Future()
     left.cancel()
     left.set_running_or_notify_cancel()
@@ -182,12 +180,12 @@ def test_workers_that_are_gone_end_the_sweep(plan, options: Options) -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}])
-def test_a_row_that_makes_no_sense_is_a_failure(plan, options: Options, wrong: dict[str, Any]) -> None:
+def test_a_row_that_makes_no_sense_is_a_failure(plan, options, wrong):
     rows = sweep(plan(), Script(lambda run, tries: row_of(run), wrong=wrong), options, Mock())
     assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
 
 
-def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, options: Options) -> None:
+def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, options):
     made = plan()
     last = made.runs[-1]
 
@@ -201,7 +199,7 @@ def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, opti
     assert rows[-1].rel_mae == 0.25
 
 
-def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(plan, options: Options) -> None:
+def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(plan, options):
     workers = Script(lambda run, tries: row_of(run))
     options.results.mkdir()
     with pytest.raises(SchemaError, match="not an ordinary file"):
@@ -278,9 +276,7 @@ def here(count: int) -> Layout:
     return replace(fitted(count, device="cpu", workers=count), threads=1)
 
 
-def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
-    plan, options: Options, expected, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options, expected, monkeypatch):
     """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=10)
     options = replace(options, seeds_at_once=True)
@@ -312,7 +308,7 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
     assert options.results.read_bytes() == before
 
 
-def test_a_process_that_died_between_two_tasks_is_replaced() -> None:
+def test_a_process_that_died_between_two_tasks_is_replaced():
     wrong = {"runs": [], "digests": [], "threads": "two"}
     with process_workers(here(1)) as workers:
         assert "task.threads" in workers.submit(wrong).result()["error"]
@@ -324,7 +320,7 @@ def test_a_process_that_died_between_two_tasks_is_replaced() -> None:
         assert "task.threads" in workers.submit(wrong).result()["error"]
 
 
-def test_a_task_under_way_ends_with_its_workers(task: Task) -> None:
+def test_a_task_under_way_ends_with_its_workers(task):
     folder = task.folder_of(task.runs[0].name)
     folder.mkdir(parents=True)
     with FileLock(folder / "run.lock"), process_workers(here(1)) as workers:  # it would wait for ever

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import math
 import shutil
@@ -16,7 +14,6 @@ from training.data.dataset import dataset_folder, load_dataset
 from training.fitting.fit import FitProgress
 from training.fitting.log import TrainingLog
 from training.results import Row
-from training.sweeping.sweep import Options
 from training.sweeping.task import PROGRESS, Task, perform, read_progress
 
 
@@ -24,7 +21,7 @@ def folder_of(task: Task) -> Path:
     return task.folder_of(task.runs[0].name)
 
 
-def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_ends_with_its_row_and_reports_its_progress(task, monkeypatch):
     seen = []
     add = TrainingLog.add
 
@@ -41,7 +38,7 @@ def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task, monkeypat
     assert perform(write(task)) == outcome  # from the run's folder
 
 
-def test_a_damaged_data_cache_is_reported(plan, task: Task, options: Options) -> None:
+def test_a_damaged_data_cache_is_reported(plan, task, options):
     configuration = plan().runs[0].configuration.data
     load_dataset(configuration, options.cache)
     folder = dataset_folder(configuration, options.cache)
@@ -56,7 +53,7 @@ def test_a_damaged_data_cache_is_reported(plan, task: Task, options: Options) ->
     assert not reported.exists()  # it did not fail in the end
 
 
-def test_a_worker_of_another_version_trains_nothing(task: Task) -> None:
+def test_a_worker_of_another_version_trains_nothing(task):
     assert "another version" in perform(write(replace(task, digests=("0",))))["error"]
     assert "unknown field 'colour'" in perform(write(task) | {"colour": 1})["error"]
     plain = write(task)
@@ -65,7 +62,7 @@ def test_a_worker_of_another_version_trains_nothing(task: Task) -> None:
 
 
 @pytest.mark.parametrize("loss", [0.5, math.inf, math.nan])
-def test_a_progress_is_read_where_it_is_whole_and_finite(tmp_path: Path, loss: float) -> None:
+def test_a_progress_is_read_where_it_is_whole_and_finite(tmp_path, loss):
     progress = FitProgress(2, 8, 1, 4, 60, 1e-3, loss, RelativeError(0.5, 0.25), 1.0, 3.0)
     assert read_progress(tmp_path) is None
     (tmp_path / PROGRESS).write_text(json.dumps(write(progress)), encoding="utf-8")
@@ -75,7 +72,7 @@ def test_a_progress_is_read_where_it_is_whole_and_finite(tmp_path: Path, loss: f
         assert read_progress(tmp_path) is None
 
 
-def test_two_tasks_never_train_in_one_folder(task: Task, capfd: pytest.CaptureFixture[str]) -> None:
+def test_two_tasks_never_train_in_one_folder(task, capfd):
     folder_of(task).mkdir(parents=True)
     lock = FileLock(folder_of(task) / "run.lock")
     with lock:

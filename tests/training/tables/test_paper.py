@@ -1,13 +1,9 @@
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from training.tables.paper import METRICS, MODEL_ORDER, PRINTED, DatasetColumn, MeanFigure, factor, mark, paper_errors
 
 
-def test_the_papers_figures_are_all_there() -> None:
+def test_the_papers_figures_are_all_there():
     figures = paper_errors()
     assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
     found = [entry.figure(metric) for entry in figures.values() for metric in METRICS]
@@ -30,7 +26,7 @@ def test_the_papers_figures_are_all_there() -> None:
         ("linear", 400, "frnn", ("noise", 16000), (0.4730, 0.3205), (0.6347, 0.2836)),
     ],
 )
-def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any, mse: Any, mae: Any) -> None:
+def test_figures_of_the_paper(string, horizon, model, column, mse, mae):
     entry = paper_errors()[string, horizon, model, DatasetColumn(*column)]
     assert (entry.rel_mse, entry.rel_mae) == (MeanFigure(*mse), MeanFigure(*mae))
 
@@ -55,11 +51,11 @@ def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any
         ((float("inf"), None), (0.1, 0.02), "worse"),
     ],
 )
-def test_marks(ours: Any, paper: Any, expected: str) -> None:
+def test_marks(ours, paper, expected):
     assert mark(MeanFigure(*ours), MeanFigure(*paper)) == expected
 
 
-def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures() -> None:
+def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures():
     assert MeanFigure(1.0).total is None
     assert MeanFigure(1.0, 0.3).total == MeanFigure(1.0, None, 0.3).total == 0.3
     assert MeanFigure(1.0, 0.3, 0.4).total == pytest.approx(0.5)

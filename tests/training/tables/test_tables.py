@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import csv
 import io
 from typing import Any
@@ -105,22 +103,22 @@ def fields(text: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("rows", "place", "expected"), [each[1:] for each in CASES], ids=[each[0] for each in CASES])
-def test_a_cell_reports_its_rows(rows: list[Row], place: str, expected: str) -> None:
+def test_a_cell_reports_its_rows(rows, place, expected):
     found = cell(rows, **fields(place) if place else {})
     for name, value in fields(expected).items():
         is_number = value[:1].isdigit() or value[:1] == "."
         assert float(found[name]) == pytest.approx(float(value), rel=1e-5) if is_number else found[name] == value
 
 
-def test_csv_has_every_cell_and_is_of_a_recipe_where_one_is_asked_for() -> None:
+def test_csv_has_every_cell_and_is_of_a_recipe_where_one_is_asked_for():
     assert len(records(as_csv(TWO))) == len(COLUMNS) * 2 * (6 + 8)  # models with the integrated phase
     assert cell(TWO)["runs"].split() == [A.name, B.name]
     for recipe in ("ours", "paper"):
-        lines = records(as_csv(RECIPES, recipe), model="koopman_var", seeds="1")  # type: ignore[arg-type]
+        lines = records(as_csv(RECIPES, recipe), model="koopman_var", seeds="1")
         assert [entry["recipe"] for entry in lines] == [recipe]
 
 
-def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_out() -> None:
+def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_out():
     other = Cell("lru", True, "gaussian", 4000, 1000)
     rows = [
         row(mse=0.3, finished="2025-02-01T00:00:00Z"),
@@ -139,7 +137,7 @@ def compact_lines(text: str, horizon: int, string: str, model: str) -> list[list
     return [entry[2:] for entry in cells if entry[:2] == [string, model]]
 
 
-def test_a_compact_line_has_start_seeds_figures_and_ratio() -> None:
+def test_a_compact_line_has_start_seeds_figures_and_ratio():
     (ours,) = compact_lines(as_compact(TWO), 4000, "nonlinear", "LRU")
     assert ours == ["random weights", "2", "**0.011 (0.0260) ×0.42**", *["not run"] * 3]
     by_mae = as_compact(TWO, metric="rel_mae")
@@ -147,7 +145,7 @@ def test_a_compact_line_has_start_seeds_figures_and_ratio() -> None:
     assert compact_lines(as_compact([row(mse=1.5)]), 4000, "nonlinear", "LRU")[0][2] == "*1.5 (0.0260) ×58*"
 
 
-def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:
+def test_compact_tables_list_what_is_missing_and_what_went_wrong():
     found = as_compact([row(A), row(B, None, None, status="diverged")])
     assert compact_lines(found, 4000, "nonlinear", "LRU")[0][2].endswith("; 1 diverged")
     assert "- LRU, nonlinear string, 4000 frames: not Gaussian 16 kHz, Noise 4 kHz, Noise 16 kHz.\n" in found
@@ -155,7 +153,7 @@ def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:
     assert "FRNN, linear string, 4000" not in found  # as in the paper
 
 
-def test_compact_tables_leave_out_long_runs_measured_over_400_frames() -> None:
+def test_compact_tables_leave_out_long_runs_measured_over_400_frames():
     long = row(LONG, rel_mse_400=0.0002, rel_mae_400=0.01)
     assert compact_lines(as_compact([long]), 4000, "nonlinear", "LRU")
     (none,) = compact_lines(as_compact([long]), 400, "nonlinear", "LRU")
