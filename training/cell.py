@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -169,6 +170,12 @@ class RecipeBook:
     case: tuple[RecipeCase, ...] = ()
 
 
+@cache
+def _recipe_book(name: str) -> RecipeBook:
+    path = RECIPES / f"{name}.toml"
+    return read(RecipeBook, read_toml(path), str(path))
+
+
 def recipe_names() -> list[str]:
     return sorted(path.stem for path in RECIPES.glob("*.toml"))
 
@@ -207,7 +214,7 @@ def configuration_of(
     path = RECIPES / f"{cell.recipe}.toml"
     if not path.is_file():
         raise SchemaError(f"{cell.name}: recipe {cell.recipe!r} is not one of {', '.join(recipe_names())}")
-    book = read(RecipeBook, read_toml(path), str(path))
+    book = _recipe_book(cell.recipe)
     settings: dict[str, Any] = dict(book.default)
     sizes: dict[str, Any] = {}
     for case in book.case:
