@@ -1,16 +1,19 @@
+"""Configurations: of a cell's name, of a file, and of earlier versions; each digest is for good."""
+
 import itertools
 from dataclasses import dataclass, replace
 
 import pytest
 
-from engine.models import MODELS, OF_MANY_STRINGS
+from engine.models import MODELS, OF_MANY_STRINGS, build_model
 from engine.models.configurations import LRUConfiguration
-from engine.schema import SchemaError
+from engine.schema import SchemaError, write
 from training.cell import Cell, configuration_of, load
+from training.configuration import read_configuration
+from training.results import RESULTS, read_results
 from training.start import starts_of
 
 OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
-
 EVERY_CELL = [
     Cell(model, nonlinear, initial, rate_hz, horizon, recipe, seed)
     for model, nonlinear, initial, rate_hz, horizon, recipe, seed in itertools.product(
@@ -57,11 +60,11 @@ def test_a_digest_is_for_good(cell):
 
 
 def test_a_digest_covers_what_a_run_has_by_default_and_its_seed_but_no_title(monkeypatch):
-    found = configuration_of(Cell("lru", True, "noise", 4000))
-    assert replace(found, model_configuration={"state_size": 128}).digest == found.digest
-    assert configuration_of(Cell("lru", True, "noise", 4000), {"count": 1000}).digest == found.digest
-    assert replace(found, title="other").digest == found.digest
+    cell = Cell("lru", True, "noise", 4000)
+    found = configuration_of(cell)
     digest = found.digest
+    assert replace(found, model_configuration={"state_size": 128}).digest == digest
+    assert configuration_of(cell, {"count": 1000}).digest == replace(found, title="other").digest == digest
 
     @dataclass(frozen=True)
     class Larger(LRUConfiguration):
@@ -71,15 +74,62 @@ def test_a_digest_covers_what_a_run_has_by_default_and_its_seed_but_no_title(mon
     assert found.digest != digest
 
 
+# Earlier versions
+
+
+def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today():
+    now = configuration_of(Cell("lru", True, "gaussian", 4000, 400))
+    plain = write(now)
+    plain["recipe"] |= {"random_start": False, "koopman_terms": "text"}
+    assert read_configuration(plain, "a preset") == now
+    plain["recipe"]["random_start"] = True
+    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it again"):
+        read_configuration(plain, "a preset")
+
+
+@pytest.mark.parametrize(
+    ("name", "flags"),
+    [
+        ("koopman_var", {"initialisation": "physics"}),
+        ("koopman", {"initialisation": "paper", "latent_epochs": 1000}),
+        ("koopman_blind", {"blind": True, "latent_epochs": 1000}),
+        ("koopman_integrated_blind", {"blind": True, "latents_per_mode": 1}),
+        ("koopman_integrated_hinted", {"blind": True, "latents_per_mode": 0}),
+        ("frnn_400", {"blind": True}),
+        ("lru_paper", {"blind": False, "initialisation": ""}),
+    ],
+)
+def test_the_flags_of_before_starts_had_one_name_are_read(name, flags):
+    now = load(f"nylon_nonlinear_noise_4k_{name}")
+    plain = write(now)
+    del plain["recipe"]["start"]
+    plain["recipe"] |= flags
+    found = read_configuration(plain, "a preset")
+    assert (found.start, found.digest) == (now.start, now.digest)
+
+
+def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_the_value_that_they_had():
+    now = configuration_of(Cell("koopman_integrated", True, "gaussian", 16_000))
+    assert now.digest in {row.digest for row in read_results(RESULTS)}
+    gone = {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}
+    plain = write(now)
+    plain["model_configuration"] |= gone
+    assert read_configuration(plain, "a preset").digest == now.digest
+    assert build_model(now.model, gone).configuration == build_model(now.model).configuration
+    plain["model_configuration"]["gain_limit_db"] = 3.0
+    with pytest.raises(SchemaError, match=r"model_configuration\.gain_limit_db: 3\.0 is of an earlier version"):
+        read_configuration(plain, "a preset")
+
+
+# Refusals
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [
         ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
         ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
-        (
-            "nylon_nonlinear_noise_4k_lru_400_theirs",
-            "recipe 'theirs' is not one of blind, hinted, ours, paper, published",
-        ),
+        ("nylon_nonlinear_noise_4k_lru_400_theirs", "'theirs' is not one of blind, hinted, ours, paper, published"),
         ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
         ("no_such_thing", "no training configuration 'no_such_thing'"),
         ("nylon_nonlinear_noise_4k_koopman_tension", "`family train` trains it"),
@@ -96,8 +146,51 @@ def test_a_name_that_is_no_cell_is_reported(name, words):
         ({"counts": 3}, {}, "data: unknown field 'counts'"),
         ({}, {"epoch": 3}, "unknown field 'epoch'"),
         ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
+        ({}, {"batch_statistics_until": 0.0}, "batch_statistics_until"),
+        ({}, {"latent_epochs": 0, "latent_polish": 1}, "latent_polish needs latent_epochs"),
+        ({}, {"start": "physics", "latent_epochs": 9}, "a pursuit needs some, any other start none"),
+        ({}, {"latent_epochs": 0, "latent_polish": 0}, "a pursuit needs some, any other start none"),
+        ({"largest_tension_rise": 0.0}, {}, "largest_tension_rise must be above 0"),
+        ({"steps": 4002, "stride": 4}, {}, "steps must be a multiple of stride, 4, not 4002"),
     ],
 )
 def test_wrong_overrides_are_reported(data, recipe, words):
     with pytest.raises(SchemaError, match=words):
         configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)
+
+
+CONFIGURATION = """
+title = "a run"
+model = "koopman_var"
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 10
+[recipe]
+epochs = 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (CONFIGURATION + "[model_configuration]\nstate_size = 1_000_000_000\n", "state_size must lie in"),
+        (CONFIGURATION + "[model_configuration]\ncolour = 3\n", "unknown field 'colour'"),
+        (CONFIGURATION + "[model_configuration]\ngrid_points = 51\n", "grid_points is 51, the data's are 101"),
+        (CONFIGURATION + 'start = "guess"\n', "start 'guess' is not one of"),
+        (CONFIGURATION.replace("modes = 10", "modes = 10\ncount = 100_000_000"), "GiB of data"),
+        (CONFIGURATION.replace("modes = 10", "modes = 10\nsubsteps = 10_000_000"), "substeps must lie in"),
+        (CONFIGURATION.replace("modes = 10", "modes = 100"), "cannot hold 100 modes"),
+        ("title = " + "[" * 60 + "]" * 60, "nested"),
+        ("title = " + "[" * 30_000 + "]" * 30_000, "recursion"),
+        ("title = '\udcff'", "not valid TOML"),
+        (CONFIGURATION.replace("4000", "4" * 5000), "digits"),
+    ],
+)
+def test_a_file_that_would_take_for_ever_is_refused_by_file_and_field(text, words, tmp_path):
+    path = tmp_path / "run.toml"
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(SchemaError, match=words) as caught:
+        load(str(path))
+    reported = str(caught.value)
+    assert str(path) in reported and len(reported) <= 500 and reported.isprintable()

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from engine.presets import load_preset
-from tests.training.fits import fit
+from tests.training.conftest import fit
 from training.cell import Cell, configuration_of
 from training.family.preset import FamilyConfiguration, train_preset
 

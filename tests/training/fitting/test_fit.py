@@ -10,7 +10,7 @@ import torch
 
 from engine.compare.relative import RelativeError
 from engine.models.dmd import DMD
-from tests.training.fits import fit
+from tests.training.conftest import fit
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe, Run, TrainingConfiguration
 from training.data.batches import Batch

@@ -11,7 +11,7 @@ from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import IntegratedPhase
 from engine.resonators.string import resonator_of
-from tests.training.fits import fit
+from tests.training.conftest import fit
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset

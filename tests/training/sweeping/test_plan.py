@@ -29,6 +29,14 @@ recipe = "ours"
 """
 
 BLOCKS = PLAN[PLAN.index("[[block]]") :]
+TOO_MANY = f"""[[block]]
+models = {["koopman"] * 1000}
+strings = ["linear"]
+initials = ["gaussian", "noise"]
+rates_hz = [4000, 16000]
+horizons = [400, 800, 1600, 4000]
+seeds = {[*range(1000)]}
+"""
 
 
 @pytest.fixture
@@ -92,9 +100,12 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path):
         ("description", "title", "unknown field 'title'"),
         ("[[block]]", "[block", "not valid TOML"),
         (BLOCKS, "block = []", "there is no [[block]]"),
+        (BLOCKS, TOO_MANY, "a block of 16000000 cells is too large"),  # before one is made
     ],
 )
-def test_what_cannot_be_is_reported_with_its_place(path, old, new, message):
+def test_what_cannot_be_is_reported_with_its_place(path, old, new, message, monkeypatch):
+    if new == TOO_MANY:
+        monkeypatch.setattr("training.sweeping.plan.Cell", None)
     with pytest.raises(SchemaError) as error:
         load_plan(change(path, old, new))
     assert str(error.value).startswith(str(path))
@@ -107,21 +118,18 @@ def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name):
         load_plan(name)
 
 
-def counts_of(name: str) -> Counter[tuple[str, int, str]]:
-    runs = load_plan(name).runs
-    return Counter((run.configuration.model, run.configuration.steps, run.recipe) for run in runs)
-
-
 def test_committed_plans_are_whole():
-    assert plan_names() == ["published", "tables", "tiny"]
-    assert load_plan("tiny").trial
+    plans = {name: load_plan(name) for name in plan_names()}
+    assert plans.keys() == {"published", "tables", "tiny"} and plans["tiny"].trial
+    runs = {name: [(run, run.configuration) for run in plan.runs] for name, plan in plans.items()}
+    counts = {name: Counter((c.model, c.steps, run.recipe) for run, c in of) for name, of in runs.items()}
     # what the paper is judged by: strings, data sets and five seeds; then long runs and the paper's text
     models = "koopman_var", "koopman", "lru", "s5"
-    assert counts_of("published") == {(model, 400, "published"): 2 * 4 * 5 for model in models} | {
+    assert counts["published"] == {(model, 400, "published"): 2 * 4 * 5 for model in models} | {
         ("koopman_var", 4000, "published"): 4 * 3,
         ("koopman_var", 400, "paper"): 4 * 3,
     }
-    first = [Cell.parse(run.name) for run in load_plan("published").runs[:5]]
+    first = [Cell.parse(run.name) for run, _ in runs["published"][:5]]
     assert first == [Cell("koopman_var", True, "noise", 4000, 400, "published", seed) for seed in range(5)]
     # the paper's: eight data sets, two horizons, five seeds; the Fourier models over 400 frames alone, one DMD
     expected = {(model, n, "paper"): 8 * 5 for model in models for n in (400, 4000)}
@@ -129,10 +137,10 @@ def test_committed_plans_are_whole():
     expected |= {(model, n, "ours"): count for (model, n, _), count in expected.items()}
     for n in (400, 4000):
         expected |= {("dmd", n, "ours"): 8, ("koopman_integrated", n, "ours"): 8 * 5}
-    found = counts_of("tables")
+    found = counts["tables"]
     blind = {key: found.pop(key) for key in list(found) if key[2] == "blind"}
     assert found == expected and {model for model, *_ in expected} == MODELS.keys() - OF_MANY_STRINGS
     assert sum(blind.values()) == 2 * 8
     # one seed of ours everywhere before two anywhere
-    seeds = [run.configuration.recipe.seed for run in load_plan("tables").runs if run.recipe == "ours"]
+    seeds = [c.recipe.seed for run, c in runs["tables"] if run.recipe == "ours"]
     assert seeds.index(1) == seeds.count(0)
