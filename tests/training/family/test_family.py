@@ -86,6 +86,9 @@ def test_a_preset_of_many_strings_is_whole(tmp_path):
     assert loaded.info == info and info.family == FAMILY["inside"]
     assert info.rel_mse is not None and 0 < info.rel_mse < 1e-3
     assert read_configuration().initialisation == "kicks"
+    train_preset(c, tmp_path / "again.safetensors")
+    again = load_preset(tmp_path / "again.safetensors").model.state_dict()
+    assert all(torch.equal(weight, again[name]) for name, weight in loaded.model.state_dict().items())
 
 
 def test_players_are_as_good_as_they_should_be():

@@ -11,23 +11,17 @@ from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import IntegratedPhase
 from engine.resonators.string import resonator_of
-from tests.training.conftest import fit
+from tests.training.conftest import DATA, fit
 from training.cell import Cell, configuration_of
-from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.configuration import Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import ModeMotion, fit_phases, upright
 from training.fitting.start import begin
-from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES
+from training.start import COUNT, PHASES, SYMMETRIES
 
 STEPS = 450
-
-
-def integrated_phase(state_size: int = 5) -> IntegratedPhase:
-    model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=state_size))
-    model.initialise("random", None, torch.Generator().manual_seed(0))
-    return model
 
 
 @torch.no_grad()
@@ -69,66 +63,32 @@ def test_a_negative_frequency_is_the_same_motion_as_a_positive_one():
     np.testing.assert_allclose(motion(fitted), motion(found), atol=1e-6)
 
 
-@pytest.mark.parametrize("state_size", [5, 7])
-def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset, state_size):
-    model = integrated_phase(state_size)
-    model.store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
+@pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
+def test_a_run_starts_with_a_latent_for_each_mode_and_predicts_strings_that_the_fit_has_not_seen(
+    small_dataset, sizes
+):
+    c = small_dataset.configuration
+    configuration = TrainingConfiguration(
+        "A test", "koopman_integrated", c, Recipe(epochs=1, start=PHASES), model_configuration=sizes
+    )
+    assert configuration.start == PHASES
+    model, latents = begin(configuration, small_dataset)
+    assert (model.configuration.state_size, latents) == (sizes.get("state_size", 5), None)
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
-    linear = resonator_of(small_dataset.configuration.string, 5).eigenvalues() / small_dataset.configuration.rate_hz
+    linear = resonator_of(c.string, 5).eigenvalues() / c.rate_hz
     torch.testing.assert_close(model.theta_log[:5].exp(), torch.from_numpy(linear.imag), rtol=2e-3, atol=0)
 
 
-def test_a_run_starts_there(small_dataset, runs):
-    recipe = Recipe(epochs=1, start=PHASES, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
-    configuration = TrainingConfiguration(
-        "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration={"state_size": 5}
-    )
-    assert configuration.start == PHASES
-    untrained = integrated_phase()
-    untrained.store_modes(fit_phases(found_modes(small_dataset, STEPS), recipe.seed))
-    expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
-    assert fit(configuration, small_dataset, runs).validation.total().rel_mae == pytest.approx(
-        expected.rel_mae, rel=1e-2
-    )
-
-
 def test_what_cannot_start_so_is_refused(small_dataset):
+    few = IntegratedPhase(IntegratedPhaseConfiguration(state_size=4))
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
-        integrated_phase(4).store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
+        few.store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
         found_modes(strided, STEPS)
     for model in ("fgru", "frnn"):
         with pytest.raises(ValueError, match=r"-m training\.research\.fourier_wiring RUN$"):
             begin(configuration_of(Cell(model, True, "gaussian", 4000, 400)), small_dataset)
-
-
-@pytest.mark.parametrize(
-    ("model", "start", "latent_epochs", "words"),
-    [
-        ("s5", PHASES, 0, "start 'phases of the displacement' is not one of paper, physics"),
-        ("koopman", PURSUIT, 0, "a pursuit needs some, any other start none"),
-        ("koopman", BLIND_PURSUIT, 0, "a pursuit needs some, any other start none"),
-        ("koopman", "paper", 1, "a pursuit needs some, any other start none"),
-    ],
-)
-def test_a_start_is_one_of_the_models(model, start, latent_epochs, words):
-    data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
-    with pytest.raises(ValueError, match=words):
-        TrainingConfiguration("A test", model, data, Recipe(epochs=1, start=start, latent_epochs=latent_epochs))
-
-
-@pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
-def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_found(small_dataset, sizes):
-    configuration = TrainingConfiguration(
-        "A test",
-        "koopman_integrated",
-        small_dataset.configuration,
-        Recipe(epochs=1, start=PHASES),
-        model_configuration=sizes,
-    )
-    model, latents = begin(configuration, small_dataset)
-    assert (model.configuration.state_size, latents) == (sizes.get("state_size", 5), None)
 
 
 @pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
@@ -142,40 +102,32 @@ def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(
     assert hinted.knowledge == (SYMMETRIES if model == "koopman" else f"{SYMMETRIES}, and {COUNT}")
 
 
-def blind_weights(cell: Cell, dataset: Dataset, runs: Path) -> StringModel:
+def blind_models(cell_model: str, runs: Path, *datasets: Dataset) -> list[StringModel]:
     """Of the committed recipe, cut short."""
-    c = dataset.configuration
-    data = {"modes": c.modes, "steps": c.steps, "count": c.count}
     recipe = {"epochs": 4, "batch_size": 8, "validate_every": 2}
-    if cell.model == "koopman":
+    if cell_model == "koopman":
         recipe |= {"latent_epochs": 3, "latent_polish": 1}
-    configuration = configuration_of(replace(cell, horizon=STEPS), data, recipe)
-    return fit(replace(configuration, data=c), dataset, runs).model
+    made = configuration_of(Cell(cell_model, True, "gaussian", 4000, STEPS, "blind"), DATA, recipe)
+    of_each = [replace(made, data=each.configuration) for each in datasets]
+    return [fit(one, each, runs / str(n)).model for n, (one, each) in enumerate(zip(of_each, datasets, strict=True))]
 
 
 @pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
-def test_the_same_displacement_of_another_claimed_string_gives_the_same_weights(small_dataset, runs, model):
-    cell = Cell(model, True, "gaussian", 4000, recipe="blind")
+def test_of_another_claimed_string_the_weights_are_the_same(small_dataset, runs, model, monkeypatch):
+    monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 5)
     c = small_dataset.configuration
     string = replace(c.string, length_m=1.3, tension_n=20.0, density_kg_m3=7850.0, damping_d3_kg_m_s=0.0)
-    claimed = replace(
-        small_dataset, configuration=replace(c, string=string, tension_modulated=False, initial="noise")
-    )
-    own, other = (
-        blind_weights(cell, each, runs / name) for name, each in (("own", small_dataset), ("other", claimed))
-    )
+    claimed = replace(c, string=string, tension_modulated=False, initial="noise")
+    own, other = blind_models(model, runs, small_dataset, replace(small_dataset, configuration=claimed))
     for name, weights in own.state_dict().items():
         assert torch.equal(weights, other.state_dict()[name]), name
 
 
 def test_the_number_of_modes_is_found_and_no_claim_of_more_changes_it(small_dataset, runs):
-    cell = Cell("koopman_integrated", True, "gaussian", 4000, recipe="blind")
     amplitudes = torch.nn.functional.pad(small_dataset.amplitudes, (0, 2))  # two more that never move
     c = replace(small_dataset.configuration, modes=7)
     claimed = replace(small_dataset, configuration=c, amplitudes=amplitudes)
-    own, other = (
-        blind_weights(cell, each, runs / name) for name, each in (("own", small_dataset), ("other", claimed))
-    )
+    own, other = blind_models("koopman_integrated", runs, small_dataset, claimed)
     assert own.configuration.state_size == other.configuration.state_size == 5
     error, again = (evaluate_model(each, small_dataset, "validation", STEPS).total() for each in (own, other))
     assert again.rel_mae == pytest.approx(error.rel_mae, rel=0.05)  # sums of seven products are rounded otherwise

@@ -9,6 +9,8 @@ import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
 from engine.models import build_model
+from tests.training.conftest import DATA
+from tests.training.fitting.test_fit import SMALL
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe
 from training.data.batches import TrainingData
@@ -39,7 +41,7 @@ def test_a_step_asks_nothing_of_the_host(name, small_dataset, monkeypatch):
     """On tensors without values, which no host can read."""
     monkeypatch.setattr(together, "MAPPED_ON", ("meta",))
     data = TrainingData(small_dataset, META)
-    models = [build_model(name).to(META) for _ in range(2)]
+    models = [build_model(name, SMALL[name]).to(META) for _ in range(2)]
 
     def step() -> None:
         batches = [data.draw(EVERY, torch.zeros(4, dtype=torch.int64, device=META), 8, 0) for _ in models]
@@ -67,7 +69,7 @@ def test_a_step_asks_nothing_of_the_host(name, small_dataset, monkeypatch):
 )
 def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(small_dataset, recipe, changes, repeats):
     cell = Cell("koopman_var", True, "gaussian", 4000, 400, recipe)
-    made = configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, {"batch_size": 4, **changes})
+    made = configuration_of(cell, DATA, {"batch_size": 4, **changes})
     assert TrainingState(made, small_dataset, CPU).repeats_itself is repeats
 
 
@@ -76,14 +78,11 @@ def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch):
     seen: list[str] = []
     stream = SimpleNamespace(wait_stream=lambda other: None)
     graph = SimpleNamespace(replay=lambda: seen.append("repeated"))
-    for name, stub in {
-        "Stream": lambda: stream,
-        "current_stream": lambda: stream,
-        "stream": lambda which: nullcontext(),
-        "CUDAGraph": lambda: graph,
-        "graph": lambda which: nullcontext(seen.append("recorded")),
-    }.items():
-        monkeypatch.setattr(torch.cuda, name, stub)
+    for name in ("Stream", "current_stream"):
+        monkeypatch.setattr(torch.cuda, name, lambda: stream)
+    monkeypatch.setattr(torch.cuda, "stream", lambda which: nullcontext())
+    monkeypatch.setattr(torch.cuda, "CUDAGraph", lambda: graph)
+    monkeypatch.setattr(torch.cuda, "graph", lambda which: nullcontext(seen.append("recorded")))
     precision = torch.get_float32_matmul_precision()
     work = recorded.RecordedWork(lambda: seen.append(torch.get_float32_matmul_precision()))
     for _ in range(recorded.BEFORE + 2):
@@ -98,7 +97,7 @@ def test_a_repeated_step_is_the_launched_one(name, small_dataset, monkeypatch):
     monkeypatch.setattr(recorded, "PRECISION", "highest")
     cells = [Cell(name, True, "gaussian", 4000, 20, "paper", seed) for seed in range(2)]
     changes = {"batch_size": 4, "schedule": "one_cycle"}
-    made = [configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, changes) for cell in cells]
+    made = [configuration_of(cell, DATA, changes) for cell in cells]
     repeated, launched = (
         [TrainingState(each, small_dataset, torch.device("cuda")) for each in made] for _ in range(2)
     )
