@@ -1,13 +1,12 @@
 """A plan of runs that are small enough for a test."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.training.conftest import row
 from training.configuration import Run
 from training.results import Row
 from training.sweeping.plan import Plan, load_plan
@@ -16,11 +15,9 @@ from training.sweeping.task import Task
 
 PLAN = """
 description = "Tiny."
-
 [data]
 count = 10
 steps = 60
-
 [recipe_fields]
 epochs = {epochs}
 batch_size = 8
@@ -28,7 +25,6 @@ steps_per_batch = 8
 first_horizon = 20
 validate_every = 4
 latent_polish = 0
-
 [[block]]
 models = ["koopman_var", "koopman"]
 strings = ["nonlinear", "linear"]
@@ -56,18 +52,10 @@ def options(tmp_path: Path) -> Options:
 
 
 @pytest.fixture
-def alone(options: Options, tmp_path: Path) -> Options:
-    """Another place for the same runs."""
-    return replace(options, results=tmp_path / "alone.csv", runs=tmp_path / "alone")
-
-
-@pytest.fixture
-def task(plan, options: Options) -> Task:
+def task(plan: Callable[..., Plan], options: Options) -> Task:
     made = plan()
     return options.task(made, made.runs[0])
 
 
-def row_of(run: Run, **changes: Any) -> Row:
-    fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
-    fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "finished": "2026-01-01T00:00:00Z"}
-    return Row(run.digest, run.name, **(fields | changes))
+def row_of(run: Run, **changes: object) -> Row:
+    return row(run.digest, run.name, **changes)
