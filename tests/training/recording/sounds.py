@@ -9,6 +9,7 @@ import io
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -40,14 +41,9 @@ DRUMS = (("concert_toms", 41), ("concert_toms", 47), ("conga", 55), ("frame_drum
 
 @dataclass(frozen=True)
 class Case:
-    """A sound to be judged.
+    """A sound to be judged; `is_note`: it is one note of a string, and to be kept."""
 
-    Attributes:
-        base: that it was made from: a recording's name, or a number.
-        is_note: it is one note of a string, and to be kept.
-    """
-
-    base: str
+    base: str  # a recording's name, or a number
     kind: str
     is_note: bool
     sound: Sound
@@ -60,20 +56,23 @@ def is_judged(name: str) -> bool:
 
 def cases(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
     """The cases of recordings, each in each change, and of so many synthetic notes; and as many that are no notes."""
-    recordings = {name: (_of_one_channel(samples), rate_hz) for name, (samples, rate_hz) in recordings.items()}
+    recordings = {
+        name: (samples if samples.ndim == 1 else samples.mean(1), rate_hz)
+        for name, (samples, rate_hz) in recordings.items()
+    }
     for name, sound in recordings.items():
-        if NO_STRING in name:
-            yield from _changed(name, sound, False, seed)
-        else:
+        if is_note := NO_STRING not in name:
             yield Case(name, "as recorded", True, sound)
-            yield from _changed(name, sound, True, seed)
+        for number, (kind, change) in enumerate(CHANGES.items()):
+            random = np.random.default_rng([seed, number, sum(name.encode())])
+            yield Case(name, kind if is_note else f"no string, {kind}", is_note, change(random, *sound))
     for number in range(count):
         base = f"synthetic {number}"
         sound = random_pluck(seed + number)
         yield Case(base, "synthetic", True, sound)
         random = np.random.default_rng([seed, number])
         kind = list(CHANGES)[number % len(CHANGES)]
-        yield Case(base, f"synthetic, {kind}", True, CHANGES[kind](random, sound))
+        yield Case(base, f"synthetic, {kind}", True, CHANGES[kind](random, *sound))
     yield from _no_notes(recordings, count, seed)
 
 
@@ -93,76 +92,66 @@ def random_pluck(seed: int) -> Sound:
     return made.samples, made.rate_hz
 
 
-# One note of a string
+# One note of a string: changes of samples and their rate
 
 
-def quieter(random: Random, sound: Sound) -> Sound:
+def quieter(random: Random, samples: Array, rate_hz: int) -> Sound:
     """At -40 to 0 dBFS, in 16 bits."""
-    samples, rate_hz = sound
     peak = 10 ** (random.uniform(-40, 0) / 20)
     return np.round(samples / np.abs(samples).max() * peak * 32767) / 32768, rate_hz
 
 
-def slightly_clipped(random: Random, sound: Sound) -> Sound:
+def slightly_clipped(random: Random, samples: Array, rate_hz: int) -> Sound:
     """At most twelve samples at the limit, some of them in a row."""
-    samples, rate_hz = sound
     limit = np.sort(np.abs(samples))[-int(random.integers(4, 13))]
     return np.clip(samples, -limit, limit) / limit, rate_hz
 
 
-def resampled(random: Random, sound: Sound) -> Sound:
-    samples, rate_hz = sound
+def resampled(random: Random, samples: Array, rate_hz: int) -> Sound:
     target = int(random.choice([rate for rate in RATES_HZ if rate != rate_hz]))
     return _at_rate(samples, rate_hz, target), target
 
 
-def noisier(random: Random, sound: Sound) -> Sound:
+def noisier(random: Random, samples: Array, rate_hz: int) -> Sound:
     """White or brown noise, below the peak."""
-    samples, rate_hz = sound
     level = 10 ** (float(random.choice(NOISE_DB)) / 20) * float(np.abs(samples).max())
     exponent = float(random.choice([0.0, 1.0]))
     return samples + level * _noise(random, len(samples), exponent), rate_hz
 
 
-def cut_before(random: Random, sound: Sound) -> Sound:
+def cut_before(random: Random, samples: Array, rate_hz: int) -> Sound:
     """0 to 20 ms are left of the lead."""
-    samples, rate_hz = sound
     left = round(random.uniform(0, 0.02) * rate_hz)
     return samples[max(0, onset_of(samples, rate_hz) - left) :], rate_hz
 
 
-def cut_after(random: Random, sound: Sound) -> Sound:
+def cut_after(random: Random, samples: Array, rate_hz: int) -> Sound:
     """0.5 to 3 s after its beginning, with a fade of 10 ms or without."""
-    samples, rate_hz = sound
-    end = onset_of(samples, rate_hz) + round(random.uniform(0.5, 3) * rate_hz)
-    part = samples[:end].copy()
+    part = samples[: onset_of(samples, rate_hz) + round(random.uniform(0.5, 3) * rate_hz)].copy()
     if random.random() < 0.5:
         fade = min(len(part), rate_hz // 100)
         part[-fade:] *= np.linspace(1, 0, fade)
     return part, rate_hz
 
 
-def silence_after(random: Random, sound: Sound) -> Sound:
+def silence_after(random: Random, samples: Array, rate_hz: int) -> Sound:
     """Digital silence, one constant, or faint noise, for 0.2 to 3 s."""
-    samples, rate_hz = cut_after(random, sound) if random.random() < 0.5 else sound
+    samples, _ = cut_after(random, samples, rate_hz) if random.random() < 0.5 else (samples, rate_hz)
     return np.concatenate([samples, _silence(random, rate_hz)]), rate_hz
 
 
-def silence_before(random: Random, sound: Sound) -> Sound:
-    samples, rate_hz = sound
+def silence_before(random: Random, samples: Array, rate_hz: int) -> Sound:
     return np.concatenate([_silence(random, rate_hz), samples]), rate_hz
 
 
-def silence_around(random: Random, sound: Sound) -> Sound:
+def silence_around(random: Random, samples: Array, rate_hz: int) -> Sound:
     """With an offset over all."""
-    samples, rate_hz = sound
     quiet = np.zeros(round(random.uniform(0.2, 3) * rate_hz))
     return np.concatenate([quiet, samples, quiet]) + random.uniform(-0.05, 0.05), rate_hz
 
 
-def in_a_room(random: Random, sound: Sound) -> Sound:
+def in_a_room(random: Random, samples: Array, rate_hz: int) -> Sound:
     """A small room, T60 of 0.15 to 0.5 s, 12 to 24 dB below the direct sound's energy."""
-    samples, rate_hz = sound
     t = np.arange(round(0.6 * rate_hz)) / rate_hz
     tail = random.standard_normal(len(t)) * 10 ** (-3 * t / random.uniform(0.15, 0.5))
     tail[: round(random.uniform(0.002, 0.01) * rate_hz)] = 0
@@ -170,10 +159,9 @@ def in_a_room(random: Random, sound: Sound) -> Sound:
     return samples + signal.fftconvolve(samples, tail)[: len(samples)], rate_hz
 
 
-def coded(container: str, subtype: str, random: Random, sound: Sound) -> Sound:
+def coded(container: str, subtype: str, random: Random, samples: Array, rate_hz: int) -> Sound:
     """Through a lossy coder and back."""
-    samples, rate_hz = sound
-    if subtype == "OPUS" and rate_hz != 48_000:
+    if (subtype == "OPUS" and rate_hz != 48_000) or (container == "MP3" and rate_hz > 48_000):
         samples, rate_hz = _at_rate(samples, rate_hz, 48_000), 48_000
     file = io.BytesIO()
     level = float(random.uniform(0.2, 0.9))
@@ -184,9 +172,8 @@ def coded(container: str, subtype: str, random: Random, sound: Sound) -> Sound:
     return soundfile.read(file)
 
 
-def on_two_channels(random: Random, sound: Sound) -> Sound:
+def on_two_channels(random: Random, samples: Array, rate_hz: int) -> Sound:
     """The same on both, one louder or later by less than a millisecond, or one of them silent."""
-    samples, rate_hz = sound
     other = samples * random.uniform(0.2, 1)
     if random.random() < 0.3:
         other = np.zeros(len(samples))
@@ -195,22 +182,15 @@ def on_two_channels(random: Random, sound: Sound) -> Sound:
     return np.stack([samples, other], 1), rate_hz
 
 
-def changed_thrice(random: Random, sound: Sound) -> Sound:
+def changed_thrice(random: Random, samples: Array, rate_hz: int) -> Sound:
     """Three changes, one after another, that leave one channel."""
     names = [name for name in CHANGES if name not in ("two channels", "three changes")]
     for name in random.choice(names, 3, replace=False):
-        sound = CHANGES[name](random, sound)
-    return sound
+        samples, rate_hz = CHANGES[name](random, samples, rate_hz)
+    return samples, rate_hz
 
 
-def _mp3(random: Random, sound: Sound) -> Sound:
-    samples, rate_hz = sound
-    if rate_hz > 48_000:
-        samples, rate_hz = _at_rate(samples, rate_hz, 48_000), 48_000
-    return coded("MP3", "MPEG_LAYER_III", random, (samples, rate_hz))
-
-
-CHANGES: dict[str, Callable[[Random, Sound], Sound]] = {
+CHANGES: dict[str, Callable[[Random, Array, int], Sound]] = {
     "gain": quieter,
     "few samples clipped": slightly_clipped,
     "sample rate": resampled,
@@ -221,18 +201,12 @@ CHANGES: dict[str, Callable[[Random, Sound], Sound]] = {
     "silence before": silence_before,
     "silence around, offset": silence_around,
     "room": in_a_room,
-    "MP3": _mp3,
-    "Vorbis": lambda random, sound: coded("OGG", "VORBIS", random, sound),
-    "Opus": lambda random, sound: coded("OGG", "OPUS", random, sound),
+    "MP3": partial(coded, "MP3", "MPEG_LAYER_III"),
+    "Vorbis": partial(coded, "OGG", "VORBIS"),
+    "Opus": partial(coded, "OGG", "OPUS"),
     "two channels": on_two_channels,
     "three changes": changed_thrice,
 }
-
-
-def _changed(base: str, sound: Sound, is_note: bool, seed: int) -> Iterator[Case]:
-    for number, (kind, change) in enumerate(CHANGES.items()):
-        random = np.random.default_rng([seed, number, sum(base.encode())])
-        yield Case(base, kind if is_note else f"no string, {kind}", is_note, change(random, sound))
 
 
 # No single note of a string
@@ -256,25 +230,14 @@ def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
         elif made == 4:
             yield Case(name, "reversed", False, (first[0][::-1].copy(), first[1]))
         elif made == 5:
-            yield Case(name, "loop", False, loop(random, first))
+            yield Case(name, "loop", False, loop(random, *first))
         elif made == 6:
-            yield Case(name, "clipped", False, clipped(random, first))
+            gain = 10 ** (random.uniform(8, 20) / 20) / float(np.abs(first[0]).max())
+            yield Case(name, "clipped", False, (np.clip(gain * first[0], -1, 1), first[1]))
         else:
             yield Case(base, "noise", False, noise(random, number))
-        yield Case(base, *_percussion(random, number))
-
-
-def _percussion(random: Random, number: int) -> tuple[str, bool, Sound]:
-    made = number % 5
-    if made == 0:
-        return "noise", False, noise(random, number)
-    if made == 1:
-        return "sweep", False, sweep(random)
-    if made == 2:
-        return "speech", False, speech(random)
-    if made == 3:
-        return "membrane", False, membrane(random)
-    return "drum", False, drum(random, number // 5)
+        kind, others = list(OTHERS.items())[number % len(OTHERS)]
+        yield Case(base, kind, False, others(random, number))
 
 
 def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
@@ -307,21 +270,13 @@ def two_onsets(random: Random, first: Sound, second: Sound) -> Sound:
     return both, rate_hz
 
 
-def loop(random: Random, sound: Sound) -> Sound:
+def loop(random: Random, samples: Array, rate_hz: int) -> Sound:
     """A sampler's: a stretch of 0.1 to 0.8 s again and again, with silence behind it or not."""
-    samples, rate_hz = sound
     begin = onset_of(samples, rate_hz) + round(random.uniform(0.1, 0.3) * rate_hz)
     part = samples[begin : begin + round(random.uniform(0.1, 0.6) * rate_hz)]
     times = math.ceil(2 * rate_hz / len(part)) + 1
     behind = np.zeros(rate_hz // 2 if random.random() < 0.3 else 0)
     return np.concatenate([samples[:begin], *[part] * times, behind]), rate_hz
-
-
-def clipped(random: Random, sound: Sound) -> Sound:
-    """By 8 to 20 dB."""
-    samples, rate_hz = sound
-    gain = 10 ** (random.uniform(8, 20) / 20) / float(np.abs(samples).max())
-    return np.clip(gain * samples, -1, 1), rate_hz
 
 
 def noise(random: Random, number: int) -> Sound:
@@ -334,7 +289,7 @@ def noise(random: Random, number: int) -> Sound:
     return np.concatenate([np.zeros(2_000), 0.1 * sound]), rate_hz
 
 
-def sweep(random: Random) -> Sound:
+def sweep(random: Random, number: int = 0) -> Sound:
     rate_hz = 44_100
     t = np.arange(2 * rate_hz) / rate_hz
     low, high = np.exp(random.uniform(math.log(50), math.log(8_000), 2))
@@ -342,7 +297,7 @@ def sweep(random: Random) -> Sound:
     return np.concatenate([np.zeros(2_000), 0.3 * tone]), rate_hz
 
 
-def speech(random: Random) -> Sound:
+def speech(random: Random, number: int = 0) -> Sound:
     """Syllables: pulses of a gliding pitch, or breath, through formants."""
     rate_hz = 22_050
     frames = round(random.uniform(1.2, 2.5) * rate_hz)
@@ -359,7 +314,7 @@ def speech(random: Random) -> Sound:
     return 0.3 * sound / np.abs(sound).max() + 1e-4 * random.standard_normal(frames), rate_hz
 
 
-def membrane(random: Random) -> Sound:
+def membrane(random: Random, number: int = 0) -> Sound:
     """A drum's head: ratios of Bessel zeros, moved by some percent."""
     rate_hz = 44_100
     t = np.arange(round(1.5 * rate_hz)) / rate_hz
@@ -380,19 +335,23 @@ def drum(random: Random, number: int) -> Sound:
     from engine.presets import SHIPPED as PRESETS
     from engine.presets import load_preset
 
-    name, key = DRUMS[number % len(DRUMS)]
+    name, key = DRUMS[number // 5 % len(DRUMS)]
     instrument = read_instrument(Path(SHIPPED) / f"{name}.json")
     preset = load_preset(PRESETS / "studio_any_string.safetensors")
     low, high = instrument.range
     key = min(max(key + int(random.integers(-3, 4)), low), high)
     sound = render_note(instrument, preset, key, int(random.integers(60, 127)), 1.5, 1.5, 44_100)[:, 0]
-    return np.concatenate([np.zeros(2_000), sound.astype(float)]) + 1e-6 * random.standard_normal(
-        len(sound) + 2_000
-    ), 44_100
+    sound = np.concatenate([np.zeros(2_000), sound.astype(float)])
+    return sound + 1e-6 * random.standard_normal(len(sound)), 44_100
 
 
-def _of_one_channel(samples: Array) -> Array:
-    return samples if samples.ndim == 1 else samples.mean(1)
+OTHERS: dict[str, Callable[[Random, int], Sound]] = {
+    "noise": noise,
+    "sweep": sweep,
+    "speech": speech,
+    "membrane": membrane,
+    "drum": drum,
+}
 
 
 def _at_rate(samples: Array, rate_hz: int, target_hz: int) -> Array:
@@ -412,8 +371,6 @@ def _noise(random: Random, frames: int, exponent: float) -> Array:
 def _silence(random: Random, rate_hz: int) -> Array:
     frames = round(random.uniform(0.2, 3) * rate_hz)
     made = int(random.integers(3))
-    if made == 0:
-        return np.zeros(frames)
-    if made == 1:
-        return np.full(frames, float(random.uniform(-1e-3, 1e-3)))
-    return 1e-4 * random.standard_normal(frames)
+    if made == 2:
+        return 1e-4 * random.standard_normal(frames)
+    return np.full(frames, float(random.uniform(-1e-3, 1e-3)) if made else 0.0)

@@ -86,15 +86,8 @@ def synthetic_note(
     pair = np.arange(2 * count) // 2
     omega = np.stack([law.omega, law.omega * split], 1).ravel()
     sigma = np.stack([law.sigma, law.sigma * slower], 1).ravel()
-    resonator = Resonator(
-        omega,
-        sigma,
-        law.coupling[pair],
-        law.stretch[pair],
-        law.tension_rise,
-        law.shapes[pair],
-        law.inverse[:, pair],
-    )
+    tables = law.coupling[pair], law.stretch[pair], law.tension_rise, law.shapes[pair], law.inverse[:, pair]
+    resonator = Resonator(omega, sigma, *tables)
     k = np.arange(1, count + 1)
     place, listened = random.uniform(0.08, 0.4), random.uniform(0.05, 0.12)
     shape = np.sin(math.pi * k * place) / k**2
@@ -103,8 +96,7 @@ def synthetic_note(
     wanted = 4 * (2 ** (rise_cents * random.uniform(0, 1) / 1200) - 1)
     q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(q)))
     solver = SplittingSolver(resonator, RATE_HZ, substeps=SUBSTEPS, silence=1e-7)
-    state = ModalState.at_rest(q[None])
-    modes = solver.solve(state, round(seconds * RATE_HZ))[0]
+    modes = solver.solve(ModalState.at_rest(q[None]), round(seconds * RATE_HZ))[0]
     heard = np.repeat(k * np.sin(math.pi * k * listened), 2)
     sound = modes @ heard
     scale = 0.3 / float(np.abs(sound).max())
@@ -115,18 +107,14 @@ def synthetic_note(
         phase, level = random.uniform(0, 2 * math.pi), 0.3 * 10 ** (random.uniform(*body_db) / 20)
         sound += level * np.exp(-math.pi * hz / quality * t) * np.sin(2 * math.pi * hz * t + phase)
     noise = float(np.sqrt(np.mean(sound[:RATE_HZ] ** 2))) * 10 ** (-snr_db / 20)
-    sound = np.concatenate([np.zeros(round(LEAD_S * RATE_HZ)), sound]) + noise * random.standard_normal(
-        len(sound) + round(LEAD_S * RATE_HZ)
-    )
-    partials = _truth(scale * heard * q, omega, sigma)
-    return SyntheticNote(sound, RATE_HZ, f0 * ratio, stiffness * ratio**2, partials)
-
-
-def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, ...]:
+    sound = np.concatenate([np.zeros(round(LEAD_S * RATE_HZ)), sound])
+    sound += noise * random.standard_normal(len(sound))
     s = -sigma + 1j * np.sqrt(omega**2 - sigma**2)
-    a = amplitude * np.exp(s.real * FIT_BEGINS_S)
-    hz, decay, level = figures_of(a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2))
-    return tuple(TruePartial(n + 1, float(hz[n]), float(decay[n]), float(level[n])) for n in range(len(hz)))
+    a = scale * heard * q * np.exp(s.real * FIT_BEGINS_S)
+    of_pairs = a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2)
+    figures = np.stack(figures_of(*of_pairs), 1).tolist()
+    partials = tuple(TruePartial(number, *each) for number, each in enumerate(figures, 1))
+    return SyntheticNote(sound, RATE_HZ, f0 * ratio, stiffness * ratio**2, partials)
 
 
 def modelled_note(

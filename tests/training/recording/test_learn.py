@@ -7,62 +7,50 @@ import numpy as np
 import pytest
 
 from engine.presets import load_preset
-from engine.resonators.recorded import RecordedString
 from training.recording.learn import Learned, combined, examined, learn
 from training.recording.physics import Partial
 from training.recording.preset import Source, recorded_note, recorded_string, write_preset
 from training.recording.report import figures
 
 
-def recorded_of(learned: Learned) -> RecordedString:
+@pytest.fixture
+def recorded(learned: Learned):
     note = recorded_note(learned.note, learned.fitted, learned.source)
     return recorded_string(note, learned.physics, learned.strung, learned.source, {}, figures(learned.report))
 
 
-def test_the_own_note_is_met_far_better_than_by_linear_poles(learned):
+def test_a_note_is_met_far_better_than_by_linear_poles_and_survives_its_preset(learned, recorded, tmp_path):
     errors = learned.report.errors
     assert errors.esr < 2e-3 and errors.log_spectral_distance_db < 4
     assert errors.esr < 0.5 * learned.verdict.linear_esr
-
-
-def test_a_note_survives_its_preset(learned, tmp_path):
-    recorded = recorded_of(learned)
     write_preset(tmp_path / "own.safetensors", "Own", learned.strung, recorded)
-    info = load_preset(tmp_path / "own.safetensors").info
-    assert info.recorded == recorded
-    assert info.recorded.digest == "0" * 64
-    sound = info.recorded.note.sound()
-    samples = learned.note.samples
+    kept = load_preset(tmp_path / "own.safetensors").info.recorded
+    assert kept == recorded and kept.digest == "0" * 64
+    sound, samples = kept.note.sound(), learned.note.samples
     assert len(sound) == len(samples)
     begin = learned.note.onset + round(0.008 * learned.note.rate_hz)
     truth, found = samples[begin : begin + 100_000], sound[begin : begin + 100_000]
-    assert float(np.sum((truth - found) ** 2) / np.sum(truth**2)) == pytest.approx(learned.report.errors.esr, rel=0.3)
+    assert float(np.sum((truth - found) ** 2) / np.sum(truth**2)) == pytest.approx(errors.esr, rel=0.3)
 
 
-def test_modes_of_the_recorded_pitch_are_the_notes(learned):
-    recorded = recorded_of(learned)
-    resonator = recorded.resonator(learned.strung.string, 2 * len(recorded.cents))
-    hz = resonator.omega / (2 * math.pi)
+def test_modes_of_the_recorded_pitch_are_the_notes(learned, recorded):
+    hz = recorded.resonator(learned.strung.string, 2 * len(recorded.cents)).omega / (2 * math.pi)
     for each in learned.physics.partials[:6]:
-        lower = each.poles[0]
-        assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / lower.hz)) < 0.5
+        assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / each.poles[0].hz)) < 0.5
 
 
 def test_progress_may_cancel(synthetic):
-    class Cancelled(Exception):
-        pass
-
     def stop(share: float) -> None:
         if share > 0.05:
-            raise Cancelled
+            raise InterruptedError
 
-    with pytest.raises(Cancelled):
+    with pytest.raises(InterruptedError):
         learn([(examined(synthetic.samples, synthetic.rate_hz), Source("a", "0", 44_100, 1))], progress=stop)
 
 
-def test_one_recording_alone_combines_to_itself_and_takes_to_their_medians(learned):
+def test_one_recording_alone_combines_to_itself_and_takes_to_their_medians(learned, recorded):
     own = combined([learned], {"kind": "guitar"})
-    assert own == replace(recorded_of(learned), settings={"kind": "guitar"})
+    assert own == replace(recorded, settings={"kind": "guitar"})
     physics = learned.physics
     takes = [
         replace(learned, physics=replace(physics, partials=tuple(shifted(each, factor) for each in physics.partials)))

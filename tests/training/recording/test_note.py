@@ -1,4 +1,4 @@
-"""What is no recording of a note is refused with the reason and the remedy."""
+"""The note of a recording: its channel, rate and onset; what is none is refused with the reason and the remedy."""
 
 import numpy as np
 import pytest
@@ -21,14 +21,11 @@ def test_reasons_are_given(samples, rate_hz, words):
         note_of(samples, rate_hz)
 
 
-def test_high_rates_are_converted_and_channels_combined(synthetic):
+def test_high_rates_are_converted_channels_combined_and_the_louder_of_unlike_ones_is_taken(synthetic):
     twice = np.repeat(synthetic.samples, 4)  # a crude 176.4 kHz
     note = note_of(np.stack([twice, twice], 1), 4 * synthetic.rate_hz)
     assert note.rate_hz == synthetic.rate_hz
     assert note.onset == pytest.approx(0.1 * note.rate_hz, abs=0.005 * note.rate_hz)
-
-
-def test_the_louder_of_two_unlike_channels_is_taken(synthetic):
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(synthetic.samples))
     note = note_of(np.stack([noise, synthetic.samples], 1), synthetic.rate_hz)
     assert np.allclose(note.samples, synthetic.samples - synthetic.samples.mean())
