@@ -5,8 +5,6 @@ last commit. A changed test runs first, then the test that mirrors a changed mod
 that the time did not reach are named. `python3 run.py test` runs everything.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -32,45 +30,43 @@ def changed_files() -> list[Path]:
     return [path for path in sorted({ROOT / name for name in names}) if path.suffix == ".py" and path.is_file()]
 
 
-def nearest_tests(changed: list[Path], tests: dict[Path, str]) -> list[Path]:
-    """Test files in the order of their nearness to changed files; `tests` holds the text of each test file."""
-    paths = [path.relative_to(ROOT).with_suffix("") for path in changed]
-    modules = [path for path in paths if path.parts[0] in PRODUCT]
+def nearest_tests(changed: list[Path]) -> list[Path]:
+    """Test files in the order of their nearness to changed files."""
+    tests = {path: path.read_text("utf-8") for path in sorted(ROOT.glob("tests/**/test_*.py"))}
+    modules = [path.relative_to(ROOT).with_suffix("") for path in changed]
+    modules = [module for module in modules if module.parts[0] in PRODUCT]
     mirrors = [ROOT / "tests" / module.parent / f"test_{module.name}.py" for module in modules]
-    patterns = [
+    pattern = "|".join(
         rf"\b{'.'.join(module.parts)}\b|from {'.'.join(module.parts[:-1])} import .*\b{module.name}\b"
         for module in modules
-    ]
-    importing = [path for path, text in tests.items() if any(re.search(pattern, text) for pattern in patterns)]
-    folders = {ROOT / "tests" / module.parent for module in modules}
+    )
+    importing = [path for path, text in tests.items() if modules and re.search(pattern, text)]
+    folders = {path.parent for path in mirrors}
     beside = sorted(importing, key=lambda path: (path.parent not in folders, path))
     return [path for path in dict.fromkeys([*changed, *mirrors, *beside]) if path in tests]
 
 
 def main(arguments: list[str]) -> int:
     """Run ruff on changed files, then the nearest tests until the time is over; the status is 1 if one failed."""
-    started = time.monotonic()
+    ends = time.monotonic() + SECONDS
     changed = changed_files()
-    tests = {path: path.read_text("utf-8") for path in sorted(ROOT.glob("tests/**/test_*.py"))}
-    chosen = nearest_tests(changed, tests)
+    chosen = nearest_tests(changed)
     print(f"{len(changed)} changed files, {len(chosen)} test files near them", flush=True)
-    failed = False
-    for words in (["check"], ["format", "--check"]) if changed else ():
-        failed |= subprocess.call([sys.executable, "-m", "ruff", *words, *changed], cwd=ROOT) != 0
-    env = {"OMP_NUM_THREADS": "1", **os.environ}
+    ruff = [[sys.executable, "-m", "ruff", *words, *changed] for words in (["check"], ["format", "--check"])]
+    failed = sum(subprocess.call(command, cwd=ROOT) for command in ruff if changed) > 0
     size = min(os.cpu_count() or 1, 4)
-    while chosen and (left := SECONDS - (time.monotonic() - started)) > 5:
-        part, chosen = chosen[:size], chosen[size:]
-        pytest = [sys.executable, "-m", "pytest", "-q", "-n", str(len(part)), "--dist", "loadfile"]
+    pytest = [sys.executable, "-m", "pytest", "-q", "-n", str(size), "--dist", "loadfile", *arguments]
+    while chosen and (left := ends - time.monotonic()) > 5:
         try:
-            done = subprocess.run([*pytest, *arguments, *part], cwd=ROOT, env=env, timeout=left)
-            failed |= done.returncode not in (0, 5)
+            command = [*pytest, *chosen[:size]]
+            done = subprocess.run(command, cwd=ROOT, env={"OMP_NUM_THREADS": "1", **os.environ}, timeout=left)
         except subprocess.TimeoutExpired:
-            chosen = [*part, *chosen]
             break
+        failed |= done.returncode not in (0, 5)
+        del chosen[:size]
     if chosen:
         print("not run to the end: " + " ".join(str(path.relative_to(ROOT)) for path in chosen))
-    print(f"{time.monotonic() - started:.0f} s, {'failed' if failed else 'passed'}")
+    print(f"{SECONDS - (ends - time.monotonic()):.0f} s, {'failed' if failed else 'passed'}")
     return int(failed)
 
 

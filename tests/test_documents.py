@@ -13,7 +13,15 @@ import pytest
 import torch
 import typer
 
+from app.commands.cli import cli
+from app.instruments.instrument import Instrument
+from bench.cli import bench, main
+from engine.models.base import Physics
 from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
+from training.cell import load
+from training.results import RESULTS, read_results
+from training.tables.compact import as_compact
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
@@ -47,8 +55,6 @@ def test_sounds_and_pictures_are_small():
 
 @cache
 def program() -> Any:
-    from app.commands.cli import cli
-
     return typer.main.get_command(cli)
 
 
@@ -77,19 +83,35 @@ def test_commands_and_their_options_exist():
         assert not set(used) - options, f"{where}: {command.name} has no option {set(used) - options}"
 
 
-def test_presets_and_instruments_that_are_named_exist():
-    shipped = {path.stem for path in (ROOT / "presets").glob("*.safetensors")}
+def test_presets_that_are_named_exist():
+    there = {path.stem for path in (ROOT / "presets").rglob("*") if path.suffix in (".safetensors", ".toml")}
     for where, words in commands():
         if words[0] in ("render", "compare", "predict"):
-            presets = [word for word in words if re.match(r"(nylon|studio)_\w+$", word)]
-            presets = [word for word in presets if not (ROOT / "presets" / "strings" / f"{word}.toml").exists()]
-            assert not set(presets) - shipped, where
+            assert {word for word in words if re.match(r"(nylon|studio)_\w+$", word)} <= there, where
+
+
+def test_every_benchmark_parses_its_options_and_the_documents_name_no_other(capsys):
+    commands: dict[str, Any] = typer.main.get_command(bench).commands
+    for name in commands:
+        assert main([name, "--help"]) == 0
+        assert f"run.py bench {name}" in capsys.readouterr().out
+        assert main([name, "--no-such-option"]) == 2
+    lines = [
+        line
+        for path in DOCUMENTS
+        for line in re.findall(r"(?:run\.py |`)bench ([a-z][^`\n#]*)", path.read_text("utf-8"))
+    ]
+    lines += re.findall(r"\| `([a-z]+)`[^|\n]*\|$", text("docs/benchmarks.md").partition("## Measured")[2], re.M)
+    assert len(lines) > 20
+    for line in lines:
+        name, *words = shlex.split(line)
+        assert name in commands, line
+        options = {option for each in commands[name].params for option in each.opts}
+        assert {word for word in words if word.startswith("--")} <= options, line
+    assert set(commands) <= {shlex.split(line)[0] for line in lines}, "each benchmark's use is in a document"
 
 
 def test_results_hold_the_tables_of_the_rows():
-    from training.results import RESULTS, read_results
-    from training.tables.compact import as_compact
-
     tables = text("RESULTS.md").partition("<!-- tables -->\n\n")[2]
     assert tables == as_compact(read_results(RESULTS)), "write them again: table --into RESULTS.md"
 
@@ -108,9 +130,6 @@ def test_the_table_of_the_readme_is_of_the_results():
 
 
 def test_the_model_of_the_worked_example_is_a_linear_string():
-    from engine.models.base import Physics
-    from engine.values.string import StringParameters
-
     (example,) = re.findall(r"```python\n(.*?)```", text("docs/models.md"), re.DOTALL)
     names: dict[str, Any] = {"__name__": "damped_modes"}
     exec(compile(example, "docs/models.md", "exec", dont_inherit=True), names)
@@ -143,18 +162,11 @@ def test_notebooks_run(path, tmp_path, monkeypatch):
     assert list(tmp_path.glob("*.png"))
 
 
-def test_the_run_of_the_documents_is_a_configuration(tmp_path):
-    from training.cell import load
-
-    (example,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
+def test_the_run_and_the_smallest_instrument_of_the_documents_are_read(tmp_path):
+    (run,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
     path = tmp_path / "my_run.toml"
-    path.write_text(example, encoding="utf-8")
+    path.write_text(run, encoding="utf-8")
     assert load(str(path)).model == "koopman_var"
-
-
-def test_the_smallest_instrument_of_the_documents_is_one():
-    from app.instruments.instrument import Instrument
-
     (example,) = re.findall(r"```json\n(.*?)```", text("docs/instruments.md"), re.DOTALL)
     assert Instrument.model_validate_json(example).strings.kind == "fretted"
 
@@ -163,8 +175,6 @@ def test_the_smallest_instrument_of_the_documents_is_one():
     ("page", "title"), [("instruments", "### Other fields"), ("drums", "## Write a drum by hand")]
 )
 def test_the_fields_that_a_page_names_exist(page, title):
-    from app.instruments.instrument import Instrument
-
     section = text(f"docs/{page}.md").partition(title)[2].partition("\n#")[0]
     named = " ".join(line.split("|")[1] for line in section.splitlines() if line.startswith("| `"))
     names = re.findall(r"\w+(?=[`.\[])", named)

@@ -3,8 +3,8 @@
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -25,32 +25,22 @@ WHAT = ("pyproject.toml", "--constraints", "constraints.txt", *(word for e in EX
 CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
 AT_ONCE = 8
 
-Cell = tuple[str, str]  # a Python and a system
 
-
-def resolved(cells: Sequence[Cell]) -> dict[Cell, subprocess.CompletedProcess[str]]:
-    """What uv answers for each cell: the packages with their versions on standard output, or why there are none."""
+def test_every_python_and_system_installs_from_wheels():
     uv = pytest.importorskip("uv", reason="uv is not installed")
     environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": MACOS, "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
 
-    def resolve(cell: Cell) -> subprocess.CompletedProcess[str]:
-        python, system = cell
+    def resolve(python: str, system: str) -> subprocess.CompletedProcess[str]:
         target = ("--python", sys.executable, "--python-version", python, "--python-platform", system)
         command = [uv.find_uv_bin(), *COMPILE, *target, *WHAT]
         return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = dict(zip(cells, pool.map(resolve, cells), strict=True))
-    for done in found.values():
-        if "Failed to fetch" in done.stderr:
-            pytest.skip(f"the package index cannot be reached: {done.stderr.strip()}")
-    return found
-
-
-def test_every_python_and_system_installs_from_wheels():
-    found = resolved([(python, system) for python in PYTHONS for system in SYSTEMS])
-    assert {cell: done.stderr for cell, done in found.items() if done.returncode != 0} == {}
-    installed = {line.split("==")[0] for done in found.values() for line in done.stdout.splitlines()}
+        found = list(pool.map(resolve, *zip(*product(PYTHONS, SYSTEMS), strict=True)))
+    if unreachable := [done.stderr for done in found if "Failed to fetch" in done.stderr]:
+        pytest.skip(f"the package index cannot be reached: {unreachable[0].strip()}")
+    assert [(done.args, done.stderr) for done in found if done.returncode != 0] == []
+    installed = {line.split("==")[0] for done in found for line in done.stdout.splitlines()}
     lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
     pinned = {line.split("==")[0].lower().replace("_", "-") for line in lines}
     assert sorted(name for name in installed - pinned if not name.startswith(CUDA)) == []

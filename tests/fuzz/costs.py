@@ -16,31 +16,26 @@ PEAK = Path("/proc/self/clear_refs")  # 5, written to it, forgets the largest si
 
 @dataclass
 class Costs:
-    """The slowest and the largest reading so far; the size stays None where the system does not tell it."""
+    """The slowest and the largest reading so far; its size stays 0 where the system does not report it."""
 
     slowest_s: float = 0.0
-    largest_mb: float | None = None
+    largest_mb: float = 0.0
 
     @contextmanager
     def reading(self) -> Iterator[None]:
         """Around nothing but the reading. Processor seconds are of all threads, and load hardly moves them."""
         return_free_pages()
-        known = PEAK.exists()
-        if known:
+        if PEAK.exists():
             PEAK.write_text("5")
         before, begun_s = psutil.Process().memory_info().rss, time.process_time()
         try:
             yield
         finally:
             self.slowest_s = max(self.slowest_s, time.process_time() - begun_s)
-            if known:
-                self.largest_mb = max(self.largest_mb or 0.0, (_largest_bytes() - before) / 1e6)
+            if PEAK.exists():
+                lines = Path("/proc/self/status").read_text().splitlines()
+                largest = 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+                self.largest_mb = max(self.largest_mb, (largest - before) / 1e6)
 
     def __str__(self) -> str:
-        size = "unknown" if self.largest_mb is None else f"{self.largest_mb:.0f} MB"
-        return f"the slowest reading {self.slowest_s:.2f} s of processor, the largest {size}"
-
-
-def _largest_bytes() -> int:
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+        return f"the slowest reading {self.slowest_s:.2f} s of processor, the largest {self.largest_mb:.0f} MB"

@@ -53,26 +53,15 @@ def damaged_value(value: Any, draw: random.Random) -> Any:
         if kind == 0 and len(holder) > 1:
             del holder[key]
         elif kind == 1 and isinstance(holder, dict) and holder is not whole:
-            holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = _hostile(draw)
+            holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = copy.deepcopy(draw.choice(HOSTILE))
         elif kind == 2 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
             holder[key] = min(holder[key], 1e18) * draw.choice((-1, 0, 2, 10, 1e3, 1e6, 10**9, 1e-9))
         elif kind == 3:
-            holder[key] = _nested(draw.choice((3, 40, 400)))
+            depth = draw.choice((3, 40, 400))
+            holder[key] = json.loads("[" * depth + "]" * depth)
         else:
-            holder[key] = _hostile(draw)
+            holder[key] = copy.deepcopy(draw.choice(HOSTILE))  # the next change may be within it
     return whole[""]
-
-
-def _hostile(draw: random.Random) -> Any:
-    """A value of its own: the next change may be within it."""
-    return copy.deepcopy(draw.choice(HOSTILE))
-
-
-def _nested(depth: int) -> list[Any]:
-    value: list[Any] = []
-    for _ in range(depth):
-        value = [value]
-    return value
 
 
 def damaged_text(value: Any, draw: random.Random) -> str:
@@ -99,9 +88,8 @@ def damaged_preset(data: bytes, draw: random.Random) -> bytes:
         header = damaged_value(header, draw)
     elif kind == 1 and weights:  # weights that are numbers still, or not
         for _ in range(draw.choice((1, 100))):
-            struct.pack_into(
-                "<f", weights, 4 * draw.randrange(len(weights) // 4), draw.choice((0, 1e30, -1e3, 1e-40))
-            )
+            place, value = 4 * draw.randrange(len(weights) // 4), draw.choice((0, 1e30, -1e3, 1e-40))
+            struct.pack_into("<f", weights, place, value)
     else:
         text = header["__metadata__"][METADATA_KEY]
         header["__metadata__"][METADATA_KEY] = damaged_text(json.loads(text), draw)
@@ -112,10 +100,7 @@ def damaged_preset(data: bytes, draw: random.Random) -> bytes:
 def attacked(
     name: str, rounds: int, seed: int, attack: Callable[[random.Random], None], costs: Costs | None = None
 ) -> None:
-    """Runs an attack so often, each from a seed of its own, and prints how many were refused or did no harm.
-
-    Where `costs` of its readings are given, they are printed, and memory is held to `MOST_MB`; time is only printed.
-    """
+    """Run an attack so often, each from a seed of its own; costs are printed, and memory is held to `MOST_MB`."""
     failures = []
     for number in range(rounds):
         try:
@@ -125,4 +110,4 @@ def attacked(
     reported = f"; {costs}" if costs else ""
     print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed}){reported}")
     assert not failures, "\n".join(failures[:20])
-    assert costs is None or (costs.largest_mb or 0) <= MOST_MB, f"{name}: {costs}"
+    assert costs is None or costs.largest_mb <= MOST_MB, f"{name}: {costs}"

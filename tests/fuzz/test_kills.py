@@ -8,7 +8,6 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -31,38 +30,30 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs PO
 @pytest.fixture(scope="module")
 def context() -> Iterator[multiprocessing.context.BaseContext]:
     """Processes whose parent has loaded all that they need, and holds nothing of this one."""
-    before = os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
-    found = multiprocessing.get_context("forkserver")
-    found.set_forkserver_preload(["tests.fuzz.works"])
-    yield found
-    if before is None:
-        del os.environ["PYTHONPATH"]
-    else:
-        os.environ["PYTHONPATH"] = before
+    with pytest.MonkeyPatch.context() as instrumented:
+        instrumented.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+        found = multiprocessing.get_context("forkserver")
+        found.set_forkserver_preload(["tests.fuzz.works"])
+        yield found
 
 
-def begun(context: multiprocessing.context.BaseContext, name: str, folder: Path) -> multiprocessing.Process:
-    process = context.Process(target=getattr(works, name), args=(folder,))
-    process.start()
-    return process
-
-
-def emptied(folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
-
-
-@pytest.mark.parametrize("name", works.WORKS)
+@pytest.mark.parametrize("name", KILLS)
 def test_a_killed_work_ends_as_if_it_had_not_been(name, context, tmp_path, seed):
     folder, kills = tmp_path / "work", KILLS[name][LONG]
     if not kills:
         pytest.skip("run.py test --fuzz has it")
-    emptied(folder)
-    begun(context, name, folder).join()  # the first loads what is loaded late
-    emptied(folder)
+
+    def begun(afresh: bool = False) -> multiprocessing.Process:
+        if afresh:
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+        process = context.Process(target=getattr(works, name), args=(folder,))
+        process.start()
+        return process
+
+    begun(afresh=True).join()  # the first loads what is loaded late
     started = time.monotonic()
-    process = begun(context, name, folder)
+    process = begun(afresh=True)
     process.join()
     assert process.exitcode == 0
     lasted_s, undisturbed = time.monotonic() - started, works.contents(folder)
@@ -71,10 +62,8 @@ def test_a_killed_work_ends_as_if_it_had_not_been(name, context, tmp_path, seed)
     while found < kills:
         tries += 1
         assert tries <= 5 * kills, f"{name} ends before it can be killed"
-        emptied(folder)
-        again = draw.choice((1, 1, 2))  # the rerun may be killed too
-        for rerun in range(again):
-            started, process = time.monotonic(), begun(context, name, folder)
+        for rerun in range(draw.choice((1, 1, 2))):  # the rerun may be killed too
+            started, process = time.monotonic(), begun(afresh=not rerun)
             process.join(lasted_s * draw.random())
             process.kill()
             process.join()
@@ -82,11 +71,12 @@ def test_a_killed_work_ends_as_if_it_had_not_been(name, context, tmp_path, seed)
                 found += 1
             elif not rerun:  # the computer was busier before: the next is killed sooner
                 lasted_s = min(lasted_s, time.monotonic() - started)
-        process = begun(context, name, folder)
+        process = begun()
         process.join()
-        assert process.exitcode == 0, f"{name} after {found} kills, seed {seed}"
+        where = f"{name} after {found} kills, seed {seed}"
+        assert process.exitcode == 0, where
         left = works.contents(folder)
-        assert left.keys() == undisturbed.keys(), f"{name} after {found} kills, seed {seed}"
+        assert left.keys() == undisturbed.keys(), where
         unlike = [file for file in left if left[file] != undisturbed[file]]
-        assert not unlike, f"{name} after {found} kills, seed {seed}: {unlike}"
+        assert not unlike, f"{where}: {unlike}"
     print(f"\n{name}: {found} kills survived of {found} (an undisturbed run takes {lasted_s:.2g} s, seed {seed})")

@@ -13,35 +13,19 @@ import torch
 from safetensors.torch import save
 
 from app.commands.cli import main
-from app.instruments.instrument import Instrument
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import own_instruments, read_instrument, save_instrument
 from app.window.settings import Settings, save_settings
 from engine import warm
 from engine.presets import SHIPPED, load_preset
-from training.cell import load
-from training.configuration import Run
+from training.cell import Cell, configuration_of
+from training.configuration import Run, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.results import read_results
 from training.run import run_rows
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
-CONFIGURATION = """title = "Tiny"
-model = "{model}"
-model_configuration = {sizes}
-[data]
-initial = "gaussian"
-rate_hz = 4000
-modes = 5
-steps = 50
-count = {count}
-[recipe]
-epochs = 4
-batch_size = 8
-steps_per_batch = 8
-first_horizon = 10
-validate_every = 1
-"""
+RECIPE = {"epochs": 4, "batch_size": 8, "steps_per_batch": 8, "first_horizon": 10, "validate_every": 1}
 PLAN = """description = "Two runs."
 [data]
 count = 10
@@ -54,57 +38,46 @@ rates_hz = [4000]
 horizons = [60]
 """
 MANY = 100  # times that a small file is saved
-WORKS = ("render", "dataset", "train", "train_lru", "sweep", "save_instruments", "save_many_settings")
 # of two runs, however equal; a developer may commit meanwhile
 UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
 
 def render(folder: Path) -> None:
     pluck = ["--position", "0.4", "--amplitude-mm", "2", "--seconds", "4"]
-    _done(main(["render", str(PRESET), str(folder / "out.wav"), *pluck]))
+    assert main(["render", str(PRESET), str(folder / "out.wav"), *pluck]) == 0
 
 
 def dataset(folder: Path) -> None:
-    configuration = _configuration(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }", 400)
-    load_dataset(load(str(configuration)).data, folder / "cache")
+    load_dataset(_tiny("koopman_var", {}, 400).data, folder / "cache")
 
 
 def train(folder: Path) -> None:
-    _train(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }")
+    _train(folder, _tiny("koopman_var", {"state_size": 8, "multiplier_widths": [4]}))
 
 
 def train_lru(folder: Path) -> None:
-    _train(folder, "lru", "{ state_size = 8, layers = 1 }")
+    _train(folder, _tiny("lru", {"state_size": 8, "layers": 1}))
 
 
 def sweep(folder: Path) -> None:
     plan = folder / "two.toml"
     plan.write_text(PLAN, encoding="utf-8")
-    rows = folder / "rows.csv"
-    words = ["--runs", str(folder / "runs"), "--cache", str(folder / "cache"), "--results", str(rows)]
-    _done(main(["sweep", str(plan), *words, "--workers", "1", "--threads", "1"]))
+    words = ["--runs", folder / "runs", "--cache", folder / "cache", "--results", folder / "rows.csv"]
+    assert main(["sweep", str(plan), *map(str, words), "--workers", "1", "--threads", "1"]) == 0
 
 
 def save_instruments(folder: Path) -> None:
     os.environ["LEARNED_STRINGS_PRESETS"] = str(folder)
+    instrument = read_instrument(min(INSTRUMENTS.glob("*.json")))
     for number in range(MANY, -1, -1):
-        save_instrument(instrument_of(number), own_instruments() / "mine.json")
+        described = instrument.model_copy(update={"name": "Mine", "description": f"{number} " * (1 + number % 9)})
+        save_instrument(described, own_instruments() / "mine.json")
 
 
 def save_many_settings(folder: Path) -> None:
     for number in range(MANY, -1, -1):
-        save_settings(folder / "settings.json", settings_of(number))
-
-
-def instrument_of(number: int) -> Instrument:
-    instrument = read_instrument(min(INSTRUMENTS.glob("*.json")))
-    return Instrument.model_validate(
-        {**dict(instrument), "name": "Mine", "description": f"{number} " * (1 + number % 9)}
-    )
-
-
-def settings_of(number: int) -> Settings:
-    return Settings(favourites=tuple(f"preset {each}" for each in range(number)))
+        favourites = tuple(f"preset {each}" for each in range(number))
+        save_settings(folder / "settings.json", Settings(favourites=favourites))
 
 
 def contents(folder: Path) -> dict[str, object]:
@@ -128,21 +101,15 @@ def _content(path: Path) -> object:
     return path.read_bytes()
 
 
-def _train(folder: Path, model: str, sizes: str) -> None:
-    configuration = load(str(_configuration(folder, model, sizes, 40)))
+def _tiny(model: str, sizes: dict[str, object], count: int = 40) -> TrainingConfiguration:
+    data = {"modes": 5, "steps": 50, "count": count}
+    made = configuration_of(Cell(model, True, "gaussian", 4000, 50, "paper"), data, RECIPE)
+    return replace(made, model_configuration=sizes)
+
+
+def _train(folder: Path, configuration: TrainingConfiguration) -> None:
     run, output = Run("tiny", "", configuration), folder / "tiny.safetensors"
     run_rows([run], folder / "runs", output=output, cache=folder / "cache", checkpoint_every_s=0.0)
-
-
-def _configuration(folder: Path, model: str, sizes: str, count: int) -> Path:
-    path = folder / "tiny.toml"
-    path.write_text(CONFIGURATION.format(model=model, sizes=sizes, count=count), encoding="utf-8")
-    return path
-
-
-def _done(status: int) -> None:
-    if status:
-        raise SystemExit(status)
 
 
 torch.set_num_threads(1)  # a child has no threads of its parent's

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -59,16 +59,24 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return load_dataset(DATA, tmp_path_factory.mktemp("cache"))
 
 
+Windows = list[tuple[float, float]]
+
+
+def measured(model: StringModel[Any], data: Dataset, seconds: float, windows_s: Windows, **options: Any) -> Any:
+    """The errors past the horizon, and those of partials."""
+    past = evaluate_past_horizon(model, data, "test", seconds, windows_s=windows_s, **options)
+    return past, evaluate_partials(model, data, "test", windows_s, **options)
+
+
 def test_the_truth_has_no_error_to_any_time(data):
     model = Truth(data)
-    found = evaluate_past_horizon(model, data, "test", 0.5, windows_s=[(0, HORIZON_S), (HORIZON_S, 0.525)])
+    found, partials = measured(model, data, 0.5, [(0, HORIZON_S), (HORIZON_S, 0.525)])
     for sums in (found.string, found.sound):
         assert len(sums.per_frame()[0]) == 2100
         assert len(sums.per_trajectory()[0]) == 2
         assert sums.total().rel_mse < 1e-11  # the model receives float32
     assert found.sound.total().null_depth_db < -110
     assert all(spectrum.convergence < 1e-5 for spectrum in found.spectra)
-    partials = evaluate_partials(model, data, "test", [(0, HORIZON_S), (HORIZON_S, 0.525)])
     for errors, most in ((partials.level_db, 1e-3), (partials.phase_cycles, 1e-4), (partials.cents, 1e-2)):
         assert np.nanmax(np.abs(errors)) < most
     assert [row.trajectories for row in partials.by_mode(0)] != [0] * 10
@@ -92,46 +100,36 @@ def test_a_gain_is_reported_and_over_the_horizon_it_is_the_figure_of_the_tables(
 
 
 def test_any_splitting_into_blocks_gives_the_same_errors(data):
-    model = Truth(replace(data, scale_m=1.01 * data.scale_m), gain=0.99)
-    windows_s = [(0, HORIZON_S), (HORIZON_S, 0.1)]
-    whole, parts = (
-        evaluate_past_horizon(model, data, "test", 0.1, windows_s=windows_s, frames_at_once=frames)
-        for frames in (10_000, 37)
+    model, windows_s = (
+        Truth(replace(data, scale_m=1.01 * data.scale_m), gain=0.99),
+        [(0, HORIZON_S), (HORIZON_S, 0.1)],
+    )
+    (whole, at_once), (parts, in_blocks) = (
+        measured(model, data, 0.1, windows_s, frames_at_once=frames) for frames in (10_000, 37)
     )
     for a, b in ((whole.string, parts.string), (whole.sound, parts.sound)):
         assert b.per_frame()[0] == pytest.approx(a.per_frame()[0], rel=1e-4)
         assert b.per_trajectory()[1] == pytest.approx(a.per_trajectory()[1], rel=1e-6)
     assert [s.log_db for s in parts.spectra] == pytest.approx([s.log_db for s in whole.spectra], rel=1e-5)
-    at_once, in_blocks = (
-        evaluate_partials(model, data, "test", windows_s, frames_at_once=frames) for frames in (10_000, 37)
-    )
     assert np.allclose(at_once.level_db, in_blocks.level_db, rtol=1e-5, equal_nan=True)
     assert np.allclose(at_once.t60_s, in_blocks.t60_s, rtol=1e-9, equal_nan=True)
 
 
 def test_some_trajectories_are_measured_and_progress_is_reported(data):
     reported: list[float] = []
-    found = evaluate_past_horizon(
-        Truth(data), data, "validation", 0.05, trajectories=slice(1), report=reported.append
-    )
-    assert len(found.string.per_trajectory()[0]) == 1
-    partials = evaluate_partials(
-        Truth(data), data, "validation", [(0, 0.05)], trajectories=slice(1), report=reported.append
-    )
-    assert partials.energy.shape == (1, 1, 10)
+    options = {"trajectories": slice(1), "report": reported.append}
+    found, partials = measured(Truth(data), data, 0.05, [(0, 0.05)], **options)
+    assert len(found.string.per_trajectory()[0]) == 1 and partials.energy.shape == (1, 1, 10)
     assert reported.count(1.0) == 2 and max(reported) == 1
     with pytest.raises(ValueError, match="at least one window"):
         evaluate_partials(Truth(data), data, "test", [])
 
 
 def test_an_output_that_is_no_number_is_an_infinite_error(data):
-    model = Truth(data, broken=200)
-    windows_s = [(0, HORIZON_S), (0.06, 0.1)]
-    found = evaluate_past_horizon(model, data, "test", 0.1, windows_s=windows_s)
+    found, partials = measured(Truth(data, broken=200), data, 0.1, [(0, HORIZON_S), (0.06, 0.1)])
     assert found.string.total(199).rel_mse < 1e-11
     assert found.string.total().rel_mse == math.inf
     assert [math.isfinite(s.convergence) for s in found.spectra] == [True, False]
-    partials = evaluate_partials(model, data, "test", windows_s)
     assert np.nanmax(np.abs(partials.level_db[:, 0])) < 1e-3
     assert np.nanmin(partials.level_db[:, 1]) == math.inf
 
@@ -148,13 +146,8 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path):
     assert last.rel_mse < 1e-6  # frequencies are float32: 250 Hz are known to a thousandth of a cycle in 10 s
     assert found.spectra[1].convergence < 1e-5
     partials = evaluate_partials(model, data, "validation", [(0, 1), (9, 10)])
-    for errors, most in (
-        (partials.level_db, 1e-4),
-        (partials.phase_cycles, 1e-3),
-        (partials.cents, 1e-3),
-        (partials.t60_error_percent, 0.01),
-    ):
-        assert np.nanmax(np.abs(errors)) < most
+    most = {"level_db": 1e-4, "phase_cycles": 1e-3, "cents": 1e-3, "t60_error_percent": 0.01}
+    assert all(np.nanmax(np.abs(getattr(partials, name))) < bound for name, bound in most.items())
     sigma = decay_rates(c.string, c.modes)
     there = ~np.isnan(partials.t60_s[:, 0])
     expected = np.broadcast_to(3 * math.log(10) / sigma, there.shape)
@@ -170,8 +163,5 @@ def test_kept_frames_of_a_stride_are_measured_alone(tmp_path):
         model = build_model(name, {"state_size": 16, "layers": 1, "hippo_blocks": 2} if name == "s5" else None)
         model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
         squared, absolute = evaluate_model(model, every, "validation").per_frame()
-        kept_squared, kept_absolute = evaluate_model(
-            model, replace(some, scale_m=every.scale_m), "validation"
-        ).per_frame()
-        np.testing.assert_allclose(kept_squared, squared[4::5], rtol=1e-3)
-        np.testing.assert_allclose(kept_absolute, absolute[4::5], rtol=1e-3)
+        kept = evaluate_model(model, replace(some, scale_m=every.scale_m), "validation").per_frame()
+        np.testing.assert_allclose(kept, (squared[4::5], absolute[4::5]), rtol=1e-3)

@@ -1,4 +1,3 @@
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +6,7 @@ import pytest
 from engine.compare.relative import RelativeError
 from engine.models.base import count_parameters
 from engine.presets import load_preset
+from tests.training.conftest import DATA
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Run, TrainingConfiguration
 from training.data.dataset import load_dataset
@@ -22,27 +22,20 @@ def progress(epoch: int, loss: float = 1.0) -> FitProgress:
     return FitProgress(2 * epoch, 18, epoch, 9, 150, 1e-3, loss, validation, 2.0 * epoch, 1.0)
 
 
-def read(path: Path) -> list[list[str]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.reader(file))
-
-
 def test_the_log_has_a_line_per_epoch_also_after_an_older_checkpoint(tmp_path):
     path = tmp_path / "run" / "log.csv"
     log = TrainingLog(path)
     for epoch in (1, 2, 3, 4):
         log.add(progress(epoch))
-    assert read(path)[:3] == [
-        list(Epoch.__dataclass_fields__),
-        ["1", "150", "0.001", "1.0", "", "", "2.0"],
-        ["2", "150", "0.001", "1.0", "0.5", "0.25", "4.0"],
-    ]
+    lines = path.read_text(encoding="utf-8").splitlines()[:3]
+    assert lines == [",".join(Epoch.__dataclass_fields__), "1,150,0.001,1.0,,,2.0", "2,150,0.001,1.0,0.5,0.25,4.0"]
     with path.open("a", encoding="utf-8") as file:
         file.write("5,150,0.0")  # killed within a line
     log = TrainingLog(path)
     log.add(progress(3, loss=7))
     log.add(progress(4, loss=8))
-    assert [(row[0], row[3]) for row in read(path)[1:]] == [("1", "1.0"), ("2", "1.0"), ("3", "7.0"), ("4", "8.0")]
+    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()[1:]]
+    assert [(row[0], row[3]) for row in rows] == [("1", "1.0"), ("2", "1.0"), ("3", "7.0"), ("4", "8.0")]
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])
@@ -55,7 +48,6 @@ def test_the_trained_range_is_that_of_the_draws(kind):
     assert found.tension_rise == 0.5
 
 
-DATA = {"count": 20, "steps": 450, "modes": 5}
 QUICK = {"epochs": 2, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}
 CELL = Cell("koopman_var", True, "gaussian", 4000, 420)
 
@@ -65,11 +57,8 @@ def configuration(**changes: object) -> TrainingConfiguration:
     return replace(made, model_configuration={"state_size": 8, "multiplier_widths": [4]})
 
 
-def run_row(
-    configuration: TrainingConfiguration, folder: Path, name: str = CELL.name, preset: Path | None = None
-) -> Row:
-    run = Run(name, "ours", configuration)
-    (row,) = run_rows([run], folder / "runs", output=preset, cache=folder / "cache")
+def run_row(made: TrainingConfiguration, folder: Path, name: str = CELL.name, preset: Path | None = None) -> Row:
+    (row,) = run_rows([Run(name, "ours", made)], folder / "runs", output=preset, cache=folder / "cache")
     return row
 
 
@@ -79,31 +68,24 @@ def test_a_row_reports_what_its_preset_measures(tmp_path):
     preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")
     dataset = load_dataset(made.data, tmp_path / "cache")
     sums = evaluate_model(preset.model, dataset, "validation", 420)
-    whole, short, quarters = sums.total(), sums.total(400), sums.windows(4000, [0.105 * q / 4 for q in range(5)])
-    found = [row.rel_mse, row.rel_mae, row.rel_mse_400, row.rel_mae_400, row.rel_mse_q1, row.rel_mae_q4]
-    assert found == pytest.approx(
-        [whole.rel_mse, whole.rel_mae, short.rel_mse, short.rel_mae, quarters[0].rel_mse, quarters[3].rel_mae],
-        rel=1e-4,
-    )
-    test = evaluate_model(preset.model, dataset, "test", 420).total()
-    assert (row.test_rel_mse, row.test_rel_mae) == pytest.approx((test.rel_mse, test.rel_mae), rel=1e-4)
-    first_frames = evaluate_model(preset.model, dataset, "test", 400)
-    for found_se, of_sums in (
-        ((row.rel_mse_se, row.rel_mae_se), sums),
-        ((row.test_rel_mse_400_se, row.test_rel_mae_400_se), first_frames),
-    ):
-        expected = of_sums.standard_error()
-        assert found_se == pytest.approx((expected.rel_mse, expected.rel_mae), rel=1e-4)
-        assert expected.rel_mse > 0
-    assert row.test_rel_mse_400 == pytest.approx(first_frames.total().rel_mse, rel=1e-4)
+    test, first = (evaluate_model(preset.model, dataset, "test", frames) for frames in (420, 400))
+    quarters = sums.windows(4000, [0.105 * q / 4 for q in range(5)])
+    expected = {
+        "": sums.total(),
+        "_400": sums.total(400),
+        "_q1": quarters[0],
+        "_q4": quarters[3],
+        "_se": sums.standard_error(),
+    }
+    expected = {f"rel_{{}}{ending}": error for ending, error in expected.items()}
+    expected |= {"test_rel_{}": test.total(), "test_rel_{}_400": first.total()}
+    expected["test_rel_{}_400_se"] = first.standard_error()
+    for name, error in expected.items():
+        found = getattr(row, name.format("mse")), getattr(row, name.format("mae"))
+        assert found == pytest.approx((error.rel_mse, error.rel_mae), rel=1e-4) and error.rel_mse > 0
     assert (row.status, row.digest, row.epochs, row.string) == ("done", made.digest, 2, "nonlinear")
-    assert (row.initialisation, row.structured, row.horizon, row.parameters) == (
-        "physics",
-        True,
-        420,
-        count_parameters(preset.model),
-    )
-    assert preset.info.horizon_steps == 420
+    assert (row.initialisation, row.structured, row.horizon) == ("physics", True, 420)
+    assert row.parameters == count_parameters(preset.model) and preset.info.horizon_steps == 420
 
 
 def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path, monkeypatch):

@@ -1,18 +1,20 @@
 import json
+import math
 import signal
 import sys
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from engine.resonators.sine_transform import analysis_matrix
 from engine.truth import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
-from training.configuration import DATA_VERSION, DatasetConfiguration
-from training.data.dataset import dataset_folder, draw_initial, load_dataset, split_rows
+from training.configuration import DATA_VERSION, DatasetConfiguration, Recipe
+from training.data import draws
+from training.data.batches import TrainingData, batches
+from training.data.dataset import Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
 TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 
@@ -31,8 +33,6 @@ def test_a_draw_that_would_break_the_string_is_softened():
     assert (rise > 0.02).any() and (rise < 0.02).any()
     np.testing.assert_allclose(free.resonator.relative_tension_rise(capped), np.minimum(rise, 0.02))
     assert np.array_equal(capped[rise <= 0.02], drawn[rise <= 0.02])
-    with pytest.raises(ValueError, match="largest_tension_rise must be above 0"):
-        replace(free, largest_tension_rise=0.0)
 
 
 def test_splits_are_in_order_and_whole():
@@ -95,36 +95,120 @@ def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path):
     every = load_dataset(replace(TINY, steps=450), tmp_path)
     some = load_dataset(replace(TINY, steps=450, stride=3), tmp_path)
     assert torch.equal(some.amplitudes, every.amplitudes[:, ::3])
-    with pytest.raises(ValueError, match="steps must be a multiple of stride, 4, not 30"):
-        replace(TINY, stride=4)
 
 
-def cut_off(folder: Path, count: int, new: bytes = b"") -> None:
-    file = folder / "amplitudes.npy"
-    file.write_bytes(file.read_bytes()[:-count] + new)
-
-
-def set_scale(folder: Path, scale_m: object) -> None:
-    file = folder / "dataset.json"
-    file.write_text(json.dumps({**json.loads(file.read_text()), "scale_m": scale_m}))
-
-
-DAMAGES: dict[str, Callable[[Path], object]] = {
-    "cut": lambda folder: cut_off(folder, 100),
-    "zeros": lambda folder: cut_off(folder, 4000, bytes(4000)),
-    "missing": lambda folder: (folder / "amplitudes.npy").unlink(),
-    "type": lambda folder: np.save(folder / "amplitudes.npy", np.zeros((10, 31, 4))),
-    "json": lambda folder: (folder / "dataset.json").write_text("{"),
-    "scale": lambda folder: set_scale(folder, float("nan")),
-    "list": lambda folder: set_scale(folder, [1]),
+DAMAGES = {  # of a file's bytes
+    "cut": ("amplitudes.npy", lambda data: data[:-100]),
+    "zeros": ("amplitudes.npy", lambda data: data[:-4000] + bytes(4000)),
+    "type": ("amplitudes.npy", lambda data: data.replace(b"<f4", b"<f8")),
+    "json": ("dataset.json", lambda data: b"{"),
+    "scale": ("dataset.json", lambda data: json.dumps({**json.loads(data), "scale_m": float("nan")}).encode()),
+    "list": ("dataset.json", lambda data: json.dumps({**json.loads(data), "scale_m": [1]}).encode()),
+    "missing": ("amplitudes.npy", None),
 }
 
 
 @pytest.mark.parametrize("how", DAMAGES)
 def test_a_damaged_cache_is_reported_with_its_remedy(tmp_path, how):
     load_dataset(TINY, tmp_path)
-    folder = dataset_folder(TINY, tmp_path)
-    DAMAGES[how](folder)
+    folder, (name, damaged) = dataset_folder(TINY, tmp_path), DAMAGES[how]
+    data = (folder / name).read_bytes()
+    (folder / name).unlink()
+    if damaged:
+        (folder / name).write_bytes(damaged(data))
     with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as reported:
         load_dataset(TINY, tmp_path)
     assert str(folder) in str(reported.value)
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "noise"])
+def test_draws_follow_the_protocol(kind):
+    drawn = draws.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
+    peaks = drawn.max(1)
+    assert drawn.shape == (500, 101)
+    assert (drawn[:, [0, -1]] == 0).all()
+    assert drawn.min() >= 0
+    # a narrow Gaussian between two grid points peaks a little below its parameter
+    assert peaks.min() >= 0.9 * draws.PEAK_RANGE_M[0]
+    assert peaks.max() <= draws.PEAK_RANGE_M[1]
+    assert float(peaks.mean()) == pytest.approx(5.5e-3, rel=0.1)
+    if kind == "gaussian":
+        centres = drawn.argmax(1) / 100
+        assert 0.29 <= float(centres.min()) <= 0.33 and 0.67 <= float(centres.max()) <= 0.71
+    again = draws.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
+    assert np.array_equal(drawn, again)
+
+
+def test_random_plucks_are_a_musicians():
+    drawn = draws.draw_plucks(600, 401, torch.Generator().manual_seed(0))
+    peaks = drawn.max(1)
+    assert drawn.shape == (600, 401) and (drawn[:, [0, -1]] == 0).all() and drawn.min() >= 0
+    assert 0.9 * draws.PLUCK_PEAK_RANGE_M[0] <= peaks.min() and peaks.max() <= draws.PLUCK_PEAK_RANGE_M[1]
+    assert float(np.log(peaks).mean()) == pytest.approx(0.5 * math.log(5e-4 * 1e-2), abs=0.1)
+    places = drawn.argmax(1) / 400
+    assert float(places.min()) < 0.08 and float(places.max()) > 0.92
+    # a triangle has two slopes and nothing else; a raised cosine is zero away from its place
+    bends = (np.abs(np.diff(drawn[1::3], n=2)) > 1e-9 * peaks[1::3, None]).sum(1)
+    assert int(bends.max()) <= 2
+    assert (drawn[2::3] == 0).mean(1).min() > 0.6
+    assert np.array_equal(drawn, draws.draw_plucks(600, 401, torch.Generator().manual_seed(0)))
+
+
+CPU = torch.device("cpu")
+ROWS = torch.arange(16)
+PLAIN = Recipe(epochs=1, flip=False, steps_per_batch=0)
+
+
+def modal(dataset: Dataset, displacement: torch.Tensor) -> torch.Tensor:
+    """Amplitudes in m of normalised displacement."""
+    c = dataset.configuration
+    return displacement.double() @ torch.from_numpy(analysis_matrix(c.grid_points, c.modes)) * dataset.scale_m
+
+
+def test_all_frames_of_the_horizon_are_the_data(small_dataset):
+    data = TrainingData(small_dataset, CPU)
+    batch = data.draw(PLAIN, ROWS, 120, 0)
+    assert data.count == 16
+    assert torch.equal(batch.frames, torch.arange(1, 121))
+    expected = small_dataset.amplitudes[:16, 1:121].double()
+    torch.testing.assert_close(modal(small_dataset, batch.target), expected, rtol=1e-5, atol=1e-9)
+
+
+def test_random_frames_cover_the_horizon_in_order(small_dataset):
+    data = TrainingData(small_dataset, CPU)
+    recipe = Recipe(epochs=1, steps_per_batch=20)
+    first, second = (data.draw(recipe, ROWS, 400, iteration).frames for iteration in (0, 1))
+    assert not torch.equal(first, second)
+    for frames in (first, second):
+        assert torch.equal((frames - 1) // 20, torch.arange(20))
+
+
+def test_mirrored_and_inverted_strings_move_as_their_first_frames_do(small_dataset):
+    c = small_dataset.configuration
+    batch = TrainingData(small_dataset, CPU).draw(Recipe(epochs=1, steps_per_batch=0), ROWS, 100, 0)
+    begun = modal(small_dataset, batch.initial)
+    assert not torch.allclose(begun, small_dataset.amplitudes[:16, 0].double(), atol=1e-5)
+    truth = SplittingSolver(c.resonator, c.rate_hz).solve(ModalState.at_rest(begun), 100)
+    torch.testing.assert_close(modal(small_dataset, batch.target), truth[:, batch.frames], rtol=1e-4, atol=2e-8)
+
+
+def test_an_epoch_holds_every_trajectory_once_and_fixed_batches_change_their_order_alone():
+    recipe = Recipe(epochs=1, batch_size=6)
+    found = batches(recipe, 20, 3)
+    assert [len(rows) for rows in found] == [6, 6, 6, 2]
+    assert sorted(torch.cat(found).tolist()) == list(range(20))
+    assert all(torch.equal(a, b) for a, b in zip(found, batches(recipe, 20, 3), strict=True))
+    assert not torch.equal(found[0], batches(recipe, 20, 4)[0])
+    recipe = Recipe(epochs=1, batch_size=5, fixed_batches=True)
+    table = [list(range(first, first + 5)) for first in range(0, 20, 5)]
+    orders = [[rows.tolist() for rows in batches(recipe, 20, epoch)] for epoch in range(8)]
+    assert all(sorted(order) == table for order in orders)
+    assert len({str(order) for order in orders}) > 1
+
+
+def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path):
+    dataset = load_dataset(DatasetConfiguration("pluck", 4000, 5, steps=450, stride=9, count=20), tmp_path)
+    batch = TrainingData(dataset, CPU).draw(Recipe(epochs=1, flip=False, steps_per_batch=7), ROWS, 450, 0)
+    assert len(batch.frames) == 7 and not (batch.frames % 9).any() and int(batch.frames[-1]) <= 450
+    expected = dataset.amplitudes[ROWS][:, batch.frames // 9].double()
+    torch.testing.assert_close(modal(dataset, batch.target), expected, rtol=1e-5, atol=1e-9)

@@ -1,20 +1,27 @@
 """A family of strings: what is drawn lies in it, and what is learned holds on others."""
 
 import math
+import os
+import subprocess
+import sys
+from functools import partial
+from itertools import product
+from unittest.mock import Mock
 
 import pytest
 import torch
 
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.models.koopman_tension import KoopmanTension
-from engine.presets import load_preset
+from engine.presets import SHIPPED, STRINGS, find_preset, load_preset, read_described_string, read_info
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
+from training.family.drums import draw_drum, measure_drum, measure_drums, store, summary
 from training.family.fit import FitCase, errors, fit_curves, geometric_mean
-from training.family.motion import linear_motion, untrained
+from training.family.motion import linear_motion, model_player, untrained, untrained_player
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
+from training.family.shelf import TITLES
 from training.family.strings import COLUMNS, FAMILY, draw_string, solve, string_of
 
 RATE_HZ, STEPS = 48_000, 1_200
@@ -47,22 +54,18 @@ def test_a_string_sounds_as_it_is_reported():
     assert found == pytest.approx([110.0, 8.0, 0.5], rel=1e-9)
 
 
-def test_splits_share_no_string_and_a_number_is_a_string_for_ever():
-    pitches = [
-        draw_string("inside", split, n).pitch_hz for split in ("train", "validation", "test") for n in range(9)
-    ]
-    assert len(set(pitches)) == len(pitches)
-    again = draw_string("inside", "test", 3)
-    assert (again.amplitudes_m == draw_string("inside", "test", 3).amplitudes_m).all()
+def test_splits_share_no_string_and_a_number_is_a_string_or_a_drum_for_ever():
+    splits = ("train", "validation", "test")
+    assert len({draw_string("inside", split, n).pitch_hz for split in splits for n in range(9)}) == 27
+    for draw in (partial(draw_string, "inside", "test"), draw_drum):
+        assert (draw(3).amplitudes_m == draw(3).amplitudes_m).all()
 
 
 def test_curves_are_found_from_nothing_and_hold_on_other_strings():
     """A sixth of a second of six strings is enough to find the twelfths of backward error analysis."""
     train, validation = cases("train", 6), cases("validation", 4)
     model = build_model("koopman_tension", {"modes": 25, "degree": 2})
-    assert isinstance(model, KoopmanTension)
-    plucked = train[0].plucked
-    physics = Physics(resonator_of(plucked.string, 25), RATE_HZ, 1e-3)
+    physics = Physics(resonator_of(train[0].plucked.string, 25), RATE_HZ, 1e-3)
     model.initialise("kicks", physics, torch.Generator())
     start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
     shares = []
@@ -113,3 +116,43 @@ def test_a_string_that_has_fallen_silent_says_so():
     assert all(one.sounds for one in early)
     rates = [draw_string("beyond", "test", number, seed).string.decay_rate(1) for number in range(2)]
     assert [one.sounds for one in late] == [1.5 * rate < 0.5 * math.log(1e18) for rate in rates] == [False, True]
+
+
+WRITE = "import sys; from pathlib import Path; from engine.presets import find_preset, load_preset;"
+WRITE += "from training.family.shelf import put_on_shelf;"
+WRITE += "put_on_shelf(load_preset(find_preset('studio_any_string')), Path(sys.argv[1]))"
+
+
+def test_descriptions_are_those_of_the_files_where_the_system_has_another_encoding(tmp_path):
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # ASCII where Python leaves it at that
+    subprocess.run([sys.executable, "-c", WRITE, str(tmp_path)], env={**os.environ, **plain}, check=True)
+    for name, title in TITLES.items():
+        string, description = read_described_string(STRINGS / f"{name}.toml")
+        info = read_info(tmp_path / f"studio_any_{name}.safetensors")
+        assert (info.title, info.string) == (title, string)
+        assert info.description == f"{description} Played by the model of every string."
+        assert info == read_info(find_preset(f"studio_any_{name}"))
+    assert "1140 kg/m³" in read_info(tmp_path / "studio_any_nylon_e4.safetensors").description
+
+
+def test_the_model_of_strings_plays_drums():
+    model = load_preset(SHIPPED / "studio_any_string.safetensors").model
+    players = {"model": model_player(model), "series": untrained_player("series"), "linear": linear_motion}
+    plates = product((4, 5, 10, 11), range(2))  # of few modes
+    errors = [each for number, seed in plates for each in measure_drum(number, players, RATE_HZ, False, seed)]
+    found = {name: summary(errors, name, RATE_HZ, 0) for name in players}
+    assert found["model"].geometric_mean < 1e-11 and found["model"].worst < 1e-6
+    assert found["series"].geometric_mean < 1e-11
+    assert found["linear"].geometric_mean > 1e-2
+
+
+def test_a_measurement_of_drums_continues(tmp_path):
+    counted = Mock(side_effect=linear_motion)
+    checkpoint = tmp_path / "runs" / "drums.csv"
+    for _ in range(2):
+        found = measure_drums({"linear": counted}, 1, 0, 8_000, 5, checkpoint)
+    assert counted.call_count == len(found) == 1
+    table = tmp_path / "rows.csv"
+    for _ in range(2):
+        store([summary(found, "linear", 8_000, 5)], table)
+    assert len(table.read_text().splitlines()) == 2

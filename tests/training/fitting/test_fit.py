@@ -175,20 +175,18 @@ def test_what_cannot_be_trained_is_refused_before(small_dataset, runs):
         fit_seeds(named([small("koopman", epochs=n) for n in (2, 3)]), small_dataset, runs)
 
 
-def test_early_stopping_ends_when_nothing_gets_better(small_dataset, runs, monkeypatch):
+def test_early_stopping_begins_with_a_prediction_and_ends_when_nothing_gets_better(small_dataset, runs, monkeypatch):
+    """Not while Koopman's encoder learns the fitted latents."""
+    found = fit(
+        small("koopman", epochs=8, latent_epochs=5, latent_polish=1, patience=3), small_dataset, runs / "late"
+    )
+    assert found.epochs >= 5 and math.isfinite(found.validation.total().rel_mae)
     monkeypatch.setattr(module, "learning_rate_at", lambda recipe, share: 0.0)
     seen: list[FitProgress] = []
     found = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
     assert (found.best_epoch, found.epochs, len(seen)) == (0, 3, 3)
     again = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
     assert len(seen) == 3 and again.epochs == 3  # a run that has ended stays ended
-
-
-def test_patience_begins_when_there_is_a_prediction(small_dataset, runs):
-    """Not while Koopman's encoder learns the fitted latents."""
-    found = fit(small("koopman", epochs=8, latent_epochs=5, latent_polish=1, patience=3), small_dataset, runs)
-    assert found.epochs >= 5
-    assert math.isfinite(found.validation.total().rel_mae)
 
 
 def test_the_mean_of_the_weights_is_what_is_kept(small_dataset, runs):

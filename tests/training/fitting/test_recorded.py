@@ -51,8 +51,7 @@ def test_a_step_asks_nothing_of_the_host(name, small_dataset, monkeypatch):
             backward(model, batch, EVERY)
             torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
 
-    if name in ("fgru", "frnn"):
-        step()  # which makes the constants that are kept
+    step()  # which makes the constants that are kept
     with _Apart():
         step()
 
@@ -98,10 +97,8 @@ def test_a_repeated_step_is_the_launched_one(name, small_dataset, monkeypatch):
     cells = [Cell(name, True, "gaussian", 4000, 20, "paper", seed) for seed in range(2)]
     changes = {"batch_size": 4, "schedule": "one_cycle"}
     made = [configuration_of(cell, DATA, changes) for cell in cells]
-    repeated, launched = (
-        [TrainingState(each, small_dataset, torch.device("cuda")) for each in made] for _ in range(2)
-    )
-    steps = Steps()
+    cuda, steps = torch.device("cuda"), Steps()
+    repeated, launched = ([TrainingState(each, small_dataset, cuda) for each in made] for _ in range(2))
     for _ in range(11):
         steps.take(repeated)
         for run in launched:

@@ -58,13 +58,10 @@ def test_the_covariance_of_white_noise_is_that_of_least_squares():
 @pytest.mark.parametrize("seed", range(3))
 def test_figures_of_beating_poles_are_those_of_their_sound(seed):
     random = np.random.default_rng(seed)
-    poles = [
-        Pole(complex(-random.uniform(2, 6), 2 * math.pi * hz), complex(*random.uniform(0.2, 1, 2)))
-        for hz in (200.0, 200.7)
-    ]
+    drawn = [(2 * math.pi * hz, random.uniform(2, 6), random.uniform(0.2, 1, 2)) for hz in (200.0, 200.7)]
+    poles = [Pole(complex(-decay, omega), complex(*a)) for omega, decay, a in drawn]
     t = np.linspace(0, 5, 500_001)
-    z = np.sum([pole.a * np.exp(pole.s * t) for pole in poles], axis=0)
-    slope = np.sum([pole.a * pole.s * np.exp(pole.s * t) for pole in poles], axis=0)
+    z, slope = (sum(p.a * p.s**power * np.exp(p.s * t) for p in poles) for power in (0, 1))
     energy, step = np.abs(z) ** 2, t[1]
     total = float(energy.sum()) * step
     found = figures_at_rest(poles)
@@ -86,6 +83,7 @@ def test_the_energy_gives_the_end_of_a_glide():
     assert rests[6].cents < 0.4 * expected  # nearer than without
     assert abs(rests[6].cents - expected) < 3 * rests[6].error
     assert rests[1].cents < rests[6].cents and rests[1].error > rests[6].error
+    assert sum(share_of_tension(k)[0] for k in range(1, 100)) == pytest.approx(1, abs=0.02)
 
 
 def test_a_pitch_that_rises_is_not_taken_for_a_law():
@@ -95,7 +93,3 @@ def test_a_pitch_that_rises_is_not_taken_for_a_law():
     assert max(abs(each.cents) for each in rising.values()) < 4
     rings = {1: [Pole(complex(-0.05, 628.0), 1 + 0j, 1)]}
     assert at_rest(Glide(np.array([5.0, 5.0, 5.0]) * CENTS), rings)[1].cents == 0
-
-
-def test_shares_of_tension_add_up():
-    assert sum(share_of_tension(k)[0] for k in range(1, 100)) == pytest.approx(1, abs=0.02)

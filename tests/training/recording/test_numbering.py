@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.training.recording.synthetic import synthetic_note
-from training.recording.note import note_of
+from training.recording.note import RecordingError, note_of
 from training.recording.numbering import followed, number_note, peaks_of, series_at
 
 RATE_HZ = 44_100
 
 
-def stiff_note(f0_hz: float, stiffness: float, missing: tuple[int, ...] = (), seed: int = 0) -> np.ndarray:
-    random = np.random.default_rng(seed)
+def stiff_note(f0_hz: float, stiffness: float, missing: tuple[int, ...] = ()) -> np.ndarray:
+    random = np.random.default_rng(0)
     t = np.arange(round(1.6 * RATE_HZ)) / RATE_HZ
     sound = np.zeros(len(t))
     for k in range(1, 41):
@@ -40,8 +40,7 @@ def test_pitch_and_stiffness_are_found_blind(f0_hz):
 
 
 @pytest.mark.parametrize(("f0_hz", "missing"), [(98.0, (1, 3, 6, 9, 12)), (196.0, (2, 4, 6, 8)), (147.0, (1, 5, 10))])
-def test_missing_partials_do_not_move_it_by_an_octave(f0_hz, missing):
-    """As where the string is plucked at a node, and where the first partial is not radiated."""
+def test_partials_that_are_not_plucked_or_not_radiated_do_not_move_it_by_an_octave(f0_hz, missing):
     series = number_note(note_of(stiff_note(f0_hz, 4e-5, missing), RATE_HZ))
     assert series is not None and cents(series.f0_hz, f0_hz) < 12
     assert series.stiffness == pytest.approx(4e-5, rel=0.2)
@@ -76,3 +75,40 @@ def test_a_string_is_followed_as_it_glides(off_cents):
     peaks = peaks_of(stiff_note(110.0, 4e-5)[8_000:40_000], RATE_HZ)
     series = followed(peaks, series_at(peaks, 110.0 * 2 ** (-off_cents / 1200), 4e-5))
     assert cents(series.f0_hz, 110.0) < 2
+
+
+@pytest.mark.parametrize(
+    ("samples", "rate_hz", "words"),
+    [
+        (np.zeros(44_100), 44_100, "silent"),
+        (np.full(44_100, np.nan), 44_100, "NaN"),
+        (np.ones(8_000 * 600), 8_000, "cut out one note"),
+        (np.ones(1_000), 44_100, "let the note ring"),
+        (np.ones(44_100), 4_000, "record at 44100"),
+    ],
+)
+def test_reasons_are_given(samples, rate_hz, words):
+    with pytest.raises(RecordingError, match=words):
+        note_of(samples, rate_hz)
+
+
+def test_high_rates_are_converted_channels_combined_and_the_louder_of_unlike_ones_is_taken(synthetic):
+    twice = np.repeat(synthetic.samples, 4)  # a crude 176.4 kHz
+    note = note_of(np.stack([twice, twice], 1), 4 * synthetic.rate_hz)
+    assert note.rate_hz == synthetic.rate_hz
+    assert note.onset == pytest.approx(0.1 * note.rate_hz, abs=0.005 * note.rate_hz)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(synthetic.samples))
+    note = note_of(np.stack([noise, synthetic.samples], 1), synthetic.rate_hz)
+    assert np.allclose(note.samples, synthetic.samples - synthetic.samples.mean())
+
+
+@pytest.mark.parametrize("rate_hz", [88_200, 96_000, 64_000])
+def test_a_high_rate_has_the_tones_of_a_low_one_and_nothing_folded(rate_hz):
+    def recorded(hz: float, at_hz: int) -> np.ndarray:
+        time_s = np.arange(at_hz // 2) / at_hz
+        return np.sin(2 * np.pi * hz * time_s) * np.hanning(len(time_s) + 1)[:-1]
+
+    tone, above = 18_000.0, 29_000.0  # the second is above half the rate that is fitted
+    note = note_of(recorded(tone, rate_hz) + recorded(above, rate_hz), rate_hz)
+    expected = recorded(tone, note.rate_hz)[: len(note.samples)]
+    assert np.linalg.norm(note.samples[: len(expected)] - expected) < 1e-4 * np.linalg.norm(expected)

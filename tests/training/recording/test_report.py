@@ -1,10 +1,15 @@
 """Errors and decays of the report, and distances of attacks, against sounds whose own are known."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import signal
 
+from tests.training.recording.synthetic import modelled_note
+from training.recording.attack import FADED_S, WHOLE_S, attack_force, first_distance_db
+from training.recording.note import Note
 from training.recording.report import bands_of, errors_of
 
 RATE_HZ = 44_100
@@ -35,3 +40,33 @@ def test_errors_ignore_one_gain_and_one_delay_and_nothing_else(frames):
     noise = 0.1 * float(np.std(truth)) * np.random.default_rng(0).standard_normal(len(truth))
     assert errors_of(truth, truth + noise, RATE_HZ).esr == pytest.approx(0.01, rel=0.1)
     assert errors_of(truth, truth, RATE_HZ).log_spectral_distance_db == 0
+
+
+@pytest.mark.parametrize(("seed", "impulse_hz"), [(0, 22_050), (1, 44_100), (2, 44_100)])
+def test_a_knock_through_the_body_is_found_again_without_the_body(seed, impulse_hz):
+    learned, note, _ = modelled_note(seed, 1, seconds=0.4)
+    rate, random = note.rate_hz, np.random.default_rng(seed)
+    t = np.arange(rate // 20) / rate
+    body = 0.3 * np.exp(-600 * t) * np.sin(2 * np.pi * random.uniform(150, 400) * t)
+    body[0] = 1.0
+    knock = signal.sosfilt(signal.butter(2, 2_000, fs=rate, output="sos"), random.standard_normal(rate // 50))
+    string = SimpleNamespace(sound=lambda rate_hz: learned.render(np.arange(round(0.4 * rate_hz)) / rate_hz))
+    samples = string.sound(rate)
+    samples[: len(t) + len(knock) - 1] += 0.05 * np.convolve(knock, body)
+    impulse = signal.resample_poly(body, impulse_hz, rate) * rate / impulse_hz
+    force = attack_force(Note(samples, rate, 0, 1e-12), string, impulse, impulse_hz)
+    assert force is not None and len(force) == round(FADED_S * rate)
+    whole = slice(0, len(knock))
+    assert np.corrcoef(force[whole], knock)[0, 1] > 0.95
+    assert float(np.linalg.norm(force[whole])) == pytest.approx(0.05 * float(np.linalg.norm(knock)), rel=0.2)
+    assert np.abs(force[round(WHOLE_S * rate) :]).max() < 0.1 * np.abs(force).max()
+    assert force[-1] == pytest.approx(0, abs=1e-9)
+    assert attack_force(Note(string.sound(rate), rate, 0, 0.0), string, impulse, impulse_hz) is None
+
+
+def test_the_distance_of_attacks_is_of_their_spectra_and_of_no_gain():
+    random = np.random.default_rng(0)
+    knock = random.standard_normal(2_000) * np.exp(-np.arange(2_000) / 300)
+    other = signal.lfilter([1, -0.9], [1], knock)
+    assert first_distance_db(knock, 0.3 * knock, 44_100) == pytest.approx(0, abs=1e-9)
+    assert first_distance_db(knock, other, 44_100) > 3

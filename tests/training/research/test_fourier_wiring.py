@@ -10,7 +10,7 @@ from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.resonators.sine_transform import synthesis_matrix
 from tests.engine.tensors import convolved
-from tests.training.fitting.test_phases import motions_of
+from tests.training.fitting.test_pursuit import motions_of
 from training.cell import Cell, configuration_of
 from training.evaluate import evaluate_model
 from training.fitting import phases
@@ -21,14 +21,14 @@ from training.research.fourier_wiring import Kernels, mean_motions, shared_coupl
 POINTS = 31
 
 
-def modes(coupled: float = 0.0, count: int = 5, points: int = POINTS) -> StringModes:
+def modes(coupled: float = 0.0, count: int = 5) -> StringModes:
     """A string whose coupling is what FGRU can hold."""
     n = torch.arange(1, count + 1, dtype=torch.float64)
     eigenvalues = torch.complex(-1e-4 * n**2, 0.31 * n)
     squares = torch.rand(30, count, generator=torch.Generator().manual_seed(3), dtype=torch.float64)
     coupling = coupled * n[:, None] * n**2 * (1 + 0.5 * torch.eye(count, dtype=torch.float64))
     starts = torch.complex(torch.ones_like(n), eigenvalues.real / eigenvalues.imag)
-    return StringModes(torch.from_numpy(synthesis_matrix(points, count)), eigenvalues, starts, coupling, squares)
+    return StringModes(torch.from_numpy(synthesis_matrix(POINTS, count)), eigenvalues, starts, coupling, squares)
 
 
 def motion(string: StringModes, initial: torch.Tensor, steps: int) -> torch.Tensor:
@@ -49,35 +49,26 @@ def relative_error(model: FGRU | FRNN, string: StringModes, steps: int, skipped:
     return float((found - truth)[:, skipped:].square().sum() / truth[:, skipped:].square().sum())
 
 
-def fgru(string: StringModes, points: int = POINTS, width: int = 24) -> FGRU:
-    model = FGRU(FGRUConfiguration(points, width))
+def fgru(string: StringModes) -> FGRU:
+    model = FGRU(FGRUConfiguration(POINTS, 24))
     store_in_fgru(model, string)
-    return model
-
-
-def frnn(string: StringModes, width: int = 8, depth: int = 3) -> FRNN:
-    model = FRNN(FRNNConfiguration(POINTS, width, depth))
-    store_in_frnn(model, string)
     return model
 
 
 @pytest.mark.parametrize("count", [4, 5])
 def test_an_frnn_is_a_linear_string(count):
-    string = modes(count=count)
-    assert relative_error(frnn(string), string, 300) < 1e-7
+    string, model = modes(count=count), FRNN(FRNNConfiguration(POINTS, 8, 3))
+    store_in_frnn(model, string)
+    assert relative_error(model, string, 300) < 1e-7
 
 
-def test_an_fgru_is_a_linear_string():
-    """Except its first frame, which it has no state for yet."""
-    assert relative_error(fgru(modes()), modes(), 300, skipped=1) < 1e-4
-    assert relative_error(fgru(modes()), modes(), 10) < 1e-2
-
-
-def test_an_fgru_follows_the_squares():
-    """The mean over a period is what the closed form has: what swings within one is left."""
-    string = modes(2e-4)
+def test_an_fgru_is_a_linear_string_and_follows_the_squares():
+    """Except its first frame, which it has no state for yet; what swings within a period is left."""
+    linear, string = modes(), modes(2e-4)
+    assert relative_error(fgru(linear), linear, 300, skipped=1) < 1e-4
+    assert relative_error(fgru(linear), linear, 10) < 1e-2
     assert relative_error(fgru(string), string, 300) < 0.02
-    assert relative_error(fgru(modes()), string, 300) > 0.1
+    assert relative_error(fgru(linear), string, 300) > 0.1
 
 
 def test_a_shared_coupling_is_found_again():
@@ -107,15 +98,11 @@ def test_kernels_pass_spread_and_gather():
     assert float(found[7, 3]) == pytest.approx(3 * float(shape[-1]))
 
 
-def test_a_mean_motion_is_the_linear_strings_own():
-    omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
-    found = mean_motions(motions_of(omega, sigma, torch.zeros(3, 3).double(), 400))
+def test_a_mean_motion_is_the_linear_strings_own_or_between_those_of_soft_and_loud_strings():
+    omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
+    found = mean_motions(motions_of(omega, sigma, torch.zeros(2, 2).double(), 400))
     torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
     assert not found.coupling.any()
-
-
-def test_a_mean_motion_is_between_those_of_soft_and_loud_strings():
-    omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
     coupling = torch.tensor([[0.002, 0.002], [0.002, 0.004]]).double()
     found = mean_motions(motions_of(omega, sigma, coupling, 400)).log_eigenvalues
     assert (found.imag > omega).all()

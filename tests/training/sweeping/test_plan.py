@@ -6,7 +6,8 @@ import pytest
 from engine.models import MODELS, OF_MANY_STRINGS
 from engine.schema import SchemaError
 from training.cell import Cell
-from training.sweeping.plan import load_plan, plan_names
+from training.sweeping.plan import Plan, load_plan, plan_names
+from training.sweeping.processes import fitted
 
 PLAN = """
 description = "Two blocks."
@@ -41,21 +42,18 @@ seeds = {[*range(1000)]}
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    file = tmp_path / "plan.toml"
-    file.write_text(PLAN, encoding="utf-8")
-    return file
+    return tmp_path / "plan.toml"
 
 
-def change(path: Path, old: str, new: str) -> str:
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    return str(path)
+def changed(path: Path, old: str = "", new: str = "") -> Plan:
+    assert old in PLAN
+    path.write_text(PLAN.replace(old, new, 1), encoding="utf-8")
+    return load_plan(str(path))
 
 
 def test_the_order_is_of_value(path):
     """Block, seed, the non-linear string first, the short horizon first, then as named; each run once."""
-    plan = load_plan(str(path))
+    plan = changed(path)
     first = [
         f"{string}_noise_4k_{model}{horizon}{seed}"
         for seed in ("", "_seed1")
@@ -72,8 +70,8 @@ def test_the_order_is_of_value(path):
 
 
 def test_a_trial_differs_from_the_cells_that_it_is_named_after(path):
-    real = load_plan(str(path))
-    trial = load_plan(change(path, "[[block]]", "[data]\ncount = 20\n[recipe_fields]\nepochs = 3\n\n[[block]]"))
+    real = changed(path)
+    trial = changed(path, "[[block]]", "[data]\ncount = 20\n[recipe_fields]\nepochs = 3\n\n[[block]]")
     assert trial.trial
     assert [run.name for run in trial.runs] == [run.name for run in real.runs]
     assert not {run.digest for run in trial.runs} & {run.digest for run in real.runs}
@@ -107,7 +105,7 @@ def test_what_cannot_be_is_reported_with_its_place(path, old, new, message, monk
     if new == TOO_MANY:
         monkeypatch.setattr("training.sweeping.plan.Cell", None)
     with pytest.raises(SchemaError) as error:
-        load_plan(change(path, old, new))
+        changed(path, old, new)
     assert str(error.value).startswith(str(path))
     assert message in str(error.value)
 
@@ -144,3 +142,47 @@ def test_committed_plans_are_whole():
     # one seed of ours everywhere before two anywhere
     seeds = [c.recipe.seed for run, c in runs["tables"] if run.recipe == "ours"]
     assert seeds.index(1) == seeds.count(0)
+
+
+def set_machine(monkeypatch: pytest.MonkeyPatch, cores: int, memory_bytes: int, gpus: int = 0) -> None:
+    sizes = {"SC_PHYS_PAGES": memory_bytes, "SC_PAGE_SIZE": 1}
+    monkeypatch.setattr("os.sysconf", sizes.__getitem__, raising=False)
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: set(range(cores)), raising=False)
+    monkeypatch.setattr("torch.cuda.is_available", lambda: gpus > 0)
+    monkeypatch.setattr("torch.cuda.device_count", lambda: gpus)
+
+
+@pytest.mark.parametrize(
+    ("memory_bytes", "tasks", "options", "count"),
+    [
+        (20 * 2**30, 100, {}, 2),
+        (20 * 2**30, 100, {"workers": 5}, 5),
+        (2**40, 100, {}, 8),
+        (2**40, 3, {}, 3),
+        (2**40, 100, {"threads": 4}, 2),
+        (2**40, 100, {"threads": 16}, 1),
+        (2**40, 100, {"workers": 20}, 20),
+    ],
+)
+def test_workers_fit_the_machine(monkeypatch, memory_bytes, tasks, options, count):
+    set_machine(monkeypatch, 8, memory_bytes)
+    found, threads = fitted(tasks, **options), options.get("threads", 1)
+    assert (found.device, found.threads, len(found.environments)) == ("cpu", threads, count)
+    assert {environment["OMP_NUM_THREADS"] for environment in found.environments} == {str(threads)}
+    with pytest.raises(ValueError, match="no CUDA device can be used here"):
+        fitted(1, device="cuda")
+
+
+@pytest.mark.parametrize(("visible", "gpus"), [(None, ["0", "1"]), ("3, MIG-7", ["3", "MIG-7"])])
+def test_several_runs_share_a_gpu(monkeypatch, visible, gpus):
+    set_machine(monkeypatch, 12, 2**40, gpus=2)
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    if visible:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", visible)
+
+    for tasks, per_device, places in ((100, 1, gpus), (100, 3, gpus * 3), (3, 3, [*gpus, gpus[0]])):
+        found = fitted(tasks, per_device=per_device)  # the few are spread
+        assert [environment["CUDA_VISIBLE_DEVICES"] for environment in found.environments] == places
+    packed = fitted(100, per_device=3)
+    assert (packed.device, packed.threads) == ("cuda", 2)
+    assert fitted(100, device="cpu").device == "cpu"

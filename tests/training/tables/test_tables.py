@@ -7,7 +7,17 @@ import pytest
 from training.cell import Cell, configuration_of
 from training.results import Row
 from training.tables.compact import as_compact
-from training.tables.paper import COLUMNS, DatasetColumn, MeanFigure
+from training.tables.paper import (
+    COLUMNS,
+    METRICS,
+    MODEL_ORDER,
+    PRINTED,
+    DatasetColumn,
+    MeanFigure,
+    factor,
+    mark,
+    paper_errors,
+)
 from training.tables.sections import sections
 from training.tables.tidy_csv import as_csv
 
@@ -17,21 +27,9 @@ G4 = DatasetColumn("gaussian", 4000)
 def row(cell: Cell | None = None, mse: float | None = 0.01, mae: float | None = 0.1, **changes: Any) -> Row:
     """A row as a run of the cell makes it."""
     cell = cell or Cell("lru", True, "gaussian", 4000)
-    facts: dict[str, Any] = {
-        "digest": configuration_of(cell).digest,
-        "name": cell.name,
-        "status": "done",
-        "model": cell.model,
-        "string": cell.string_kind,
-        "initial": cell.initial,
-        "rate_hz": cell.rate_hz,
-        "horizon": cell.horizon,
-        "recipe": cell.recipe,
-        "seed": cell.seed,
-        "initialisation": "paper",
-        "rel_mse": mse,
-        "rel_mae": mae,
-    }
+    of_cell = {name: getattr(cell, name) for name in ("model", "initial", "rate_hz", "horizon", "recipe", "seed")}
+    facts = {"digest": configuration_of(cell).digest, "name": cell.name, "string": cell.string_kind, **of_cell}
+    facts |= {"status": "done", "initialisation": "paper", "rel_mse": mse, "rel_mae": mae}
     return Row(**(facts | changes))
 
 
@@ -41,8 +39,7 @@ def seeds(count: int, **fields: Any) -> list[Cell]:
 
 
 def records(text: str, **wanted: str) -> list[dict[str, str]]:
-    lines = list(csv.DictReader(io.StringIO(text)))
-    return [entry for entry in lines if all(entry[name] == value for name, value in wanted.items())]
+    return [entry for entry in csv.DictReader(io.StringIO(text)) if wanted.items() <= entry.items()]
 
 
 def cell(rows: list[Row], **wanted: str) -> dict[str, str]:
@@ -60,6 +57,8 @@ GONE: dict[str, Any] = {"mse": None, "mae": None}
 OF_400 = {"rel_mse_400": 0.0002, "rel_mae_400": 0.01, "test_rel_mse_400": 0.0003, "rel_mse_400_se": 0.00001}
 SOFT, LOUD = 0.02 - 0.0015 * 2**0.5, 0.02 + 0.0015 * 2**0.5
 ENDS = [row(A), row(B, **GONE, status="diverged"), row(C, **GONE, status="diverged"), row(D, **GONE, status="failed")]
+# √((0.003² + 0.005²) / 2): the seeds share their strings
+BOTH = [row(A, SOFT, rel_mse_se=0.003), row(B, LOUD, rel_mse_se=0.005)]
 TWO = [row(A, 0.010, 0.10), row(B, 0.012, 0.16)]
 RECIPES = [row(OURS, 0.006, initialisation="physics"), row(PAPER, 0.020)]
 APART = [row(LONG, test_rel_mse=0.9, **OF_400), row(SHORT, 0.0008, 0.02)]
@@ -75,13 +74,7 @@ CASES = [  # rows, the cell, and what it says
     ("the test split", [row(A, test_rel_mse=0.01)], "", "test_rel_mse=0.01 test_mse_mark=better"),
     ("a seed that runs away there counts", [row(A, test_rel_mse=0.01), row(B)], "", "test_rel_mse="),
     ("the choice of strings has an error", [row(A, 0.02, rel_mse_se=0.005)], "", "rel_mse_se=0.005"),
-    # √((0.003² + 0.005²) / 2): the seeds share their strings
-    (
-        "which counts beside the seeds",
-        [row(A, SOFT, rel_mse_se=0.003), row(B, LOUD, rel_mse_se=0.005)],
-        "",
-        "mse_mark=equal rel_mse_std=.003 rel_mse_se=.00412311",
-    ),
+    ("which counts beside the seeds", BOTH, "", "mse_mark=equal rel_mse_std=.003 rel_mse_se=.00412311"),
     ("marks of the test split", TEST, "", "mse_mark=better test_mse_mark=equal test_mae_mark=worse"),
     ("figures of the test split", TEST, "", "test_rel_mse=.03 test_rel_mse_se=.002 test_rel_mae_se="),
     ("runs that ended badly are counted", ENDS, "", "rel_mse=0.01 seeds=1 diverged=2 failed=1"),
@@ -145,16 +138,74 @@ def test_a_compact_line_has_start_seeds_figures_and_ratio():
     assert compact_lines(as_compact([row(mse=1.5)]), 4000, "nonlinear", "LRU")[0][2] == "*1.5 (0.0260) ×58*"
 
 
-def test_compact_tables_list_what_is_missing_and_what_went_wrong():
+def test_compact_tables_list_what_is_missing_and_what_went_wrong_and_leave_long_runs_out_of_short_ones():
     found = as_compact([row(A), row(B, None, None, status="diverged")])
     assert compact_lines(found, 4000, "nonlinear", "LRU")[0][2].endswith("; 1 diverged")
     assert "- LRU, nonlinear string, 4000 frames: not Gaussian 16 kHz, Noise 4 kHz, Noise 16 kHz.\n" in found
     assert "- FRNN, linear string, 400 frames: no cell.\n" in found
     assert "FRNN, linear string, 4000" not in found  # as in the paper
-
-
-def test_compact_tables_leave_out_long_runs_measured_over_400_frames():
     long = row(LONG, rel_mse_400=0.0002, rel_mae_400=0.01)
     assert compact_lines(as_compact([long]), 4000, "nonlinear", "LRU")
     (none,) = compact_lines(as_compact([long]), 400, "nonlinear", "LRU")
     assert none == ["—", "0", "not run (0.0008)", "not run (0.0013)", "not run (0.0008)", "not run (0.0259)"]
+
+
+def test_the_papers_figures_are_all_there():
+    figures = paper_errors()
+    assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
+    found = [entry.figure(metric) for entry in figures.values() for metric in METRICS]
+    assert sum(figure is not None and figure.deviation is not None for figure in found) == 192
+    for string in ("linear", "nonlinear"):
+        for horizon, models in ((4000, MODEL_ORDER[:5]), (400, MODEL_ORDER[:7])):
+            assert {key[2] for key in figures if key[:2] == (string, horizon)} == set(models)
+
+
+@pytest.mark.parametrize(
+    ("string", "horizon", "model", "column", "mse", "mae"),
+    [
+        ("nonlinear", 4000, "dmd", ("noise", 16000), (1.8313, 0.2467), (1.0953, 0.087)),
+        ("nonlinear", 4000, "koopman_var", ("gaussian", 4000), (0.0113, 0.0061), (0.0977, 0.0284)),
+        ("nonlinear", 400, "koopman_var", ("gaussian", 16000), (0.0003, 0.0), (0.0201, 0.0006)),
+        ("nonlinear", 400, "frnn", ("noise", 4000), (0.7289, 0.0653), (0.8553, 0.0495)),
+        ("linear", 4000, "koopman_var", ("noise", 16000), (0.0495, 0.0973), (0.1125, 0.1785)),
+        ("linear", 4000, "dmd", ("gaussian", 4000), (0.0, 0.0), (0.006, 0.0007)),
+        ("linear", 400, "fgru", ("gaussian", 16000), (0.0378, 0.0162), (0.214, 0.0551)),
+        ("linear", 400, "frnn", ("noise", 16000), (0.4730, 0.3205), (0.6347, 0.2836)),
+    ],
+)
+def test_figures_of_the_paper(string, horizon, model, column, mse, mae):
+    entry = paper_errors()[string, horizon, model, DatasetColumn(*column)]
+    assert (entry.rel_mse, entry.rel_mae) == (MeanFigure(*mse), MeanFigure(*mae))
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "expected"),
+    [
+        ((0.08, None), (0.1, 0.02), "equal"),  # on the boundary, which floats miss
+        ((0.12, None), (0.1, 0.02), "equal"),
+        ((0.0799, None), (0.1, 0.02), "better"),
+        ((0.1201, None), (0.1, 0.02), "worse"),
+        ((0.05, 0.06), (0.1, 0.02), "equal"),  # ours is the larger deviation
+        ((0.05, 0.03), (0.1, 0.04), "equal"),  # 3, 4, 5: both count, as variances of a difference do
+        ((0.0499, 0.03), (0.1, 0.04), "better"),
+        ((0.05, None, 0.03), (0.1, 0.04), "equal"),  # which strings are in the split counts as the seeds do
+        ((0.04, 0.03, 0.04), (0.1, 0.02), "better"),
+        ((0.04, 0.03, 0.04), (0.1, 0.034), "equal"),
+        ((5e-6, 1e-7), (0.0, 0.0), "equal"),  # the paper's may be anything below its last decimal
+        ((PRINTED, None), (0.0, 0.0), "equal"),
+        ((6e-5, None), (0.0, 0.0), "worse"),
+        ((5e-6, None), (0.0001, 0.0), "better"),
+        ((float("inf"), None), (0.1, 0.02), "worse"),
+    ],
+)
+def test_marks(ours, paper, expected):
+    assert mark(MeanFigure(*ours), MeanFigure(*paper)) == expected
+
+
+def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures():
+    assert MeanFigure(1.0).total is None
+    assert MeanFigure(1.0, 0.3).total == MeanFigure(1.0, None, 0.3).total == 0.3
+    assert MeanFigure(1.0, 0.3, 0.4).total == pytest.approx(0.5)
+    assert factor(MeanFigure(5.65e-6), MeanFigure(0.0113)) == "×0.0005"
+    assert factor(MeanFigure(1.0), MeanFigure(0.004)) == "×250"
+    assert factor(MeanFigure(5e-6), MeanFigure(0.0)) == "> ×0.1"
