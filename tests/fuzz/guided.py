@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 
 LONGEST_BYTES = 20_000  # of a file; a whole one of its kind is smaller, or it is cut
-SLOWEST_S = 20  # of a file
 
 
 def main() -> int:
@@ -31,32 +30,23 @@ def main() -> int:
         _fuzz(chosen.target[0], chosen.seconds)
     from tests.fuzz.readers import TARGETS
 
-    failed = []
-    for name in chosen.target or [target.name for target in TARGETS]:
-        print(f"{name}, {chosen.seconds} s", flush=True)
-        command = [sys.executable, "-m", "tests.fuzz.guided", name, "--seconds", str(chosen.seconds), "--alone"]
-        if subprocess.call(command):
-            failed.append(name)
+    command = [sys.executable, "-m", "tests.fuzz.guided", "--alone", "--seconds", str(chosen.seconds)]
+    failed = [name for name in chosen.target or [each.name for each in TARGETS] if subprocess.call([*command, name])]
     print(f"failed: {', '.join(failed)}" if failed else "nothing failed")
     return bool(failed)
-
-
-def _compiled() -> list[str]:
-    """Modules whose compiler does not know the probes."""
-    root = Path(__file__).parents[2]
-    files = [file for file in root.glob("engine/**/*.py") if "numba" in file.read_text(encoding="utf-8")]
-    return [".".join(file.relative_to(root).with_suffix("").parts) for file in files]
 
 
 def _fuzz(name: str, seconds: int) -> None:
     """Never returns: the library ends the process."""
     import atheris
 
-    with atheris.instrument_imports(include=["app", "engine", "training"], exclude=_compiled()):
+    root = Path(__file__).parents[2]
+    files = [file for file in root.glob("engine/**/*.py") if "numba" in file.read_text(encoding="utf-8")]
+    compiled = [".".join(file.relative_to(root).with_suffix("").parts) for file in files]  # without probes
+    with atheris.instrument_imports(include=["app", "engine", "training"], exclude=compiled):
         from tests.fuzz.readers import TARGETS, in_one_line
 
-    targets = {each.name: each for each in TARGETS}
-    target = targets[name]
+    (target,) = (each for each in TARGETS if each.name == name)
     with tempfile.TemporaryDirectory(prefix="guided") as folder:
         corpus, place = Path(folder) / "corpus", Path(folder) / "there"
         corpus.mkdir()
@@ -72,7 +62,7 @@ def _fuzz(name: str, seconds: int) -> None:
                 in_one_line(error, path)
 
         length = max(LONGEST_BYTES, (corpus / "whole").stat().st_size)
-        limits = [f"-max_total_time={seconds}", f"-max_len={length}", f"-timeout={SLOWEST_S}", "-rss_limit_mb=3000"]
+        limits = [f"-max_total_time={seconds}", f"-max_len={length}", "-timeout=20", "-rss_limit_mb=3000"]
         atheris.Setup([sys.argv[0], *limits, "-print_final_stats=0", "-verbosity=0", str(corpus)], one)
         atheris.Fuzz()
 

@@ -19,6 +19,8 @@ HOSTILE: tuple[Any, ...] = (
 
 def damaged_bytes(data: bytes, draw: random.Random) -> bytes:
     """Cut, lengthened, overwritten, swapped or doubled at a few places, most of them near the beginning."""
+    if draw.random() < 0.05:
+        return draw.randbytes(draw.choice((0, 7, 400)))
     changed = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 8))):
         size = max(1, len(changed))
@@ -68,13 +70,10 @@ def damaged_text(value: Any, draw: random.Random) -> str:
     """The JSON of damaged data; now and then what no data make."""
     text = json.dumps(damaged_value(value, draw))
     kind = draw.randrange(12)
-    if kind == 0:
-        return text.replace(": ", ": " + "[" * draw.choice((100, 2_000)), 1)
-    if kind == 1:
-        return text.replace("1", "7" * 5_000, 1)
     if kind == 2:
         return text[: draw.randrange(len(text) + 1)]
-    return text
+    old, new = {0: (": ", ": " + "[" * draw.choice((100, 2_000))), 1: ("1", "7" * 5_000)}.get(kind, ("", ""))
+    return text.replace(old, new, 1)
 
 
 def damaged_preset(data: bytes, draw: random.Random) -> bytes:

@@ -103,18 +103,28 @@ def json_or_bytes(whole: bytes, draw: random.Random) -> bytes:
     return damaged_bytes(whole, draw) if draw.random() < 0.3 else damaged_text(json.loads(whole), draw).encode()
 
 
-def toml_or_bytes(whole: bytes, draw: random.Random) -> bytes:
-    lines = whole.decode().splitlines()
-    if draw.random() < 0.3:
-        return damaged_bytes(whole, draw)
-    place = draw.randrange(len(lines))
-    name = lines[place].partition("=")[0] if "=" in lines[place] else "colour "
-    value = draw.choice(
-        ("-1", "0", "1e300", "nan", "inf", "'x'", "[]", "{}", "true", "9" * 5000, "1000000000", "[1, 'a']",
-         "'" + "x" * 50_000 + "'", "[" * 100 + "]" * 100, "[" * 3_000, "[" + "1," * 3000 + "]")
-    )  # fmt: skip
-    lines[place] = f"{name}= {value}"
-    return "\n".join(lines).encode()
+def lines_or_bytes(values: str, others: tuple[str, ...]) -> Callable[[bytes, random.Random], bytes]:
+    """Damage lines of a text: a few of them, or their values behind a name, become others."""
+
+    def damaged(whole: bytes, draw: random.Random) -> bytes:
+        if draw.random() < 0.35:
+            return damaged_bytes(whole, draw)
+        lines = whole.decode().splitlines()
+        for _ in range(draw.choice((1, 1, 3))):
+            place = draw.randrange(len(lines))
+            name, sign, _ = lines[place].partition("=")
+            lines[place] = (name + sign if sign else "") + draw.choice((*values.split(), *others))
+        return "\n".join(lines).encode()
+
+    return damaged
+
+
+NESTED = ("'" + "x" * 50_000 + "'", "[" * 100 + "]" * 100, "[" * 3_000, "[" + "1," * 3000 + "]", "9" * 5000)
+toml_or_bytes = lines_or_bytes("-1 0 1e300 nan inf 'x' [] {} true 1000000000 [1,'a'] colour=1", NESTED)
+scala_or_bytes = lines_or_bytes(
+    "-1 0 x 1e300 nan inf. 2000000000 -2000000000. 1/0 0/1 -3/2 ! \u00e9 1.2.3 20000 128",
+    ("9" * 5000, "1/" + "9" * 30, "5" * 200 + ".", ""),
+)
 
 
 def wav(folder: Path, comment: str) -> bytes:
@@ -201,18 +211,6 @@ def scala(path: Path) -> None:
     assert all(0 < tuning.hz(key) < np.inf for key in range(128))
 
 
-def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
-    if draw.random() < 0.4:
-        return damaged_bytes(whole, draw)
-    lines = whole.decode().splitlines()
-    for _ in range(draw.choice((1, 1, 3))):
-        lines[draw.randrange(len(lines))] = draw.choice(
-            ("-1", "0", "x", "1e300", "nan", "inf.", "9" * 5000, "2000000000", "-2000000000.", "1/0", "0/1", "-3/2",
-             "1/" + "9" * 30, "", "!", "\u00e9", "5" * 200 + ".", "1.2.3", "20000", "128")
-        )  # fmt: skip
-    return "\n".join(lines).encode()
-
-
 MPE = read_instrument(INSTRUMENTS / "long_wire.json").model_copy(update={"mode": "mpe"})
 
 
@@ -220,13 +218,11 @@ def song(path: Path) -> None:
     """Read a MIDI file, and write what it says."""
     events = read_midi(path)
     assert read_song(path, MPE).events == events
-    notes = sum(isinstance(each.event, NoteOn) for each in events)
-    parts = [each.event for _, part in read_parts(path)[0] for each in part.events]
-    assert sum(isinstance(event, NoteOn) for event in parts) == notes, "each has one instrument"
+    parts = [each for _, part in read_parts(path)[0] for each in part.events]
+    notes = [sum(isinstance(each.event, NoteOn) for each in some) for some in (events, parts)]
+    assert notes[0] == notes[1], "each has one instrument"
     assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
-    for each in events:
-        if isinstance(each.event, Bend):
-            assert -1 <= each.event.value <= 1
+    assert all(-1 <= each.event.value <= 1 for each in events if isinstance(each.event, Bend))
     midi_bytes(events)
 
 

@@ -134,20 +134,18 @@ def cut_after(random: Random, samples: Array, rate_hz: int) -> Sound:
     return part, rate_hz
 
 
-def silence_after(random: Random, samples: Array, rate_hz: int) -> Sound:
-    """Digital silence, one constant, or faint noise, for 0.2 to 3 s."""
-    samples, _ = cut_after(random, samples, rate_hz) if random.random() < 0.5 else (samples, rate_hz)
-    return np.concatenate([samples, _silence(random, rate_hz)]), rate_hz
-
-
-def silence_before(random: Random, samples: Array, rate_hz: int) -> Sound:
-    return np.concatenate([_silence(random, rate_hz), samples]), rate_hz
-
-
-def silence_around(random: Random, samples: Array, rate_hz: int) -> Sound:
-    """With an offset over all."""
-    quiet = np.zeros(round(random.uniform(0.2, 3) * rate_hz))
-    return np.concatenate([quiet, samples, quiet]) + random.uniform(-0.05, 0.05), rate_hz
+def silent(place: str, random: Random, samples: Array, rate_hz: int) -> Sound:
+    """Digital silence, one constant, or faint noise, for 0.2 to 3 s; with an offset over all where it is around."""
+    if place == "around":
+        quiet = np.zeros(round(random.uniform(0.2, 3) * rate_hz))
+        return np.concatenate([quiet, samples, quiet]) + random.uniform(-0.05, 0.05), rate_hz
+    if place == "after" and random.random() < 0.5:
+        samples, _ = cut_after(random, samples, rate_hz)
+    frames, made = round(random.uniform(0.2, 3) * rate_hz), int(random.integers(3))
+    quiet = np.full(frames, float(random.uniform(-1e-3, 1e-3)) if made == 1 else 0.0)
+    if made == 2:
+        quiet = 1e-4 * random.standard_normal(frames)
+    return np.concatenate([samples, quiet] if place == "after" else [quiet, samples]), rate_hz
 
 
 def in_a_room(random: Random, samples: Array, rate_hz: int) -> Sound:
@@ -197,9 +195,9 @@ CHANGES: dict[str, Callable[[Random, Array, int], Sound]] = {
     "noise": noisier,
     "cut before": cut_before,
     "cut after": cut_after,
-    "silence after": silence_after,
-    "silence before": silence_before,
-    "silence around, offset": silence_around,
+    "silence after": partial(silent, "after"),
+    "silence before": partial(silent, "before"),
+    "silence around, offset": partial(silent, "around"),
     "room": in_a_room,
     "MP3": partial(coded, "MP3", "MPEG_LAYER_III"),
     "Vorbis": partial(coded, "OGG", "VORBIS"),
@@ -366,11 +364,3 @@ def _noise(random: Random, frames: int, exponent: float) -> Array:
     spectrum[0] = 0
     sound = np.fft.irfft(spectrum, frames)
     return sound / math.sqrt(float(np.mean(sound**2)))
-
-
-def _silence(random: Random, rate_hz: int) -> Array:
-    frames = round(random.uniform(0.2, 3) * rate_hz)
-    made = int(random.integers(3))
-    if made == 2:
-        return 1e-4 * random.standard_normal(frames)
-    return np.full(frames, float(random.uniform(-1e-3, 1e-3)) if made else 0.0)

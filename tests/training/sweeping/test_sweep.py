@@ -143,17 +143,14 @@ def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, 
     assert sorted(row.name for row in rows if row.status == "failed") == sorted(workers.pieces[1])
 
 
-def test_what_diverged_is_a_result(plan, options):
+def test_what_diverged_is_a_result_and_a_row_that_makes_no_sense_is_a_failure(plan, options):
+    for wrong in ({"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}):
+        rows = sweep(plan(), Script(done, wrong=wrong), options, Mock())
+        assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
     diverged = Script(lambda run, tries: row_of(run, status="diverged", rel_mae=None, message="the loss is nan"))
     assert {row.status for row in sweep(plan(), diverged, options, Mock())} == {"diverged"}
     sweep(plan(), NOBODY, options, Mock())
     assert is_finished(row_of(plan().runs[0])) and not is_finished(None)
-
-
-@pytest.mark.parametrize("wrong", [{"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}])
-def test_a_row_that_makes_no_sense_is_a_failure(plan, options, wrong):
-    rows = sweep(plan(), Script(done, wrong=wrong), options, Mock())
-    assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
 
 
 def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, options):
