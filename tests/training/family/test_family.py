@@ -1,4 +1,4 @@
-"""A family of strings: what is drawn lies in it, and what is learned holds on others."""
+"""A family of strings: what is drawn lies in it, and what is learned holds on others, and on drums."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Koopman's start by matching pursuit."""
+"""Starts of models: by matching pursuit, by the phases of the displacement, with the string's eigenvalues."""
 
 from dataclasses import replace
 from pathlib import Path

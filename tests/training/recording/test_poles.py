@@ -1,11 +1,11 @@
-"""Poles: their start by a subspace, their spectra by an FFT, their steps by finite differences."""
+"""Poles and glides against closed forms, spectra by an FFT and finite differences; decays that do not show."""
 
 import math
 
 import numpy as np
 import pytest
 
-from training.recording.glide import CENTS, Glide
+from training.recording.glide import CENTS, Glide, basis, glide_of_phases, rate_basis, warped
 from training.recording.refine import MOST_GLIDE, Fit, Pole, polarisations, subspace_poles
 from training.recording.slow import FALL, settle_slow
 from training.recording.sweeps import Takes
@@ -104,3 +104,45 @@ def test_a_decay_that_shows_stays_and_one_that_does_not_is_settled_alike_in_all_
     assert 0.5 < alone.poles[0][1].decay <= FALL / 0.5
     settle_slow(Takes(takes))
     assert [pole.s for pole in takes[0].poles[0]] == [pole.s for pole in takes[1].poles[0]]
+
+
+TIMES = np.linspace(0, 2, 400)
+
+
+def glide_of(seed: int, pitch: float = 0.0) -> Glide:
+    return Glide(np.random.default_rng(seed).uniform(-5, 15, 3) * CENTS, pitch)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed):
+    one = glide_of(seed, pitch=2e-3)
+    np.testing.assert_allclose(one.times(one.tau(TIMES)), TIMES, atol=1e-12)
+    slope = (one.tau(TIMES + 1e-6) - one.tau(TIMES - 1e-6)) / 2e-6
+    np.testing.assert_allclose(slope, 1 + one.pitch + rate_basis(TIMES) @ one.shares, rtol=1e-8)
+    np.testing.assert_allclose(
+        2 ** (glide_of(seed).cents(TIMES) / 1200), 1 + rate_basis(TIMES) @ one.shares, rtol=1e-12
+    )
+    assert not Glide.none().cents(TIMES).any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_gliding_tone_does_not_glide_in_warped_time(seed):
+    one, rate_hz = glide_of(seed), 8_000
+    t = np.arange(rate_hz) / rate_hz
+    found, times = warped(np.sin(2 * math.pi * 440 * one.tau(t)), rate_hz, one)
+    still = np.sin(2 * math.pi * 440 * np.arange(len(found)) / rate_hz)
+    np.testing.assert_allclose(found[:-100], still[:-100], atol=1e-5)
+    np.testing.assert_allclose(one.tau(times[:-100]), np.arange(len(found) - 100) / rate_hz, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_phases_of_partials_show_the_glide_that_they_share(seed):
+    """Up to what is constant: each partial is off its place in the series by some cents."""
+    one, random = glide_of(seed), np.random.default_rng([seed, 1])
+    t, bands = np.arange(150) / 120, []
+    for k in range(1, 9):
+        off_hz, hz = random.uniform(-0.2, 0.2), 100.0 * k
+        phase = 2 * math.pi * (hz * (basis(t) @ one.shares) + off_hz * t + random.uniform())
+        bands.append((hz, 1 / 120, np.exp(-3 * t + 1j * phase) / k + 1e-4 * random.standard_normal(len(t))))
+    apart = (glide_of_phases(bands).cents(TIMES) - one.cents(TIMES))[TIMES < 1]
+    assert float(np.abs(apart - apart.mean()).max()) < 0.1 * float(np.ptp(one.cents(TIMES)))
