@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +17,8 @@ from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.training.conftest import DATA, fit
-from training.cell import Cell, configuration_of
+from tests.training.fitting.test_fit import SMALL
+from training.cell import Cell, configuration_of, load
 from training.configuration import Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
@@ -101,14 +101,6 @@ def test_a_mode_that_seems_to_grow_decays_all_the_same(small_dataset):
     assert all(float(grid.real.max()) < 0 for grid in found_modes(grown, STEPS).grids)
 
 
-def test_other_models_and_strided_data_are_refused(small_dataset):
-    with pytest.raises(ValueError, match="needs the model 'koopman'"):
-        pursue(KoopmanVar(KoopmanVarConfiguration()), small_dataset, STEPS, torch.Generator())
-    strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
-    with pytest.raises(ValueError, match="stride must be 1, not 2"):
-        pursue(koopman(), strided, STEPS, torch.Generator())
-
-
 def test_a_polish_holds_weights_down_by_the_recipes_decay_and_reports_the_error_alone(small_dataset):
     def polished(weight_decay: float) -> tuple[float, float]:
         model = koopman()
@@ -165,14 +157,10 @@ def test_a_negative_frequency_is_the_same_motion_as_a_positive_one():
 
 
 @pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
-def test_a_run_starts_with_a_latent_for_each_mode_and_predicts_strings_that_the_fit_has_not_seen(
-    small_dataset, sizes
-):
+def test_a_run_starts_with_a_latent_for_each_mode_and_predicts_other_strings(small_dataset, sizes):
     c = small_dataset.configuration
-    configuration = TrainingConfiguration(
-        "A test", "koopman_integrated", c, Recipe(epochs=1, start=PHASES), model_configuration=sizes
-    )
-    assert configuration.start == PHASES
+    recipe = Recipe(epochs=1, start=PHASES)
+    configuration = TrainingConfiguration("A test", "koopman_integrated", c, recipe, model_configuration=sizes)
     model, latents = begin(configuration, small_dataset)
     assert (model.configuration.state_size, latents) == (sizes.get("state_size", 5), None)
     assert evaluate_model(model, small_dataset, "validation", EVERY_STEP).total().rel_mse < 1e-3
@@ -181,23 +169,25 @@ def test_a_run_starts_with_a_latent_for_each_mode_and_predicts_strings_that_the_
 
 
 def test_what_cannot_start_so_is_refused(small_dataset):
-    few = IntegratedPhase(IntegratedPhaseConfiguration(state_size=4))
-    with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
-        few.store_modes(fit_phases(found_modes(small_dataset, EVERY_STEP), seed=0))
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
-    with pytest.raises(ValueError, match="stride must be 1, not 2"):
-        found_modes(strided, EVERY_STEP)
-    for model in ("fgru", "frnn"):
-        with pytest.raises(ValueError, match=r"-m training\.research\.fourier_wiring RUN$"):
-            begin(configuration_of(Cell(model, True, "gaussian", 4000, 400)), small_dataset)
+    few, generator = IntegratedPhase(IntegratedPhaseConfiguration(state_size=4)), torch.Generator()
+    phases = fit_phases(found_modes(small_dataset, STEPS), seed=0)
+    for start, words in (
+        (lambda: pursue(KoopmanVar(KoopmanVarConfiguration()), small_dataset, STEPS, generator), "model 'koopman'"),
+        (lambda: pursue(koopman(), strided, STEPS, generator), "stride must be 1, not 2"),
+        (lambda: found_modes(strided, STEPS), "stride must be 1, not 2"),
+        (lambda: few.store_modes(phases), "state_size must be at least 5, the modes that the data show, not 4"),
+        (lambda: begin(load("nylon_nonlinear_gaussian_4k_fgru_400"), small_dataset), "fourier_wiring RUN$"),
+        (lambda: begin(load("nylon_nonlinear_gaussian_4k_frnn_400"), small_dataset), "fourier_wiring RUN$"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            start()
 
 
 @pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
-@pytest.mark.parametrize("rate_hz", [4000, 16000])
-def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(model, rate_hz):
-    blind, hinted = (
-        configuration_of(Cell(model, True, "gaussian", rate_hz, recipe=name)) for name in ("blind", "hinted")
-    )
+@pytest.mark.parametrize("rate", ["4k", "16k"])
+def test_the_blind_recipe_is_given_nothing_of_the_string_and_hints_are_reported(model, rate):
+    blind, hinted = (load(f"nylon_nonlinear_noise_{rate}_{model}_{recipe}") for recipe in ("blind", "hinted"))
     assert blind.knowledge == "" and not blind.recipe.flip
     assert "state_size" not in blind.model_configuration
     assert hinted.knowledge == (SYMMETRIES if model == "koopman" else f"{SYMMETRIES}, and {COUNT}")
@@ -234,19 +224,13 @@ def test_the_number_of_modes_is_found_and_no_claim_of_more_changes_it(small_data
     assert again.rel_mae == pytest.approx(error.rel_mae, rel=0.05)  # sums of seven products are rounded otherwise
 
 
-SIZES: list[tuple[str, int, dict[str, Any]]] = [
-    ("dmd", 1, {"rank": 12}),
-    ("koopman", 1, {"state_size": 6, "encoder_widths": [32], "decoder_widths": [32]}),
-    ("koopman_integrated", 1, {"state_size": 5, "encoder_widths": [], "eigenvalue_widths": [4]}),
-    ("lru", 2, {"state_size": 6, "layers": 1}),
-    ("s5", 2, {"state_size": 12, "hippo_blocks": 2, "layers": 1}),
-]
+LAYERS = {"dmd": 1, "koopman": 1, "koopman_integrated": 1, "lru": 2, "s5": 2}
 
 
-@pytest.mark.parametrize(("model", "layers", "sizes"), SIZES, ids=[name for name, *_ in SIZES])
-def test_a_model_with_linear_dynamics_starts_with_the_strings_eigenvalues(model, layers, sizes):
-    resonator = resonator_of(StringParameters(), 5)
-    built = build_model(model, sizes)
+@pytest.mark.parametrize("model", LAYERS)
+def test_a_model_with_linear_dynamics_starts_with_the_strings_eigenvalues(model):
+    resonator, layers = resonator_of(StringParameters(), 5), LAYERS[model]
+    built = build_model(model, SMALL.get(model, {"rank": 12}))
     how = "physics" if "physics" in built.initialisations else built.own_initialisation()
     built.initialise(how, Physics(resonator, 4000, 1e-3), torch.Generator().manual_seed(0))
     found = built.log_eigenvalues()

@@ -16,7 +16,7 @@ from filelock import FileLock
 from engine.compare.relative import RelativeError
 from engine.schema import read, write
 from tests.training.sweeping.test_sweep import alone_rows, measured
-from training.data.dataset import dataset_folder, load_dataset
+from training.data.dataset import dataset_folder
 from training.fitting.fit import FitProgress
 from training.fitting.log import TrainingLog
 from training.results import Row, read_results
@@ -31,14 +31,9 @@ def folder_of(task: Task) -> Path:
 
 
 def test_a_task_ends_with_its_row_and_reports_its_progress(task, monkeypatch):
-    seen = []
-    add = TrainingLog.add
-
-    def followed(log: TrainingLog, progress: FitProgress) -> None:
-        add(log, progress)
-        seen.append(read_progress(folder_of(task)))  # of the epoch before
-
-    monkeypatch.setattr(TrainingLog, "add", followed)
+    seen, add = [], TrainingLog.add
+    followed = lambda *of: (add(*of), seen.append(read_progress(folder_of(task))))  # noqa: E731
+    monkeypatch.setattr(TrainingLog, "add", followed)  # what is seen is of the epoch before
     outcome = perform(write(task))
     (row,) = (read(Row, row, "row") for row in outcome["rows"])
     assert (row.status, row.digest, row.threads) == ("done", task.runs[0].digest, 1)
@@ -47,12 +42,9 @@ def test_a_task_ends_with_its_row_and_reports_its_progress(task, monkeypatch):
     assert perform(write(task)) == outcome  # from the run's folder
 
 
-def test_a_damaged_data_cache_is_reported(plan, task, options):
-    configuration = plan().runs[0].configuration.data
-    load_dataset(configuration, options.cache)
-    folder = dataset_folder(configuration, options.cache)
-    file = folder / "amplitudes.npy"
-    file.write_bytes(file.read_bytes()[:1000])
+def test_a_damaged_data_cache_is_reported(task, options):
+    folder = dataset_folder(task.runs[0].configuration.data, options.cache)
+    folder.mkdir(parents=True)
     error = perform(write(task))["error"]
     assert f"{folder}: damaged data cache" in error and "delete" in error
     reported = folder_of(task) / "failure.txt"
@@ -83,8 +75,7 @@ def test_a_progress_is_read_where_it_is_whole_and_finite(tmp_path, loss):
 
 def test_two_tasks_never_train_in_one_folder(task, capfd):
     folder_of(task).mkdir(parents=True)
-    lock = FileLock(folder_of(task) / "run.lock")
-    with lock:
+    with FileLock(folder_of(task) / "run.lock"):
         second = threading.Thread(target=perform, args=(write(task),))
         second.start()
         while "waits: another process trains it" not in capfd.readouterr().err:
