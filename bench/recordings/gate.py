@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tests.training.recording.sounds import Case, Recordings, cases, is_judged
+from bench.recordings.sounds import Case, Recordings, cases, is_judged
 from training.cli.console import ProgressReport
 from training.recording.fit import fit_note
 from training.recording.learn import examined

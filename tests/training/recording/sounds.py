@@ -1,17 +1,11 @@
-"""Sounds for the gate of recordings: notes as users record them, and sounds that are no single note of a string.
-
-All are drawn by a seed. Thresholds are set on half of the recordings and on other seeds than judge them.
-"""
+"""Sounds for the gate of recordings: notes as users record them, chords, drums and noise, all drawn by a seed."""
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import soundfile
@@ -25,7 +19,6 @@ from training.recording.numbering import number_note
 Array = NDArray[np.float64]
 Sound = tuple[Array, int]  # samples (frames,) or (frames, channels), and their rate
 Random = np.random.Generator
-Recordings = Mapping[str, Sound]
 
 F0_RANGE_HZ = (30.0, 1_000.0)
 HIGHEST_HZ = 9_000.0
@@ -35,45 +28,6 @@ RATES_HZ = (22_050, 44_100, 48_000, 88_200, 96_000)
 NOISE_DB = (-60.0, -50.0, -40.0)
 CHORD_DB = (0.0, -5.0, -10.0)
 OCTAVE_CENTS = 60.0  # two notes so near to octaves are one series of partials
-NO_STRING = "not_a_string"  # of a file's name: a slap, a thump, a strum
-DRUMS = (("concert_toms", 41), ("concert_toms", 47), ("conga", 55), ("frame_drum", 55), ("tuned_toms", 50))
-
-
-@dataclass(frozen=True)
-class Case:
-    """A sound to be judged; `is_note`: it is one note of a string, and to be kept."""
-
-    base: str  # a recording's name, or a number
-    kind: str
-    is_note: bool
-    sound: Sound
-
-
-def is_judged(name: str) -> bool:
-    """The half of a recording: thresholds are set on the other."""
-    return sum(name.encode()) % 2 == 1
-
-
-def cases(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
-    """The cases of recordings, each in each change, and of so many synthetic notes; and as many that are no notes."""
-    recordings = {
-        name: (samples if samples.ndim == 1 else samples.mean(1), rate_hz)
-        for name, (samples, rate_hz) in recordings.items()
-    }
-    for name, sound in recordings.items():
-        if is_note := NO_STRING not in name:
-            yield Case(name, "as recorded", True, sound)
-        for number, (kind, change) in enumerate(CHANGES.items()):
-            random = np.random.default_rng([seed, number, sum(name.encode())])
-            yield Case(name, kind if is_note else f"no string, {kind}", is_note, change(random, *sound))
-    for number in range(count):
-        base = f"synthetic {number}"
-        sound = random_pluck(seed + number)
-        yield Case(base, "synthetic", True, sound)
-        random = np.random.default_rng([seed, number])
-        kind = list(CHANGES)[number % len(CHANGES)]
-        yield Case(base, f"synthetic, {kind}", True, CHANGES[kind](random, *sound))
-    yield from _no_notes(recordings, count, seed)
 
 
 def random_pluck(seed: int) -> Sound:
@@ -109,7 +63,7 @@ def slightly_clipped(random: Random, samples: Array, rate_hz: int) -> Sound:
 
 def resampled(random: Random, samples: Array, rate_hz: int) -> Sound:
     target = int(random.choice([rate for rate in RATES_HZ if rate != rate_hz]))
-    return _at_rate(samples, rate_hz, target), target
+    return at_rate(samples, rate_hz, target), target
 
 
 def noisier(random: Random, samples: Array, rate_hz: int) -> Sound:
@@ -160,7 +114,7 @@ def in_a_room(random: Random, samples: Array, rate_hz: int) -> Sound:
 def coded(container: str, subtype: str, random: Random, samples: Array, rate_hz: int) -> Sound:
     """Through a lossy coder and back."""
     if (subtype == "OPUS" and rate_hz != 48_000) or (container == "MP3" and rate_hz > 48_000):
-        samples, rate_hz = _at_rate(samples, rate_hz, 48_000), 48_000
+        samples, rate_hz = at_rate(samples, rate_hz, 48_000), 48_000
     file = io.BytesIO()
     level = float(random.uniform(0.2, 0.9))
     samples = level * samples / np.abs(samples).max()
@@ -210,34 +164,6 @@ CHANGES: dict[str, Callable[[Random, Array, int], Sound]] = {
 # No single note of a string
 
 
-def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
-    notes = [(name, sound) for name, sound in recordings.items() if NO_STRING not in name]
-    random = np.random.default_rng([seed, 2])
-    for number in range(count):
-        base = f"none {number}"
-        real = number % 2 == 0 and len(notes) > 3
-        name, first = notes[int(random.integers(len(notes)))] if real else (base, random_pluck(seed + 5_000 + number))
-        second = notes[int(random.integers(len(notes)))][1] if real else random_pluck(seed + 7_000 + number)
-        made = number // 2 % 8
-        if made < 3:
-            for level_db in CHORD_DB if made == 0 else (float(random.choice(CHORD_DB)),):
-                if (sound := chord(first, second, level_db)) is not None:
-                    yield Case(name, f"chord, {level_db:.0f} dB", False, sound)
-        elif made == 3:
-            yield Case(name, "two onsets", False, two_onsets(random, first, second))
-        elif made == 4:
-            yield Case(name, "reversed", False, (first[0][::-1].copy(), first[1]))
-        elif made == 5:
-            yield Case(name, "loop", False, loop(random, *first))
-        elif made == 6:
-            gain = 10 ** (random.uniform(8, 20) / 20) / float(np.abs(first[0]).max())
-            yield Case(name, "clipped", False, (np.clip(gain * first[0], -1, 1), first[1]))
-        else:
-            yield Case(base, "noise", False, noise(random, number))
-        kind, others = list(OTHERS.items())[number % len(OTHERS)]
-        yield Case(base, kind, False, others(random, number))
-
-
 def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
     """Two notes at once, the second at a level of the first; None where they are octaves, or one pitch."""
     one, other = (number_note(note_of(*each)) for each in (first, second))
@@ -247,34 +173,12 @@ def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
     if abs((cents + 600) % 1200 - 600) < OCTAVE_CENTS:
         return None
     (a, rate_hz), (b, other_hz) = first, second
-    b = _at_rate(b, other_hz, rate_hz)
+    b = at_rate(b, other_hz, rate_hz)
     a, b = (each[onset_of(each, rate_hz) :] for each in (a, b))
     frames = min(len(a), len(b))
     a, b = a[:frames], b[:frames]
     b = b * 10 ** (level_db / 20) * math.sqrt(float(a @ a) / float(b @ b))
     return np.concatenate([np.zeros(rate_hz // 10), a + b]), rate_hz
-
-
-def two_onsets(random: Random, first: Sound, second: Sound) -> Sound:
-    """A second note, or the same again, 0.15 to 0.8 s after the first."""
-    samples, rate_hz = first
-    other = _at_rate(*second, rate_hz) if random.random() < 0.6 else samples
-    other = other[onset_of(other, rate_hz) :]
-    peak = float(np.abs(samples).max())
-    begin = onset_of(samples, rate_hz) + round(random.uniform(0.15, 0.8) * rate_hz)
-    both = np.zeros(max(len(samples), begin + len(other)))
-    both[: len(samples)] = samples
-    both[begin : begin + len(other)] += other / np.abs(other).max() * peak
-    return both, rate_hz
-
-
-def loop(random: Random, samples: Array, rate_hz: int) -> Sound:
-    """A sampler's: a stretch of 0.1 to 0.8 s again and again, with silence behind it or not."""
-    begin = onset_of(samples, rate_hz) + round(random.uniform(0.1, 0.3) * rate_hz)
-    part = samples[begin : begin + round(random.uniform(0.1, 0.6) * rate_hz)]
-    times = math.ceil(2 * rate_hz / len(part)) + 1
-    behind = np.zeros(rate_hz // 2 if random.random() < 0.3 else 0)
-    return np.concatenate([samples[:begin], *[part] * times, behind]), rate_hz
 
 
 def noise(random: Random, number: int) -> Sound:
@@ -285,31 +189,6 @@ def noise(random: Random, number: int) -> Sound:
     if number % 3:
         sound = sound * np.exp(-random.uniform(1, 12) * t)
     return np.concatenate([np.zeros(2_000), 0.1 * sound]), rate_hz
-
-
-def sweep(random: Random, number: int = 0) -> Sound:
-    rate_hz = 44_100
-    t = np.arange(2 * rate_hz) / rate_hz
-    low, high = np.exp(random.uniform(math.log(50), math.log(8_000), 2))
-    tone = signal.chirp(t, low, t[-1], high * 1.5, "logarithmic") * np.exp(-random.uniform(0, 2) * t)
-    return np.concatenate([np.zeros(2_000), 0.3 * tone]), rate_hz
-
-
-def speech(random: Random, number: int = 0) -> Sound:
-    """Syllables: pulses of a gliding pitch, or breath, through formants."""
-    rate_hz = 22_050
-    frames = round(random.uniform(1.2, 2.5) * rate_hz)
-    t = np.arange(frames) / rate_hz
-    pitch = random.uniform(90, 220) * 2 ** (0.3 * np.sin(2 * np.pi * random.uniform(0.4, 1.5) * t))
-    pulses = np.diff(np.floor(np.cumsum(pitch) / rate_hz), prepend=0.0) + 0.05 * random.standard_normal(frames)
-    edges = np.linspace(0, frames, int(random.integers(3, 8)), dtype=int)
-    sound = np.zeros(frames)
-    for first, last in pairwise(edges):
-        part = pulses[first:last] * np.hanning(last - first)
-        for hz in (random.uniform(300, 800), random.uniform(900, 2_200), random.uniform(2_300, 3_200)):
-            b, a = signal.iirpeak(hz, hz / 90, fs=rate_hz)
-            sound[first:last] += signal.lfilter(b, a, part)
-    return 0.3 * sound / np.abs(sound).max() + 1e-4 * random.standard_normal(frames), rate_hz
 
 
 def membrane(random: Random, number: int = 0) -> Sound:
@@ -326,33 +205,7 @@ def membrane(random: Random, number: int = 0) -> Sound:
     return np.concatenate([np.zeros(2_000), 0.2 * sound]) + 1e-5 * random.standard_normal(len(t) + 2_000), rate_hz
 
 
-def drum(random: Random, number: int) -> Sound:
-    """A blow on one of the project's drums."""
-    from app.instruments.library import SHIPPED, read_instrument
-    from app.player.offline import render_note
-    from engine.presets import SHIPPED as PRESETS
-    from engine.presets import load_preset
-
-    name, key = DRUMS[number // 5 % len(DRUMS)]
-    instrument = read_instrument(Path(SHIPPED) / f"{name}.json")
-    preset = load_preset(PRESETS / "studio_any_string.safetensors")
-    low, high = instrument.range
-    key = min(max(key + int(random.integers(-3, 4)), low), high)
-    sound = render_note(instrument, preset, key, int(random.integers(60, 127)), 1.5, 1.5, 44_100)[:, 0]
-    sound = np.concatenate([np.zeros(2_000), sound.astype(float)])
-    return sound + 1e-6 * random.standard_normal(len(sound)), 44_100
-
-
-OTHERS: dict[str, Callable[[Random, int], Sound]] = {
-    "noise": noise,
-    "sweep": sweep,
-    "speech": speech,
-    "membrane": membrane,
-    "drum": drum,
-}
-
-
-def _at_rate(samples: Array, rate_hz: int, target_hz: int) -> Array:
+def at_rate(samples: Array, rate_hz: int, target_hz: int) -> Array:
     shared = math.gcd(rate_hz, target_hz)
     return samples if rate_hz == target_hz else signal.resample_poly(samples, target_hz // shared, rate_hz // shared)
 
