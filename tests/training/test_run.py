@@ -62,7 +62,7 @@ def run_row(made: TrainingConfiguration, folder: Path, name: str = CELL.name, pr
     return row
 
 
-def test_a_row_reports_what_its_preset_measures(tmp_path):
+def test_a_row_reports_what_its_preset_measures_and_is_read_again(tmp_path, monkeypatch):
     made = configuration()
     row = run_row(made, tmp_path)
     preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")
@@ -87,9 +87,7 @@ def test_a_row_reports_what_its_preset_measures(tmp_path):
     assert (row.initialisation, row.structured, row.horizon) == ("physics", True, 420)
     assert row.parameters == count_parameters(preset.model) and preset.info.horizon_steps == 420
 
-
-def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path, monkeypatch):
-    row = run_row(configuration(), tmp_path)
+    # a run that was done is read, and another configuration is not its
     with monkeypatch.context() as instrumented:
         instrumented.setattr("training.run.fit_seeds", lambda *_, **__: pytest.fail("trained again"))
         assert run_row(configuration(), tmp_path) == row

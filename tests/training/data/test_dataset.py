@@ -19,11 +19,13 @@ from training.data.dataset import Dataset, dataset_folder, draw_initial, load_da
 TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 
 
-def test_amplitudes_are_the_solvers(small_dataset):
+def test_amplitudes_are_the_solvers_and_a_stride_keeps_some_of_their_frames(small_dataset, tmp_path):
     c = small_dataset.configuration
     solver = SplittingSolver(c.resonator, c.rate_hz)
     state = ModalState.at_rest(torch.from_numpy(draw_initial(c)))
     assert torch.equal(small_dataset.amplitudes, solver.solve(state, c.steps).float())
+    some = load_dataset(replace(c, stride=3), tmp_path)
+    assert torch.equal(some.amplitudes, small_dataset.amplitudes[:, ::3])
 
 
 def test_a_draw_that_would_break_the_string_is_softened():
@@ -42,16 +44,13 @@ def test_splits_are_in_order_and_whole():
         split_rows(10, "half")
 
 
-def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path):
+def test_the_cache_is_used_again_and_never_shared_by_other_data_or_another_version(tmp_path, monkeypatch):
     load_dataset(TINY, tmp_path)
     stamp = (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns
     load_dataset(TINY, tmp_path, lambda share: pytest.fail("made again"))
     assert (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns == stamp
     assert dataset_folder(replace(TINY, seed=1), tmp_path) != dataset_folder(TINY, tmp_path)
     assert not list((tmp_path / "datasets").glob("*.unfinished"))
-
-
-def test_another_version_of_the_data_is_other_data(tmp_path, monkeypatch):
     named = lambda: {dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest}  # noqa: E731
     before = named()
     monkeypatch.setattr("training.data.dataset.DATA_VERSION", 99)
@@ -89,12 +88,6 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
     assert [path.suffix for path in (tmp_path / "datasets").iterdir()] == [".lock"]
-
-
-def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path):
-    every = load_dataset(replace(TINY, steps=450), tmp_path)
-    some = load_dataset(replace(TINY, steps=450, stride=3), tmp_path)
-    assert torch.equal(some.amplitudes, every.amplitudes[:, ::3])
 
 
 DAMAGES = {  # of a file's bytes
@@ -165,17 +158,13 @@ def modal(dataset: Dataset, displacement: torch.Tensor) -> torch.Tensor:
     return displacement.double() @ torch.from_numpy(analysis_matrix(c.grid_points, c.modes)) * dataset.scale_m
 
 
-def test_all_frames_of_the_horizon_are_the_data(small_dataset):
+def test_all_frames_of_the_horizon_are_the_data_and_random_ones_cover_it_in_order(small_dataset):
     data = TrainingData(small_dataset, CPU)
     batch = data.draw(PLAIN, ROWS, 120, 0)
     assert data.count == 16
     assert torch.equal(batch.frames, torch.arange(1, 121))
     expected = small_dataset.amplitudes[:16, 1:121].double()
     torch.testing.assert_close(modal(small_dataset, batch.target), expected, rtol=1e-5, atol=1e-9)
-
-
-def test_random_frames_cover_the_horizon_in_order(small_dataset):
-    data = TrainingData(small_dataset, CPU)
     recipe = Recipe(epochs=1, steps_per_batch=20)
     first, second = (data.draw(recipe, ROWS, 400, iteration).frames for iteration in (0, 1))
     assert not torch.equal(first, second)

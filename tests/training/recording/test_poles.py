@@ -36,7 +36,7 @@ def fit() -> Fit:
 
 
 @pytest.mark.parametrize(("pole", "most"), [(GLIDING, 1e-10), (FREE, 2e-2)])
-def test_the_spectrum_of_a_pole_is_its_sounds(fit, pole, most):
+def test_the_spectrum_of_a_pole_is_its_sounds_and_its_columns_are_the_slopes(fit, pole, most):
     """In closed form; of poles that do not glide by a sum over some samples."""
     bins = slice(1, fit.highest)
     index = np.arange(bins.start, bins.stop)
@@ -47,10 +47,6 @@ def test_the_spectrum_of_a_pole_is_its_sounds(fit, pole, most):
         np.testing.assert_allclose(found[0], whole[index], atol=most * scale)
         np.testing.assert_allclose(found[1], whole[-index].conj(), atol=most * scale)
 
-
-@pytest.mark.parametrize("pole", [GLIDING, FREE])
-def test_the_columns_of_a_pole_are_the_slopes_of_its_spectrum(fit, pole):
-    bins = slice(1, fit.highest)
     linear, bent = fit.columns([pole], bins)
     present = fit.part([pole], bins)
     np.testing.assert_allclose(linear @ [pole.a.real, pole.a.imag], present, atol=1e-9)
@@ -114,7 +110,7 @@ def glide_of(seed: int, pitch: float = 0.0) -> Glide:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed):
+def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_phases_of_partials_show_the_glide(seed):
     one = glide_of(seed, pitch=2e-3)
     np.testing.assert_allclose(one.times(one.tau(TIMES)), TIMES, atol=1e-12)
     slope = (one.tau(TIMES + 1e-6) - one.tau(TIMES - 1e-6)) / 2e-6
@@ -124,21 +120,14 @@ def test_warped_time_runs_as_fast_as_the_pitch_is_high_and_back_again(seed):
     )
     assert not Glide.none().cents(TIMES).any()
 
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_gliding_tone_does_not_glide_in_warped_time(seed):
-    one, rate_hz = glide_of(seed), 8_000
-    t = np.arange(rate_hz) / rate_hz
-    found, times = warped(np.sin(2 * math.pi * 440 * one.tau(t)), rate_hz, one)
-    still = np.sin(2 * math.pi * 440 * np.arange(len(found)) / rate_hz)
+    one = glide_of(seed)  # a tone that glides so does not in warped time
+    t = np.arange(RATE_HZ) / RATE_HZ
+    found, times = warped(np.sin(2 * math.pi * 440 * one.tau(t)), RATE_HZ, one)
+    still = np.sin(2 * math.pi * 440 * np.arange(len(found)) / RATE_HZ)
     np.testing.assert_allclose(found[:-100], still[:-100], atol=1e-5)
-    np.testing.assert_allclose(one.tau(times[:-100]), np.arange(len(found) - 100) / rate_hz, atol=1e-9)
+    np.testing.assert_allclose(one.tau(times[:-100]), np.arange(len(found) - 100) / RATE_HZ, atol=1e-9)
 
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_phases_of_partials_show_the_glide_that_they_share(seed):
-    """Up to what is constant: each partial is off its place in the series by some cents."""
-    one, random = glide_of(seed), np.random.default_rng([seed, 1])
+    random = np.random.default_rng([seed, 1])  # phases show it: each partial is off its place by some cents
     t, bands = np.arange(150) / 120, []
     for k in range(1, 9):
         off_hz, hz = random.uniform(-0.2, 0.2), 100.0 * k
