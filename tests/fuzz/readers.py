@@ -46,6 +46,7 @@ from engine.sources import ModelSource, Runaway, TruthSource
 from engine.values.ear import Ear
 from engine.voices import model_program, render_voice, truth_program
 from tests.fuzz.mutations import damaged_bytes, damaged_preset, damaged_text
+from tests.training.sweeping.test_plan import PLAN
 from training.cell import load
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
@@ -141,18 +142,10 @@ def recipe_text(preset: Path) -> str:
 
 
 def played_text() -> str:
-    return InstrumentSound(
-        program="Learned Strings",
-        version="0.2.0",
-        instrument="Classical guitar",
-        preset="studio_any_string",
-        preset_sha256="0" * 64,
-        source="truth",
-        rate_hz=48_000,
-        bits="24",
-        midi="take.mid",
-        recorded="2026-11-24T11:00:00+01:00",
-    ).model_dump_json()
+    facts = {"program": "Learned Strings", "version": "0.2.0", "instrument": "Classical guitar", "source": "truth"}
+    facts |= {"preset": "studio_any_string", "preset_sha256": "0" * 64, "rate_hz": 48_000, "bits": "24"}
+    played = InstrumentSound(**facts, midi="take.mid", recorded="2026-11-24T11:00:00+01:00")
+    return played.model_dump_json()
 
 
 def damaged_wav(whole: bytes, draw: random.Random) -> bytes:
@@ -186,9 +179,8 @@ def row_file(folder: Path) -> bytes:
 
 
 def checkpoint(folder: Path) -> bytes:
-    tensor = torch.zeros(3)
-    facts = {"configuration": {"a": [1, 2]}, "step": 3, "loss_total": 0.5}
-    Checkpoint({"w": tensor}, {"w": tensor}, {}, {"0": {"exp_avg": tensor}}, facts).save(folder / "whole")
+    facts, tensors = {"configuration": {"a": [1, 2]}, "step": 3, "loss_total": 0.5}, {"w": torch.zeros(3)}
+    Checkpoint(tensors, tensors, {}, {"0": {"exp_avg": torch.zeros(3)}}, facts).save(folder / "whole")
     return (folder / "whole").read_bytes()
 
 
@@ -237,17 +229,6 @@ SONG = midi_bytes(
 INSTRUMENT = min(INSTRUMENTS.glob("*.json"))
 SCALE = b"! a.scl\n!\nfifths and thirds\n 5\n!\n 9/8\n 386.3\n 3/2\n 5/3\n 2/1\n"
 KEYMAP = b"7\n0\n127\n60\n69\n440.0\n12\n0\n2\n4\n5\n7\n9\n11\n"
-PLAN = b"""description = "a plan"
-[[block]]
-models = ["koopman", "dmd"]
-strings = ["linear"]
-initials = ["gaussian"]
-rates_hz = [4000]
-horizons = [400]
-seeds = [0, 1]
-[data]
-count = 20
-"""
 CONFIGURATION = b"""title = "a run"
 model = "koopman_var"
 [data]
@@ -294,7 +275,7 @@ TARGETS = (
     *map(preset_target, PRESETS),
     *map(recipe_target, PRESETS[:2]),
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
-    Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
+    Target("plan.toml", lambda p: PLAN.encode(), lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
     Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),
     Target("string.toml", lambda p: STRING, read_string, (SchemaError,), toml_or_bytes),
     Target("rows.csv", row_file, read_results, (SchemaError,)),
