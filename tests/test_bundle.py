@@ -1,5 +1,7 @@
-"""The bundle of `python3 run.py bundle`: it starts without Python, and sounds as the source does."""
+"""Away from its sources, a bundle of `python3 run.py bundle` and an installed wheel have all that they need."""
 
+import json
+import os
 import shutil
 import subprocess
 import sys
@@ -12,7 +14,7 @@ import soundfile
 from app.commands import cli
 
 ROOT = Path(__file__).parents[1]
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the bundle was tried on Linux alone")
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="the bundle was tried on Linux alone")
 NOTE = ("--position", "0.3", "--amplitude-mm", "2", "--seconds", "0.5", "--bits", "32f")
 WINDOW = """
 import sys
@@ -25,6 +27,21 @@ def close_when_playable(controller):
     timer.start()
 
 sys.exit(run(alive=close_when_playable))
+"""
+LISTING = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from app.commands import cli
+assert cli.__file__.startswith(sys.path[0])
+for name in ("presets", "instruments"):
+    assert cli.main([name, "--json"]) == 0
+    print("\x1e")
+from app.views.theme import SIGNS
+from training.cell import load
+from training.data.dataset import default_cache
+from training.run import default_runs
+assert not any(folder.is_relative_to(sys.path[0]) for folder in (default_runs(), default_cache()))
+print(json.dumps([load("studio_nylon_b3").model, load("nylon_linear_noise_4k_lru").model, SIGNS.is_dir()]))
 """
 
 
@@ -40,14 +57,16 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "learned-strings"
 
 
-def run(program: Path, *words: str, folder: Path, status: int = 0) -> str:
-    """The errors of the bundle's program in an environment without anything of Python's."""
-    environment = {"PATH": "", "HOME": str(folder), "QT_QPA_PLATFORM": "offscreen", "LANG": "C.UTF-8"}
-    done = subprocess.run([program, *words], cwd=folder, env=environment, capture_output=True, text=True)
+def run(*words: object, folder: Path, status: int = 0, environment: dict[str, str] | None = None) -> str:
+    """The output of a program, its errors where it fails; in an environment without anything of Python's."""
+    bare = {"PATH": "", "HOME": str(folder), "QT_QPA_PLATFORM": "offscreen", "LANG": "C.UTF-8"}
+    command = [str(word) for word in words]
+    done = subprocess.run(command, cwd=folder, env=environment or bare, capture_output=True, text=True)
     assert done.returncode == status, done.stderr
-    return done.stderr
+    return done.stderr if status else done.stdout
 
 
+@LINUX
 def test_its_command_line_renders_the_same_note(program, tmp_path):
     run(program, "render", "studio_any_string", "bundle.wav", *NOTE, folder=tmp_path)
     assert cli.main(["render", "studio_any_string", str(tmp_path / "source.wav"), *NOTE]) == 0
@@ -55,6 +74,7 @@ def test_its_command_line_renders_the_same_note(program, tmp_path):
     np.testing.assert_allclose(bundle, source, atol=2e-5)  # other instructions of the processor round differently
 
 
+@LINUX
 def test_it_finds_its_compiled_kernels_where_it_was_moved(program, tmp_path):
     kernels = program.parent / "_internal/engine/kernels/__pycache__"
     before = {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")}
@@ -63,7 +83,31 @@ def test_it_finds_its_compiled_kernels_where_it_was_moved(program, tmp_path):
     assert {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")} == before
 
 
+@LINUX
 def test_its_window_opens_and_it_says_that_it_builds_no_plugins(program, tmp_path):
     run(program, "-P", "-c", WINDOW, folder=tmp_path)
     assert list(tmp_path.rglob("settings.json"))
     assert "start the program with Python" in run(program, "plugin", "concert_harp", folder=tmp_path, status=1)
+
+
+def test_a_wheel_has_presets_recipes_and_pictures(tmp_path):
+    source, installed, elsewhere = (tmp_path / name for name in ("source", "installed", "elsewhere"))
+    for name in ("engine", "training", "app", "presets"):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    elsewhere.mkdir()
+    folders = ("LEARNED_STRINGS_RUNS", "LEARNED_STRINGS_CACHE")
+    own = {name: value for name, value in os.environ.items() if name not in folders}
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q", "install", "--no-build-isolation")
+    run(*pip, "--no-deps", "--no-compile", "--target", installed, source, folder=elsewhere, environment=own)
+    # the installed package alone: without the development install's paths
+    listed = run(sys.executable, "-W", "ignore", "-c", LISTING, installed, folder=elsewhere, environment=own)
+    presets, instruments, others = map(json.loads, listed.split("\x1e"))
+    shipped = sorted(path.stem for path in (ROOT / "presets").glob("*.safetensors"))
+    assert sorted(each["name"] for each in presets) == shipped
+    assert {each["name"] for each in instruments} == {
+        path.stem for path in (ROOT / "presets/instruments").glob("*.json")
+    }
+    assert others == ["koopman_integrated", "lru", True]
+    assert list(elsewhere.iterdir()) == []

@@ -27,11 +27,12 @@ from training.fitting.losses import backward, training_loss
 from training.fitting.soap import EVERY, SOAP
 
 RECIPE = Recipe(epochs=1, consistency_weight=0.3)
+PHYSICS = Physics(resonator_of(StringParameters(), 6), 4_000)
 
 
 def model_and_batch() -> tuple[KoopmanVar, Batch]:
     model = KoopmanVar(KoopmanVarConfiguration(101, 6, (5,))).double()
-    model.initialise("paper", Physics(resonator_of(StringParameters(), 6), 4_000), torch.Generator().manual_seed(1))
+    model.initialise("paper", PHYSICS, torch.Generator().manual_seed(1))
     draw = torch.Generator().manual_seed(2)
     frames = torch.tensor([1, 3, 4])
     target = torch.randn(2, 3, 101, generator=draw, dtype=torch.float64)
@@ -73,7 +74,7 @@ def test_the_loss_is_the_sum_of_its_terms(terms):
 def test_frames_that_were_drawn_twice_are_compared_with_themselves():
     """As many frames as the last one's number need not be all of them."""
     model = build_model("lru", {"layers": 0, "state_size": 4})
-    model.initialise("paper", Physics(resonator_of(StringParameters(), 6), 4_000), torch.Generator().manual_seed(1))
+    model.initialise("paper", PHYSICS, torch.Generator().manual_seed(1))
     model.eval()
     initial, frames = torch.randn(2, 101, generator=torch.Generator().manual_seed(2)), torch.tensor([1, 3, 3, 4])
     whole = model(initial, 4).detach()
@@ -86,8 +87,7 @@ def test_frames_that_were_drawn_twice_are_compared_with_themselves():
 @pytest.mark.parametrize("name", ["koopman", "koopman_var", "koopman_integrated"])
 def test_parts_of_a_batch_have_its_gradients_and_error(name, terms, monkeypatch):
     model = build_model(name, {"grid_points": 101}).double()
-    physics = Physics(resonator_of(StringParameters(), 6), 4_000)
-    model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(1))
+    model.initialise(model.own_initialisation(), PHYSICS, torch.Generator().manual_seed(1))
     target = torch.randn(7, 4, 101, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
     batch = Batch(target[:, 0], torch.tensor([1, 3, 4]), target[:, 1:])
     recipe = replace(RECIPE, koopman_terms=terms)
