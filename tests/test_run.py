@@ -1,7 +1,6 @@
 """run.py, on a copy of it beside a small .venv; no pip, no apt-get and no network."""
 
 import ast
-import collections
 import contextlib
 import importlib.util
 import shutil
@@ -44,7 +43,7 @@ def run(tmp_path, monkeypatch):
     (package / "RECORD").write_text("numpy/__init__.py,,5\nnumpy/x.pyc,,9\nRECORD,,\n")  # as pip writes it
     monkeypatch.setattr(run, "pip", lambda *arguments: None)
     monkeypatch.setattr(run, "sound", lambda: True)
-    run.torch_source_here = run.torch_source  # for the tests that ask for it
+    run.torch_source_here, run.missing_here = run.torch_source, run.missing  # for the tests that ask for them
     monkeypatch.setattr(run, "torch_source", lambda: [])
     monkeypatch.setattr(run, "missing", lambda table: [])
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: pytest.fail(f"started {command}"))
@@ -281,15 +280,12 @@ def test_signs_of_system_packages_are_found_where_they_are(run):
 def machine(run, monkeypatch):
     """Return run.py on a machine that lacks PortAudio and Xvfb, with a record of the commands it runs."""
     lacking, commands = {"libportaudio.so.2", "Xvfb"}, []
-    monkeypatch.undo()
-    monkeypatch.setattr(run, "torch_source", lambda: [])
+    monkeypatch.setattr(run, "missing", run.missing_here)
     monkeypatch.setattr(run, "present", lambda sign: sign not in lacking)
-    monkeypatch.setattr(run, "pip", lambda *arguments: None)
-    monkeypatch.setattr(run, "sound", lambda: True)
     monkeypatch.setattr(run, "start", lambda arguments: 0)
     monkeypatch.setattr(run.shutil, "which", {"apt-get": "/usr/bin/apt-get"}.get)
     monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: commands.append(command))
-    return collections.namedtuple("Machine", "run lacking commands")(run, lacking, commands)
+    return SimpleNamespace(run=run, lacking=lacking, commands=commands)
 
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="pip brings everything elsewhere")

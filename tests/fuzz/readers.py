@@ -54,9 +54,7 @@ from training.results import Row, add_rows, read_results
 from training.sweeping.plan import load_plan
 
 FRAMES = 32
-ONE_STRING = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
-MANY_STRINGS = SHIPPED / "studio_any_string.safetensors"
-DMD = SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors"
+ONE_STRING, DMD = "nylon_nonlinear_gaussian_4k_koopman_integrated", "nylon_linear_gaussian_16k_dmd"
 
 
 def in_one_line(error: Exception, path: Path) -> None:
@@ -258,22 +256,18 @@ def recipe(preset: Path) -> Callable[[Path], None]:
     return read
 
 
-PRESETS = (ONE_STRING, MANY_STRINGS, DMD)
+PRESETS = [SHIPPED / f"{name}.safetensors" for name in (ONE_STRING, "studio_any_string", DMD)]
+PRESET = play, (PresetError,), damaged_preset
 IMPULSES = {"float.wav": ("WAV", "FLOAT"), "pcm.wav": ("WAV", "PCM_16"), "body.flac": ("FLAC", "PCM_24")}
 STRING = (STRINGS / "steel_e4.toml").read_bytes()
 
 
-def preset_target(path: Path) -> Target:
-    return Target(f"{path.stem}.safetensors", lambda _: path.read_bytes(), play, (PresetError,), damaged_preset)
-
-
-def recipe_target(path: Path) -> Target:
-    return Target(f"{path.stem}.wav", lambda p: wav(p, recipe_text(path)), recipe(path), (RecipeError,), damaged_wav)
-
-
 TARGETS = (
-    *map(preset_target, PRESETS),
-    *map(recipe_target, PRESETS[:2]),
+    *(Target(f"{of.stem}.safetensors", lambda p, of=of: of.read_bytes(), *PRESET) for of in PRESETS),
+    *(
+        Target(f"{of.stem}.wav", lambda p, of=of: wav(p, recipe_text(of)), recipe(of), (RecipeError,), damaged_wav)
+        for of in PRESETS[:2]
+    ),
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN.encode(), lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
     Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),

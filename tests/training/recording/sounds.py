@@ -20,10 +20,6 @@ Array = NDArray[np.float64]
 Sound = tuple[Array, int]  # samples (frames,) or (frames, channels), and their rate
 Random = np.random.Generator
 
-F0_RANGE_HZ = (30.0, 1_000.0)
-HIGHEST_HZ = 9_000.0
-DAMPING = (0.4, 6.0)
-BODY_DB = (-40.0, -12.0)
 RATES_HZ = (22_050, 44_100, 48_000, 88_200, 96_000)
 NOISE_DB = (-60.0, -50.0, -40.0)
 CHORD_DB = (0.0, -5.0, -10.0)
@@ -38,10 +34,10 @@ def random_pluck(seed: int) -> Sound:
         seconds=float(random.uniform(1.0, 4.0)),
         snr_db=float(random.uniform(35, 65)),
         rise_cents=float(random.choice([0.5, 5.0, 20.0, 40.0])),
-        f0_range_hz=F0_RANGE_HZ,
-        highest_hz=HIGHEST_HZ,
-        damping=DAMPING,
-        body_db=BODY_DB,
+        f0_range_hz=(30.0, 1_000.0),
+        highest_hz=9_000.0,
+        damping=(0.4, 6.0),
+        body_db=(-40.0, -12.0),
     )
     return made.samples, made.rate_hz
 
@@ -69,8 +65,7 @@ def resampled(random: Random, samples: Array, rate_hz: int) -> Sound:
 def noisier(random: Random, samples: Array, rate_hz: int) -> Sound:
     """White or brown noise, below the peak."""
     level = 10 ** (float(random.choice(NOISE_DB)) / 20) * float(np.abs(samples).max())
-    exponent = float(random.choice([0.0, 1.0]))
-    return samples + level * _noise(random, len(samples), exponent), rate_hz
+    return samples + level * _noise(random, len(samples), float(random.choice([0.0, 1.0]))), rate_hz
 
 
 def cut_before(random: Random, samples: Array, rate_hz: int) -> Sound:

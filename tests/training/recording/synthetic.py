@@ -24,9 +24,7 @@ from training.recording.refine import Pole
 Array = NDArray[np.float64]
 
 RATE_HZ = 44_100
-HIGHEST_HZ = 4_000.0
 LEAD_S = 0.1
-SUBSTEPS = 4
 
 
 @dataclass(frozen=True)
@@ -56,8 +54,7 @@ def synthetic_note(
     snr_db: float = 50.0,
     rise_cents: float = 15.0,
     f0_range_hz: tuple[float, float] = (60.0, 350.0),
-    highest_hz: float = HIGHEST_HZ,
-    fretted: float = 0.0,
+    highest_hz: float = 4_000.0,
     damping: tuple[float, float] = (0.6, 2.0),
     body_db: tuple[float, float] = (-36.0, -20.0),
 ) -> SyntheticNote:
@@ -66,7 +63,6 @@ def synthetic_note(
     Args:
         damping: range of the first polarisation's loss at low frequencies, in 1/s.
         body_db: range of the body's modes, below the string's peak.
-        fretted: semitones of the string's shortening; all else of a seed stays.
     """
     random = np.random.default_rng(seed)
     low, high = map(math.log, f0_range_hz)
@@ -78,8 +74,7 @@ def synthetic_note(
     d1 = 2 * mass * random.uniform(*damping)
     d3 = 2 * mass * random.uniform(1.0, 4.0) / (math.pi * 1_000 / (f0 * length)) ** 2
     second = stiffness * tension * length**2 / (math.pi**2 * modulus)
-    ratio = 2 ** (fretted / 12)
-    string = StringParameters(length / ratio, area, second, mass / area, modulus, d1, d3, tension)
+    string = StringParameters(length, area, second, mass / area, modulus, d1, d3, tension)
     law = resonator_of(string, count, grid_points=count + 2)
     split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
     slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
@@ -95,7 +90,7 @@ def synthetic_note(
     q = np.stack([share * shape, (1 - share) * shape], 1).ravel()
     wanted = 4 * (2 ** (rise_cents * random.uniform(0, 1) / 1200) - 1)
     q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(q)))
-    solver = SplittingSolver(resonator, RATE_HZ, substeps=SUBSTEPS, silence=1e-7)
+    solver = SplittingSolver(resonator, RATE_HZ, substeps=4, silence=1e-7)
     modes = solver.solve(ModalState.at_rest(q[None]), round(seconds * RATE_HZ))[0]
     heard = np.repeat(k * np.sin(math.pi * k * listened), 2)
     sound = modes @ heard
@@ -114,7 +109,7 @@ def synthetic_note(
     of_pairs = a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2)
     figures = np.stack(figures_of(*of_pairs), 1).tolist()
     partials = tuple(TruePartial(number, *each) for number, each in enumerate(figures, 1))
-    return SyntheticNote(sound, RATE_HZ, f0 * ratio, stiffness * ratio**2, partials)
+    return SyntheticNote(sound, RATE_HZ, f0, stiffness, partials)
 
 
 def modelled_note(
