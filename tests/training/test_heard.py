@@ -119,7 +119,7 @@ def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path)
         assert read_heard(tmp_path) == ({each.sha256: each for each in known}, [])
     names, values = zip(*(row.split(",", 1) for row in (tmp_path / NAME).read_text().splitlines()), strict=True)
     assert names == ("name", "good", "other") and "-0.0" not in values[1]
-    # of before hums were measured
+    # from a time without hums
     (tmp_path / NAME).unlink()
     without = "\n".join(row.rpartition(",")[0] for row in (HEAD, line()))
     (tmp_path / NAME).write_text(f"{without}\n", encoding="utf-8")

@@ -33,7 +33,7 @@ def folder_of(task: Task) -> Path:
 def test_a_task_ends_with_its_row_and_reports_its_progress(task, monkeypatch):
     seen, add = [], TrainingLog.add
     followed = lambda *of: (add(*of), seen.append(read_progress(folder_of(task))))  # noqa: E731
-    monkeypatch.setattr(TrainingLog, "add", followed)  # what is seen is of the epoch before
+    monkeypatch.setattr(TrainingLog, "add", followed)  # each is of the epoch before
     outcome = perform(write(task))
     (row,) = (read(Row, row, "row") for row in outcome["rows"])
     assert (row.status, row.digest, row.threads) == ("done", task.runs[0].digest, 1)
