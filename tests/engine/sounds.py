@@ -1,8 +1,9 @@
-"""Sounds, voices and errors that tests of kernels and voices share."""
+"""Shipped presets, voices, what they sound like, and errors, for tests of kernels, voices and effects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +12,55 @@ from scipy.signal import oaconvolve
 from engine.effects import Effects
 from engine.kernels.amplifier import amplify, drive
 from engine.kernels.constants import QUANTUM
-from engine.kernels.mixer_records import LARGEST, MIXER, SMALLEST
+from engine.kernels.mixer_records import MIXER
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetInfo
+from engine.presets import SHIPPED, Preset, PresetInfo, load_preset
+from engine.resonators.sine_transform import project
+from engine.values.ear import Ear
 from engine.values.effects import Amp
-from engine.voices import Mixer, Voice, plain_program
+from engine.voices import Mixer, Program, Voice, model_program, plain_program
 
 RATE_HZ = 48_000
+KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
+STEEL = "studio_steel_e4"
+PLUCK, EAR = Pluck(0.3), Ear((0.37,))
 
 Signal = NDArray[np.float64]
 Samples = NDArray[np.float32]
-Rung = Callable[..., Signal]  # fixtures of `conftest.py`
-Strike = Callable[..., Voice]
-Shipped = Callable[[str], Preset]
-Initial = Callable[[PresetInfo, Pluck], Signal]
-Info = Callable[[bool], PresetInfo]
+
+
+@cache
+def shipped(name: str) -> Preset:
+    """A shipped preset by its name; nobody may change it."""
+    return load_preset(SHIPPED / f"{name}.safetensors")
+
+
+@cache
+def program_of(name: str, rate_hz: int) -> Program:
+    return model_program(shipped(name), rate_hz)
+
+
+def small_info(tension_modulated: bool) -> PresetInfo:
+    """A string of six modes at 4 kHz, tension-modulated or linear."""
+    plain = replace(shipped(KNOWING).info, model="dmd", model_configuration={}, modes=6, grid_points=41)
+    return replace(plain, tension_modulated=tension_modulated)
+
+
+def initial_m(info: PresetInfo, pluck: Pluck) -> Signal:
+    """The displacement that a string of a preset's is released from, (grid_points,)."""
+    return project(pluck.displacement(info.grid_points), info.modes)
+
+
+def strike(name: str, pluck: Pluck = PLUCK, rate_hz: int = RATE_HZ, ear: Ear = EAR, gain: float = 1.0) -> Voice:
+    """A voice of a shipped preset's model."""
+    return Voice(program_of(name, rate_hz), initial_m(shipped(name).info, pluck), ear, gain)
+
+
+def rung(frames: int, *voices: Voice, attack: bool = True) -> Signal:
+    """What voices sound like together, (frames, 2), with no limiter."""
+    for voice in () if attack else voices:
+        voice.record["attack"] = 0  # the string's own samples from the first on
+    return mixer_of(*voices, rate_hz=voices[0].program.rate_hz).render(frames).astype(np.float64)
 
 
 def relative(found: Signal, expected: Signal) -> float:
@@ -58,23 +93,13 @@ def faded(frames: int) -> Signal:
 
 
 def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> Signal:
-    """Apply these effects to sound (frames, 1 or 2) as a mixer does: its first frames, as many, (frames, 2).
-
-    Give silence after the sound where the end shall ring out, `Effects.tail_s`. Samples that are no numbers, and
-    those too large or too small to be sound, are taken as silence, as the mixer does.
-    """
+    """Sound (frames, 1 or 2) through effects, by SciPy: its first frames, as many, (frames, 2)."""
     stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
-    if effects is None or not len(stereo):
-        return stereo
-    wild = ~(np.abs(stereo) < LARGEST).all(1)
-    stereo[wild] = 0.0
-    stereo[np.abs(stereo) < SMALLEST] = 0.0
-    if effects.amp is not None and effects.amp.drive_db:
+    if effects is not None and effects.amp is not None and effects.amp.drive_db:
         stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
-    if not effects.rings:
+    if effects is None or not effects.rings:
         return stereo
-    wet: Signal = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
-    return wet
+    return np.asarray(oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)])
 
 
 def amplified(amp: Amp, sound: Signal, rate_hz: int, level_db: float = 0.0) -> Signal:

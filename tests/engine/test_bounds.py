@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.effects import Body
+from engine.effects import Body, Impulse
 from engine.models.base import Physics
 from engine.pluck import Pluck
 from engine.presets import preset_files, read_info
@@ -18,6 +18,8 @@ from engine.values.drum import DrumParameters
 from engine.values.effects import Amp, Room
 from engine.values.string import Losses, Polarisations, StringParameters
 
+GOOD = np.random.default_rng(0).standard_normal((4000, 2))
+LOW = np.sin(np.arange(96_000) * 2 * np.pi * 8 / 48_000)[:, None] * np.hanning(96_000)[:, None]
 ROUND = {"length_m": 0.33, "width_m": 0.33}
 REFUSED: list[tuple[type, dict[str, Any], str]] = [
     *((StringParameters, {name: bad}, name) for name in ("length_m", "tension_n") for bad in (0.0, -1, math.nan)),
@@ -39,6 +41,21 @@ REFUSED: list[tuple[type, dict[str, Any], str]] = [
     (Body, {"mix": math.nan}, "mix"),
     (Body, {"size": 0.1}, "size"),
     (Body, {"name": "lute"}, "guitar"),
+    *((Impulse, {"samples": GOOD, "rate_hz": bad}, "rate") for bad in (4_000, 10**9)),
+    *(
+        (Impulse, {"samples": samples, "rate_hz": 48_000}, words)
+        for samples, words in (
+            (GOOD[:, :1].repeat(3, 1), "channels"),
+            (GOOD[:, :0], "channels"),
+            (GOOD[:, 0], "dimensions"),
+            (GOOD.repeat(37, 0), "length"),
+            (GOOD[:0], "silent"),
+            (1e-9 * GOOD, "silent"),
+            *((np.where(np.arange(4000)[:, None] == 1234, bad, GOOD), "no numbers") for bad in (np.nan, -np.inf)),
+            (np.where(np.arange(4000)[:, None] == 1234, 1e300, GOOD), "largest sample"),
+            (LOW, "80"),
+        )
+    ),
     (DrumParameters, {"thickness_m": -1.0}, "thickness_m must lie in"),
     (DrumParameters, {"tension_n_m": 1e9}, "tension_n_m must lie in"),
     (DrumParameters, {**ROUND, "width_m": 0.2}, "two diameters, nearly the same"),
@@ -49,7 +66,7 @@ REFUSED: list[tuple[type, dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "values", "words"), REFUSED)
+@pytest.mark.parametrize(("kind", "values", "words"), REFUSED, ids=range(len(REFUSED)))
 def test_a_value_out_of_its_bounds_is_refused_by_name(kind: type, values: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         kind(**values)

@@ -1,4 +1,4 @@
-"""Relative errors by hand."""
+"""Relative errors and spectral distances by hand."""
 
 import math
 from collections.abc import Callable
@@ -16,6 +16,7 @@ from engine.compare.relative import (
     error_to_signal,
     relative_error,
 )
+from engine.compare.spectra import FLOOR_DB, log_spectral_distance, spectral_distances
 
 
 @pytest.mark.parametrize(
@@ -34,34 +35,29 @@ def test_errors_by_hand(predicted: list[Any], truth: list[Any], rel_mse: float, 
         relative_error(torch.zeros(1, 4, 2), torch.zeros(1, 4, 3))
 
 
-def test_batches_and_windows_add_up() -> None:
-    generator = torch.Generator().manual_seed(0)
-    truth, predicted = (torch.randn(6, 100, 3, generator=generator, dtype=torch.float64) for _ in range(2))
-    sums = ErrorSums(100)
-    for rows in (slice(0, 1), slice(1, 6)):
-        sums.add(predicted[rows], truth[rows])
-    whole = relative_error(predicted, truth)
-    assert sums.total().rel_mse == pytest.approx(whole.rel_mse)
-    first, second = sums.windows(100.0, [0, 0.25, 1.0, 2.0, 3.0])
-    assert first.rel_mae == pytest.approx(relative_error(predicted[:, :25], truth[:, :25]).rel_mae)
-    assert second.rel_mse == pytest.approx(relative_error(predicted[:, 25:], truth[:, 25:]).rel_mse)
-    assert (second.start_s, second.stop_s) == (0.25, 1.0)
-
-
-def motions(*shape: int) -> tuple[torch.Tensor, torch.Tensor]:
-    generator = torch.Generator().manual_seed(1)
+def motions(*shape: int) -> tuple[torch.Tensor, torch.Tensor, ErrorSums]:
+    """A prediction, a truth with a loud trajectory and a silent frame, and their sums."""
+    generator, sums = torch.Generator().manual_seed(1), ErrorSums(shape[1])
     truth, predicted = (torch.randn(*shape, generator=generator, dtype=torch.float64) for _ in range(2))
-    return predicted, truth
-
-
-def test_the_first_frames_some_trajectories_and_batches_have_their_own_errors() -> None:
-    predicted, truth = motions(5, 50, 3)
-    truth[0] *= 100
-    sums = ErrorSums(50)
+    truth[0] *= 10
+    truth[:, 2] = predicted[:, 2] = 0
     sums.add(predicted, truth)
-    assert sums.total(20).rel_mae == pytest.approx(relative_error(predicted[:, :20], truth[:, :20]).rel_mae)
-    assert sums.total(50).rel_mse == sums.total().rel_mse == pytest.approx(sums.of(range(5)).rel_mse)
-    assert sums.of([0, 2]).rel_mse == pytest.approx(relative_error(predicted[[0, 2]], truth[[0, 2]]).rel_mse)
+    return predicted, truth, sums
+
+
+def same(found: RelativeError, predicted: torch.Tensor, truth: torch.Tensor) -> bool:
+    expected = relative_error(predicted, truth)
+    return (found.rel_mse, found.rel_mae) == pytest.approx((expected.rel_mse, expected.rel_mae))
+
+
+def test_windows_frames_trajectories_and_batches_have_their_own_errors() -> None:
+    predicted, truth, sums = motions(5, 50, 3)
+    assert same(sums.total(), predicted, truth) and same(sums.of(range(5)), predicted, truth)
+    assert same(sums.total(20), predicted[:, :20], truth[:, :20])
+    assert same(sums.of([0, 2]), predicted[[0, 2]], truth[[0, 2]])
+    first, second = sums.windows(100.0, [0, 0.25, 0.5, 2.0, 3.0])
+    assert same(first, predicted[:, :25], truth[:, :25]) and same(second, predicted[:, 25:], truth[:, 25:])
+    assert (second.start_s, second.stop_s) == (0.25, 0.5)
     wrong = (predicted - truth).square().sum((1, 2))
     assert sums.shares() == pytest.approx((wrong / wrong.sum()).numpy())
     own = [relative_error(predicted[rows], truth[rows]) for rows in (slice(0, 2), slice(2, 4), slice(4, 5))]
@@ -69,27 +65,32 @@ def test_the_first_frames_some_trajectories_and_batches_have_their_own_errors() 
     assert found.rel_mse == pytest.approx(np.mean([error.rel_mse for error in own]))
     assert found.rel_mae == pytest.approx(np.mean([error.rel_mae for error in own]))
     assert found.rel_mse != pytest.approx(sums.total().rel_mse, rel=0.01)
+    frames, trajectories = sums.per_frame(), sums.per_trajectory()
+    assert frames[0].dtype == np.float64
+    assert (frames[0].shape, trajectories[0].shape, frames[0][2]) == ((50,), (5,), 0)
+    for index, each in enumerate(zip(*frames, strict=True)):
+        assert same(RelativeError(*each), predicted[:, [index]], truth[:, [index]])
+    for row, each in enumerate(zip(*trajectories, strict=True)):
+        assert same(RelativeError(*each), predicted[[row]], truth[[row]])
+    assert sums.spread().rel_mse == pytest.approx(np.std(trajectories[0]))
+    assert sums.spread().rel_mae == pytest.approx(np.std(trajectories[1]))
     for steps in (0, 51):
         with pytest.raises(ValueError, match=f"steps must lie in 1 … 50, not {steps}"):
             sums.total(steps)
 
 
-def test_per_frame_and_per_trajectory() -> None:
-    predicted, truth = motions(4, 6, 3)
-    truth[:, 2], predicted[:, 2] = 0, 0
-    sums = ErrorSums(6)
-    sums.add(predicted, truth)
-    frames, trajectories = sums.per_frame(), sums.per_trajectory()
-    assert frames[0].dtype == np.float64
-    assert (frames[0].shape, trajectories[0].shape) == ((6,), (4,))
-    assert frames[0][2] == 0
-    for index, found in enumerate(zip(*frames, strict=True)):
-        frame = relative_error(predicted[:, index : index + 1], truth[:, index : index + 1])
-        assert found == pytest.approx((frame.rel_mse, frame.rel_mae))
-    alone = [relative_error(predicted[row : row + 1], truth[row : row + 1]) for row in range(4)]
-    assert trajectories[0] == pytest.approx([error.rel_mse for error in alone])
-    assert sums.spread().rel_mse == pytest.approx(np.std([error.rel_mse for error in alone]))
-    assert sums.spread().rel_mae == pytest.approx(np.std([error.rel_mae for error in alone]))
+@pytest.mark.parametrize("rows_first", [True, False])
+def test_trajectories_are_known_again_in_blocks(rows_first: bool) -> None:
+    predicted, truth, whole = motions(5, 30, 3)
+    sums, parts, blocks = ErrorSums(30), ((0, 2), (2, 5)), ((0, 7), (7, 20), (20, 30))
+    for outer in parts if rows_first else blocks:
+        for inner in blocks if rows_first else parts:
+            rows, frames = (slice(*each) for each in ((outer, inner) if rows_first else (inner, outer)))
+            row = None if rows_first else rows.start
+            sums.add(predicted[rows, frames], truth[rows, frames], frames.start, row)
+    assert sums.per_trajectory()[0] == pytest.approx(whole.per_trajectory()[0])
+    assert sums.spread().rel_mae == pytest.approx(whole.spread().rel_mae)
+    assert sums.total().rel_mse == pytest.approx(whole.total().rel_mse)
 
 
 def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSums:
@@ -100,7 +101,7 @@ def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSum
     return sums
 
 
-def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -> None:
+def test_a_standard_error_is_that_of_a_ratio_of_sums() -> None:
     """A quarter is ten times as loud: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
     shares, loudness = [0.01, 0.01, 0.01, 0.2] * 100, [1.0, 1.0, 1.0, 10.0] * 100
     sums = spoilt(shares, loudness)
@@ -109,58 +110,19 @@ def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -
     found = sums.standard_error(20_000)
     assert found.rel_mse == pytest.approx(expected, rel=0.05)
     assert found.rel_mse < sums.spread().rel_mse / 20 / 5  # what the plain deviation of a mean would tell
-
-
-def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
-    """Half of 100 have an error of 0.1, half of 0.3: a draw with replacement is binomial; its deviation is known."""
+    # of equal trajectories it is that of a mean: a draw with replacement is binomial
     found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
-    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)  # the population's deviation over √count
+    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)
     assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
-
-
-def test_the_standard_error_where_there_is_nothing_to_draw_and_the_depth_of_a_null() -> None:
     assert spoilt([0.5]).standard_error() == RelativeError(0, 0)
     assert spoilt([0.5] * 7).standard_error().rel_mae == pytest.approx(0, abs=1e-12)
-    assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
-    for rel_mse, depth_db in ((1e-3, -30), (0, NULL_FLOOR_DB), (1e-30, NULL_FLOOR_DB), (math.inf, math.inf)):
-        assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
     assert spoilt([0.1, math.inf]).standard_error() == RelativeError(math.inf, math.inf)
     assert spoilt([0.1, 0.2, 0.4]).standard_error() == spoilt([0.1, 0.2, 0.4]).standard_error()
-
-
-def test_trajectories_are_known_again_in_blocks() -> None:
-    predicted, truth = motions(5, 30, 3)
-    whole, rows_first, frames_first = ErrorSums(30), ErrorSums(30), ErrorSums(30)
-    whole.add(predicted, truth)
-    parts, blocks = (slice(0, 2), slice(2, 5)), (slice(0, 7), slice(7, 20), slice(20, 30))
-    for rows in parts:
-        for frames in blocks:
-            rows_first.add(predicted[rows, frames], truth[rows, frames], frames.start)
-    for frames in blocks:
-        for rows in parts:
-            frames_first.add(predicted[rows, frames], truth[rows, frames], frames.start, rows.start)
-    for sums in (rows_first, frames_first):
-        assert sums.per_trajectory()[0] == pytest.approx(whole.per_trajectory()[0])
-        assert sums.spread().rel_mae == pytest.approx(whole.spread().rel_mae)
-        assert sums.total().rel_mse == pytest.approx(whole.total().rel_mse)
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, 1e200])
-def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> None:
-    predicted, truth = motions(3, 10, 2)
-    predicted[1, 5:] = value
-    sums = ErrorSums(10)
-    sums.add(predicted, truth)
-    assert sums.total().rel_mse == math.inf
-    assert math.isfinite(sums.total(5).rel_mse)
-    assert np.isinf(sums.per_frame()[0]).tolist() == [False] * 5 + [True] * 5
-    assert np.isinf(sums.per_trajectory()[0]).tolist() == [False, True, False]
-    assert sums.spread().rel_mse == math.inf
+    assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
 
 
 def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> None:
-    draw = np.random.default_rng(3)
-    predicted, truth = draw.normal(size=(2, 12, 30, 4))
+    predicted, truth = np.random.default_rng(3).normal(size=(2, 12, 30, 4))
     whole, alone = ErrorSums(30, edges=[20, 10, 90]), ErrorSums(10)
     for first in (0, 7, 14, 21, 28):  # blocks that cross the edges
         whole.add(predicted[:, first : first + 7], truth[:, first : first + 7], first)
@@ -169,6 +131,29 @@ def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> 
     assert (found.rel_mse, found.rel_mae) == pytest.approx((wanted.rel_mse, wanted.rel_mae))
     with pytest.raises(ValueError, match="edges"):
         whole.standard_error(first=11, last=20)
+
+
+@pytest.mark.parametrize(
+    ("rel_mse", "depth_db"), [(1e-3, -30), (0, NULL_FLOOR_DB), (1e-30, NULL_FLOOR_DB), (math.inf, math.inf)]
+)
+def test_the_depth_of_a_null(rel_mse: float, depth_db: float) -> None:
+    assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e200])
+def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> None:
+    predicted, truth, _ = motions(3, 10, 2)
+    predicted[1, 5:] = value
+    sums = ErrorSums(10)
+    sums.add(predicted, truth)
+    assert sums.total().rel_mse == sums.spread().rel_mse == math.inf
+    assert math.isfinite(sums.total(5).rel_mse)
+    assert np.isinf(sums.per_frame()[0]).tolist() == [False] * 5 + [True] * 5
+    assert np.isinf(sums.per_trajectory()[0]).tolist() == [False, True, False]
+    windows, ones = ErrorWindows(20, 0.01, 1_000), np.ones((20, 3))
+    windows.add(np.where(np.arange(20)[:, None] == 15, np.nan, ones), ones)
+    assert windows.curves["rmse"].tolist() == windows.curves["mae"].tolist() == [0.0, math.inf]
+    assert windows.rel_mse == math.inf
 
 
 @pytest.mark.parametrize("of", [np.asarray, torch.tensor])
@@ -180,8 +165,41 @@ def test_an_error_to_signal_ratio(of: Callable[..., Any]) -> None:
     assert error_to_signal(of([math.nan, 0.0]), truth) == math.inf
 
 
-def test_a_prediction_that_is_not_a_number_is_an_infinite_error_in_its_window() -> None:
-    windows, truth = ErrorWindows(20, 0.01, 1_000), np.ones((20, 3))
-    windows.add(np.where(np.arange(20)[:, None] == 15, np.nan, truth), truth)
-    assert windows.curves["rmse"].tolist() == windows.curves["mae"].tolist() == [0.0, math.inf]
-    assert windows.rel_mse == math.inf
+def sine(hz: float, samples: int = 4000, phase: float = 0.0) -> np.ndarray:
+    return np.sin(2 * math.pi * hz * np.arange(samples) / 4000 + phase)[None]
+
+
+def test_spectra_hear_a_gain_exactly_a_frequency_and_no_phase() -> None:
+    noise = np.random.default_rng(0).standard_normal((3, 5000), np.float32)
+    convergence, log_db = spectral_distances(2 * noise, noise)
+    assert convergence.tolist() == pytest.approx([1, 1, 1])
+    assert log_db.tolist() == pytest.approx([20 * math.log10(2)] * 3, rel=1e-3)
+    assert [values.tolist() for values in spectral_distances(noise, noise)] == [[0, 0, 0], [0, 0, 0]]
+    assert float(spectral_distances(sine(500, phase=1), sine(500))[0][0]) < 0.01
+    convergence, log_db = spectral_distances(sine(700), sine(500))
+    assert float(convergence[0]) == pytest.approx(2**0.5, rel=0.01)
+    assert float(log_db[0]) > 1
+    for samples in (1, 2, 3, 100, 511, 600):
+        sound = 1 + sine(500, samples)
+        assert float(spectral_distances(3 * sound, sound)[0][0]) == pytest.approx(2)
+
+
+def test_spectra_of_silence_and_of_what_is_no_number() -> None:
+    silence = np.zeros((1, 600))
+    assert [float(value[0]) for value in spectral_distances(silence, silence)] == [0, 0]
+    assert float(spectral_distances(sine(500, 600), silence)[0][0]) == math.inf
+    quiet = 10 ** (FLOOR_DB / 20) / 10 * sine(1500)
+    assert float(spectral_distances(sine(500) + quiet, sine(500))[1][0]) < 0.01  # below the floor
+    for shapes, words in (((3, 4), "differ in shape"), ((0, 0), "at least one sample")):
+        with pytest.raises(ValueError, match=words):
+            spectral_distances(*(np.zeros((1, samples)) for samples in shapes))
+    for value in (math.nan, math.inf):
+        assert [float(v[0]) for v in spectral_distances(silence + value, sine(500, 600))] == [math.inf, math.inf]
+
+
+def test_a_log_spectral_distance_is_a_gain_above_the_floor() -> None:
+    noise = np.random.default_rng(0).standard_normal(5000)
+    assert log_spectral_distance(noise, 2 * noise) == pytest.approx(20 * math.log10(2))
+    assert log_spectral_distance(noise[:100], noise[:100] / 2) == pytest.approx(20 * math.log10(2), rel=0.05)
+    assert log_spectral_distance(noise, 2 * noise, noise_power=1e6) == 0
+    assert log_spectral_distance(0 * noise, 0 * noise) == 0

@@ -1,4 +1,4 @@
-"""The sum of all voices, and what is done to it: volume, channels, tone, and the guards."""
+"""The sum of all voices, and what is done to it: volume, channels, tone, guards, and the safety limiter."""
 
 from __future__ import annotations
 
@@ -8,22 +8,15 @@ import numpy as np
 import pytest
 
 from engine.kernels.constants import AHEAD
-from engine.kernels.limiter import LARGEST_LEVEL
+from engine.kernels.limiter import CEILING, LARGEST_LEVEL, STEEPEST
 from engine.kernels.mixer import TONE_HZ, TONE_LEVEL, UNDERFLOW, call
 from engine.kernels.mixer_records import GAPS, MOST_VOICES, RING
 from engine.voices import Mixer
-from engine.voices.mixer import VOLUME_SMOOTHING_S
-from tests.engine.sounds import RATE_HZ, Samples, mixer_of, noise, voice_of
+from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
+from tests.engine.sounds import RATE_HZ, Samples, Signal, mixer_of, noise, voice_of
 
-CALL = ctypes.CFUNCTYPE(
-    ctypes.c_int32,
-    ctypes.c_void_p,
-    ctypes.c_void_p,
-    ctypes.c_uint64,
-    ctypes.c_void_p,
-    ctypes.c_uint64,
-    ctypes.c_void_p,
-)
+POINTER, COUNT = ctypes.c_void_p, ctypes.c_uint64
+CALL = ctypes.CFUNCTYPE(ctypes.c_int32, POINTER, POINTER, COUNT, POINTER, COUNT, POINTER)
 
 
 def ask(mixer: Mixer, frames: int, flags: int = 0, now_s: float = 0.0) -> Samples:
@@ -163,15 +156,97 @@ def test_a_full_ring_refuses_and_reports() -> None:
     assert not again.over
 
 
-def test_ended_voices_are_forgotten_and_the_others_go_on() -> None:
+def test_ended_voices_are_forgotten_the_others_go_on_and_another_rate_is_refused() -> None:
     lasting = noise(20_000)
     mixer = mixer_of(voice_of(noise(640)), voice_of(lasting), voice_of(noise(64)))
     mixer.render(6400)
     mixer.forget_ended()
     assert len(mixer.voices) == 1
     np.testing.assert_array_equal(mixer.render(6400), lasting[6400:12_800])
-
-
-def test_another_rate_is_refused() -> None:
     with pytest.raises(ValueError, match="48000 Hz, the mixer 44100 Hz"):
         Mixer(44_100).add(voice_of(noise(64)))
+
+
+ROUNDING = 1e-6  # of a gain that is read off single-precision samples
+
+
+def limited(sound: Samples, block: int = 1000) -> Samples:
+    """As a device is given it, without the delay."""
+    mixer, total = mixer_of(voice_of(sound), limited=True), len(sound) + AHEAD
+    blocks = [mixer.render(min(block, total - first)) for first in range(0, total, block)]
+    return np.concatenate(blocks)[AHEAD:]
+
+
+def swell(seed: int = 0) -> Samples:
+    """Half a second of noise that swells and fades, up to +12 dB."""
+    level = 4 * np.sin(np.linspace(0, np.pi, RATE_HZ // 2)) ** 2
+    return noise(RATE_HZ // 2, level=1.0, seed=seed) * level[:, None].astype(np.float32)
+
+
+def burst(begin: int) -> Samples:
+    """0.9, and for 200 frames twenty times as much, at once."""
+    sound = np.full((RATE_HZ, 2), 0.9, np.float32)
+    sound[begin : begin + 200] *= 20
+    sound[::2] *= -1
+    return sound
+
+
+LOUD = {
+    "noise": swell(),
+    "tone": np.outer(np.sin(2 * np.pi * 220 * np.arange(RATE_HZ // 2) / RATE_HZ), [3.0, 1.5]).astype(np.float32),
+    # wherever in a quantum the peak is; the first frames had no frame before them to fall in
+    **{f"burst in frame {frame}": burst(64 * 100 + frame) for frame in (0, 1, 31, 32, 63)},
+}
+
+
+def gain_of(found: Samples, sound: Samples) -> Signal:
+    """Its factor, frame by frame, where it is loud enough to tell."""
+    rows, side = np.arange(len(sound)), np.abs(sound).argmax(axis=1)
+    given = sound.astype(float)[rows, side]
+    return np.where(np.abs(given) > 0.1, found[rows, side] / np.where(given == 0, 1.0, given), np.nan)
+
+
+@pytest.mark.parametrize("name", LOUD)
+def test_nothing_exceeds_the_ceiling_and_the_gain_of_both_sides_has_neither_jumps_nor_corners(name: str) -> None:
+    """Its slope changes by a small part of itself from frame to frame, down to the peak and up again."""
+    sound = LOUD[name]
+    found = limited(sound)
+    assert np.abs(found).max() <= np.float32(CEILING)
+    gain = gain_of(found, sound)
+    reduction = 1 - np.nanmin(gain)
+    assert np.nanmax(np.abs(np.diff(gain))) <= reduction * STEEPEST + ROUNDING
+    if name.startswith("burst"):
+        assert np.abs(np.diff(gain, 2)).max() <= reduction * STEEPEST**2 + 3 * ROUNDING
+    if name == "tone":  # the image does not move
+        loud = np.abs(sound[:, 1]) > 0.1
+        np.testing.assert_allclose(*(found.astype(float)[loud] / sound[loud]).T, rtol=1e-5)
+
+
+def test_it_begins_no_earlier_than_it_looks_reports_what_it_did_and_the_gain_returns() -> None:
+    begin, sound = 6400, burst(6400)
+    mixer = mixer_of(voice_of(sound), limited=True)
+    first = mixer.render(6000)
+    assert mixer.take_reduction_db() == 0.0
+    found = np.concatenate([first, mixer.render(len(sound) + AHEAD - 6000)])[AHEAD:]
+    assert mixer.take_reduction_db() == pytest.approx(20 * np.log10(18.0 / CEILING), abs=1e-5)
+    assert mixer.take_peak() == pytest.approx(CEILING)
+    np.testing.assert_array_equal(found[: begin - AHEAD], sound[: begin - AHEAD])
+    np.testing.assert_array_equal(found[-2000:], sound[-2000:])
+    gain = gain_of(found, sound)
+    np.testing.assert_allclose(gain[begin : begin + 200], CEILING / 18.0, rtol=1e-5)
+    after = gain[begin + 200 + AHEAD : begin + 200 + 8 * AHEAD]
+    growth = np.exp(1 / (LIMITER_RELEASE_S * RATE_HZ))
+    np.testing.assert_allclose(after[1:] / after[:-1], growth, rtol=1e-5)
+    assert (np.diff(gain[begin + 200 :]) > -ROUNDING).all()
+
+
+@pytest.mark.parametrize("block", [1, 63, 64, 480])
+def test_blocks_make_no_difference_to_the_limiter(block: int) -> None:
+    sound = LOUD["noise"][:6000]
+    np.testing.assert_array_equal(limited(sound, block), limited(sound, len(sound) + AHEAD))
+
+
+def test_after_a_loud_sound_soft_ones_are_as_they_were() -> None:
+    """To the last bit: no average is left that lacks a rounding error of being 1."""
+    sound = np.concatenate([burst(600)[:4000], swell(1)[:2000], np.zeros((48_000, 2), np.float32), 0.2 * swell(2)])
+    np.testing.assert_array_equal(limited(sound)[-RATE_HZ // 2 :], sound[-RATE_HZ // 2 :])

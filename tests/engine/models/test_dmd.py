@@ -63,23 +63,19 @@ def relative_mse(found: torch.Tensor, truth: torch.Tensor) -> float:
     ("lags", "rank", "tension_modulated"), [(1, 10, True), (2, 50, False), (2, 30, True), (3, 40, True)]
 )
 def test_it_is_pydmds(lags: int, rank: int, tension_modulated: bool) -> None:
-    snapshots = trajectories(tension_modulated=tension_modulated)[0].numpy().T
-    theirs = pydmd.HankelDMD(svd_rank=rank, d=lags, exact=True).fit(snapshots)
+    """PyDMD takes one sequence, or pairs of snapshots: ours of many trajectories are the pairs within each."""
+    data = trajectories(tension_modulated=tension_modulated)
+    theirs = pydmd.HankelDMD(svd_rank=rank, d=lags, exact=True).fit(data[0].numpy().T)
     assert_same_eigenvalues(fitted(tension_modulated, lags=lags, rank=rank), theirs.eigs, 1e-8)
-
-
-@pytest.mark.filterwarnings("ignore:Input data condition number")
-def test_that_of_many_trajectories_is_pydmds_of_all_their_pairs() -> None:
-    """PyDMD takes one sequence, or pairs of snapshots: ours are the pairs within each trajectory."""
-    data = trajectories(tension_modulated=True).numpy()
-    pairs = (
-        [np.concatenate([t[1:-1], t[:-2]], axis=1) for t in data],
-        [np.concatenate([t[2:], t[1:-1]], axis=1) for t in data],
-    )
-    before, after = (np.concatenate(part).T for part in pairs)
-    theirs = pydmd.DMD(svd_rank=30, exact=True).fit(before, after)
-    model = DMD.fit(trajectories(tension_modulated=True), DMDConfiguration(rank=30))
-    assert_same_eigenvalues(model, theirs.eigs, 1e-8)
+    if (lags, rank) == (2, 30):
+        before, after = (
+            np.concatenate(
+                [np.concatenate([t[1 + k : len(t) - 1 + k], t[k : len(t) - 2 + k]], axis=1) for t in data]
+            ).T
+            for k in (0, 1)
+        )
+        theirs = pydmd.DMD(svd_rank=rank, exact=True).fit(before, after)
+        assert_same_eigenvalues(DMD.fit(data, DMDConfiguration(rank=rank)), theirs.eigs, 1e-8)
 
 
 @torch.no_grad()

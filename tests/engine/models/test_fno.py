@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -70,24 +69,24 @@ class FourierLaws(ModelLaws):
         model, found = self.stirred(grid_points=points).double(), []
         start, wanted = drawn(3, points).double(), drawn(21, points).double().view(3, 7, points)
 
+        def by_definition(hidden: Tensor) -> tuple[Tensor, Tensor]:
+            frames = []
+            for _ in range(7):
+                hidden = self.tensor_step(model, hidden)
+                frames.append(model.out_mapping(hidden)[..., 0])
+            return torch.stack(frames, dim=1), hidden
+
         def learning(hidden: Tensor) -> tuple[Tensor, Tensor]:
             frames, state = model.advance(FieldState(hidden), 7)
             return frames, state.hidden
 
-        for advance in (partial(self.by_definition, model), learning):
+        for advance in (by_definition, learning):
             model.zero_grad()
             frames, last = advance(model.encode(start).hidden)
             ((frames - wanted).square().mean() + last.square().mean()).backward()
             found.append([frames, last, *(parameter.grad for parameter in model.parameters())])
         for expected, fast in zip(*found, strict=True):
             torch.testing.assert_close(fast, expected, rtol=1e-9, atol=1e-12)
-
-    def by_definition(self, model: Any, hidden: Tensor) -> tuple[Tensor, Tensor]:
-        frames = []
-        for _ in range(7):
-            hidden = self.tensor_step(model, hidden)
-            frames.append(model.out_mapping(hidden)[..., 0])
-        return torch.stack(frames, dim=1), hidden
 
     def test_its_papers_start_is_uniform_and_positive(self) -> None:
         for name, tensor in self.made().state_dict().items():

@@ -11,6 +11,9 @@ import torch
 from scipy.integrate import solve_ivp
 
 from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import record_of, slot, slots
+from engine.kernels.memory import publish
+from engine.kernels.voice_records import VOICE, WISH
 from engine.levels import FULL_SCALE_M
 from engine.models._tension_law import CURVES
 from engine.models.base import Physics
@@ -21,16 +24,34 @@ from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
-from engine.voices import Mixer, Program
+from engine.voices import Program, Voice
 from engine.voices.programs import solver_program, tension_program
 from engine.voices.voice import resonator_rows
 from tests.engine.sounds import RATE_HZ, Signal, mixer_of
-from tests.engine.voices.changing import ChangingVoice
 
 STRING = StringParameters(tension_n=80.0, second_moment_m4=1.4e-14)
 EAR = Ear((0.37,))
 PLUCK = Pluck(0.3, 4.0, "raised_cosine", 0.2)
 Changes = list[tuple[int, Resonator | Pluck, float]]  # the quantum, what changes, seconds of the way
+
+
+class ChangingVoice(Voice):
+    """A pluck whose string Python changes as it rings, as the compiled player changes those of its notes."""
+
+    def __init__(self, of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> None:
+        super().__init__(of, pluck.displacement(of.grid_points), ear)
+        self.never_ends()
+        self.blocks: list[Signal] = []
+
+    def retune(self, resonator: Resonator, seconds: float) -> None:
+        """Other modes while it rings: it gets there evenly, after those wished for before."""
+        block = np.concatenate([np.zeros(slots(WISH)), resonator_rows(resonator).ravel()])
+        record_of(block, WISH)["quanta"] = max(1, round(seconds * self.program.rate_hz / QUANTUM))
+        memory, place = (
+            (self.blocks[-1], slot(WISH, "next")) if self.blocks else (self.memory, slot(VOICE, "pending_modes"))
+        )
+        publish(memory.view(np.int64), place, block.ctypes.data)
+        self.blocks.append(block)
 
 
 def modes_of(string: StringParameters, modes: int = 40) -> Resonator:
@@ -46,41 +67,31 @@ def damped(t60_s: float) -> Resonator:
     return modes_of(replace(STRING, damping_d1_kg_m_s=STRING.damping_d1_kg_m_s + added))
 
 
-def program(kind: str, resonator: Resonator | None = None, coarser: int = 15) -> Program:
+def program(kind: str, resonator: Resonator | None = None, coarser: int = 15, rate_hz: int = RATE_HZ) -> Program:
+    """Of the solver, or of a model as it starts."""
     own = resonator or modes_of(STRING)
     if kind == "truth":
-        return solver_program(own, RATE_HZ, coarser)
-    return series_program(own, RATE_HZ)
-
-
-def series_program(resonator: Resonator, rate_hz: int) -> Program:
-    """Of a model as it starts."""
-    model = KoopmanTension(KoopmanTensionConfiguration(modes=resonator.modes))
-    model.initialise("series", Physics(resonator, rate_hz), torch.Generator())
+        return solver_program(own, rate_hz, coarser)
+    model = KoopmanTension(KoopmanTensionConfiguration(modes=own.modes))
+    model.initialise("series", Physics(own, rate_hz), torch.Generator())
     curves = {name: getattr(model, name).detach().numpy() for name in CURVES}
-    return tension_program(curves, model.configuration, resonator, rate_hz)
-
-
-def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> ChangingVoice:
-    return ChangingVoice(of, pluck.displacement(of.grid_points), ear)
+    return tension_program(curves, model.configuration, own, rate_hz)
 
 
 def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> Signal:
     """The sound, (frames,), of a string that is plucked and then changed."""
-    mixer, voice, blocks, done = Mixer(RATE_HZ, limited=False), struck(of, ear=ear), [], 0
-    mixer.add(voice)
-    for quantum, change, seconds in [*changes, (quanta, PLUCK, 0.0)]:
+    voices, blocks, done = [ChangingVoice(of, ear=ear)], [], 0
+    mixer = mixer_of(*voices)
+    for quantum, change, seconds in changes:
         blocks.append(mixer.render((quantum - done) * QUANTUM)[:, 0])
         done = quantum
-        if quantum == quanta:
-            break
         if isinstance(change, Resonator):
-            voice.retune(change, seconds)
-        else:
-            again = struck(of, change, ear)
-            again.continues(voice)
-            mixer.add(again)
-            voice = again
+            voices[-1].retune(change, seconds)
+        else:  # it is plucked again while it rings on
+            voices.append(ChangingVoice(of, change, ear))
+            voices[-1].record["previous_voice"] = voices[-2].address
+            mixer.add(voices[-1])
+    blocks.append(mixer.render((quanta - done) * QUANTUM)[:, 0])
     return np.concatenate(blocks).astype(np.float64)
 
 
@@ -110,7 +121,7 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     """Against DOP853, quantum by quantum, with the modes that the voice had then."""
     first, last, quanta = modes_of(STRING, 4), modes_of(replace(STRING, tension_n=95.0, length_m=0.6), 4), 12
     of = program("truth", first, coarser=1)
-    voice = struck(of)
+    voice = ChangingVoice(of)
     voice.begin_at_once()
     mixer = mixer_of(voice)
     heard = [mixer.render(4 * QUANTUM)[:, 0]]
@@ -150,16 +161,14 @@ def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind: str, pic
 
 
 def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
-    low_hz = 16_000
-    own = modes_of(STRING, 80)
+    own, low_hz = modes_of(STRING, 80), 16_000
     below = int((own.omega < 3.0 * low_hz).sum())
     assert below < 80
-    few = modes_of(STRING, below)
-
-    def at(resonator: Resonator) -> Signal:
-        return mixer_of(struck(series_program(resonator, low_hz)), rate_hz=low_hz).render(3_200)[:, 0]
-
-    np.testing.assert_allclose(at(own), at(few), atol=1e-4)
+    found, expected = (
+        mixer_of(ChangingVoice(program("model", each, rate_hz=low_hz)), rate_hz=low_hz).render(3_200)
+        for each in (own, modes_of(STRING, below))
+    )
+    np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
@@ -177,21 +186,3 @@ def test_endless_bending_does_not_pump_the_string(kind: str) -> None:
     wild: Changes = [(2 + n, bent(3 * math.sin(n)), 0.0) for n in range(500)]
     heard = sound(program(kind), wild, 520)
     assert np.abs(heard[-12_800:]).max() < 3 * np.abs(heard[:12_800]).max()
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_modes_count_from_their_frame_on(kind: str) -> None:
-    """As if they had been wished for then, to a quantum; each waits for those before it."""
-    quantum = QUANTUM
-    asked: Changes = [(50, bent(1), 0.002), (51, bent(2), 0.005), (80, bent(-1), 0.01), (120, damped(0.2), 0.01)]
-    expected = sound(program(kind), asked)
-    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program(kind))
-    for at, wish, seconds in asked[:-1]:
-        assert isinstance(wish, Resonator)
-        voice.retune(wish, seconds, at * quantum - 5)
-    voice.retune(damped(0.2), 0.01, 120 * quantum)
-    mixer.add(voice)
-    heard = mixer.render(60 * quantum)[:, 0]
-    voice.retune(damped(0.2), 0.01)  # at once, but after what was wished for: the same once more
-    heard = np.concatenate([heard, mixer.render(240 * quantum)[:, 0]])
-    np.testing.assert_allclose(heard, expected, atol=1e-6)

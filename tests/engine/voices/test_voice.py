@@ -1,11 +1,13 @@
-"""What all voices share: blocks, gains, listening points, velocity, the beginning and the end."""
+"""What all voices share: blocks, gains, listening points, beginning and end; samples that somebody else renders."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import soxr
 
 from engine.kernels.constants import QUANTUM
 from engine.kernels.fields import record_of
@@ -13,64 +15,52 @@ from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
-from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
-from engine.values.string import StringParameters
-from engine.voices import Mixer, Voice, model_program, truth_program
+from engine.voices import Mixer, Program, Voice, model_program, plain_program, rendered_program, truth_program
 from engine.voices.ear import REACH_FRAMES
-from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
+from tests.engine import sounds
 from tests.engine.sounds import (
+    EAR,
+    KNOWING,
     RATE_HZ,
-    Info,
-    Initial,
-    Rung,
-    Shipped,
+    STEEL,
+    Samples,
     Signal,
-    Strike,
     faded,
+    initial_m,
     mixer_of,
+    noise,
+    rung,
+    shipped,
+    small_info,
+    strike,
     voice_of,
 )
 
 FADE = round(FADE_S * RATE_HZ)
-KNOWING, STEEL = "nylon_nonlinear_gaussian_4k_koopman_integrated", "studio_steel_e4"
-HINTED = "nylon_nonlinear_gaussian_4k_koopman_integrated_hinted"
-EAR = Ear((0.37,))
-
-
-@pytest.fixture
-def struck(strike: Strike, small_info: Info, initial_m: Initial) -> Strike:
-    """A voice of either kind at 48 kHz: struck(kind, ear, gain)."""
-
-    def made(kind: str, ear: Ear = EAR, gain: float = 1.0) -> Voice:
-        if kind == "bank":
-            return strike(KNOWING, ear=ear, gain=gain)
-        info = small_info(True)
-        return Voice(truth_program(info, RATE_HZ), initial_m(info, Pluck(0.3)), ear, gain)
-
-    return made
-
-
-def constant(frames: int = 48_000, level: float = 0.5) -> Voice:
-    """It shows every change of gain."""
-    return voice_of(np.full((frames, 1), level, np.float32))
-
-
 KINDS = pytest.mark.parametrize("kind", ["bank", "truth"])
+PICKUPS = pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+
+
+def struck(kind: str, ear: Ear = EAR, gain: float = 1.0, rate_hz: int = RATE_HZ) -> Voice:
+    if kind != "truth":
+        return strike({"bank": KNOWING, "tension": "studio_any_string"}[kind], rate_hz=rate_hz, ear=ear, gain=gain)
+    info = small_info(True)
+    return Voice(truth_program(info, rate_hz), initial_m(info, Pluck(0.3)), ear, gain)
+
+
+def constant(frames: int = 48_000, level: float = 0.5, rate_hz: int = RATE_HZ) -> Voice:
+    """It shows every change of gain."""
+    return voice_of(np.full((frames, 1), level, np.float32), rate_hz=rate_hz)
 
 
 @KINDS
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str, struck: Strike) -> None:
-    ear = Ear((0.3, 0.6), pickup)
-
+@PICKUPS
+def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str) -> None:
     def rendered(sizes: list[int]) -> Signal:
-        voice, mixer, parts = struck(kind, ear), Mixer(RATE_HZ), []
-        mixer.add(voice)
-        for size in sizes:
-            parts.append(mixer.render(size))
-        return np.concatenate(parts)
+        mixer = mixer_of(struck(kind, Ear((0.3, 0.6), pickup)), limited=True)
+        return np.concatenate([mixer.render(size) for size in sizes])
 
     sizes = [int(size) for size in np.random.default_rng(0).integers(1, 400, 40)]
     whole = rendered([sum(sizes)])
@@ -80,9 +70,7 @@ def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str, struck: S
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 3])
-def test_velocity_is_the_derivative_of_displacement(
-    kind: str, solo: int, struck: Strike, rung: Rung, derivative: Callable[..., Signal]
-) -> None:
+def test_velocity_is_the_derivative_of_displacement(kind: str, solo: int, derivative: Callable[..., Signal]) -> None:
     points = (0.3, 0.6)
     displacement = rung(9600, struck(kind, Ear(points, solo=solo)), attack=False)
     found = rung(9600, struck(kind, Ear(points, "velocity", solo)), attack=False)
@@ -92,9 +80,7 @@ def test_velocity_is_the_derivative_of_displacement(
 
 
 @pytest.mark.parametrize("amplitude_mm", [0.1, 20.0])
-def test_no_pluck_as_velocity_is_taken_for_a_runaway(
-    amplitude_mm: float, shipped: Shipped, initial_m: Initial, rung: Rung
-) -> None:
+def test_no_pluck_as_velocity_is_taken_for_a_runaway(amplitude_mm: float) -> None:
     info, pluck = shipped(STEEL).info, Pluck(0.02, amplitude_mm, "triangular")
     voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), Ear((0.05,), "velocity"))
     assert rung(4800, voice).any()
@@ -102,11 +88,9 @@ def test_no_pluck_as_velocity_is_taken_for_a_runaway(
 
 
 @KINDS
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+@PICKUPS
 @pytest.mark.parametrize("skipped", [False, True])
-def test_what_was_not_heard_is_where_it_would_have_been(
-    kind: str, pickup: str, skipped: bool, struck: Strike, rung: Rung
-) -> None:
+def test_what_was_not_heard_is_where_it_would_have_been(kind: str, pickup: str, skipped: bool) -> None:
     """It fades in, without anything of what sounded meanwhile; what is skipped is not even waited for."""
     ear, frames, arrived = Ear((0.37,), pickup), 150 * QUANTUM, FADE + 4 * QUANTUM
     expected = rung(frames + 12_000, struck(kind, ear))[frames:]
@@ -128,18 +112,17 @@ def test_what_was_not_heard_is_where_it_would_have_been(
     assert np.abs(found[: FADE // 4]).max() < 0.6 * np.abs(expected).max()
 
 
-@KINDS
+@pytest.mark.parametrize(("kind", "rate_hz"), [("bank", 48_000), ("truth", 44_100), ("truth", 192_000)])
 @pytest.mark.parametrize("solo", [0, 2])
-def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
+def test_another_listening_point_is_faded_to_and_then_exact(kind: str, rate_hz: int, solo: int) -> None:
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
-    moved = struck(kind, here)
-    mixer = mixer_of(moved)
+    moved, frames = struck(kind, here, rate_hz=rate_hz), round(0.02 * rate_hz)
+    mixer = mixer_of(moved, rate_hz=rate_hz)
     mixer.render(1920)
     assert moved.listen(there)
     assert not moved.listen(here), "a fade is under way"
     found = mixer.render(4800).astype(np.float64)
-    before, after = rung(6720, struck(kind, here))[1920:], rung(6720, struck(kind, there))[1920:]
-    frames = FADE
+    before, after = (rung(6720, struck(kind, ear, rate_hz=rate_hz))[1920:] for ear in (here, there))
     share = np.minimum(np.arange(1, 4801) / frames, 1.0)[:, None]
     np.testing.assert_allclose(found, before + share * (after - before), atol=1e-6)
     if kind == "truth":
@@ -148,11 +131,10 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int
 
 
 @pytest.mark.parametrize("gain", [0.0, 1.0])
-@KINDS
-def test_what_has_become_silent_ends_by_itself(kind: str, gain: float, struck: Strike, small_info: Info) -> None:
+@pytest.mark.parametrize("kind", ["bank", "truth", "tension"])
+def test_what_has_become_silent_ends_by_itself(kind: str, gain: float) -> None:
     voice = struck(kind, gain=gain)
-    mixer = mixer_of(voice)
-    level, found = np.inf, np.zeros((1, 2), np.float32)
+    mixer, level, found = mixer_of(voice), np.inf, np.zeros((1, 2), np.float32)
     while not voice.over and voice.seconds < 40:
         level, found = float(np.abs(found).max()), mixer.render(9600)
     assert voice.over
@@ -160,17 +142,25 @@ def test_what_has_become_silent_ends_by_itself(kind: str, gain: float, struck: S
     assert voice.level_db < -100
 
 
+@pytest.mark.parametrize("rate_hz", [44_100, 192_000])
 @KINDS
-@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+def test_at_its_end_it_fades_as_long_at_any_rate(kind: str, rate_hz: int) -> None:
+    voice, frames = struck(kind, rate_hz=rate_hz), round(0.02 * rate_hz)
+    voice.record["silent"] = 0.0  # louder than it is
+    found, whole = (rung(8000, each) for each in (voice, struck(kind, rate_hz=rate_hz)))
+    way = np.concatenate([np.zeros(QUANTUM), faded(frames), np.ones(8000 - QUANTUM - frames)])[:, None]
+    np.testing.assert_allclose(found, (1 - way) * whole, atol=1e-7)
+    assert voice.over
+
+
+@KINDS
+@PICKUPS
 @pytest.mark.parametrize("frame", [1, 700, 1023])
-def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
-    kind: str, pickup: str, frame: int, struck: Strike, rung: Rung
-) -> None:
+def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(kind: str, pickup: str, frame: int) -> None:
     """All of it, with a change of gain and the release, later by so many frames."""
-    ear = Ear((0.3, 0.6), pickup)
 
     def rendered(begins: int) -> Signal:
-        voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
+        voice, mixer = struck(kind, Ear((0.3, 0.6), pickup)), Mixer(RATE_HZ, limited=False)
         voice.begin_at(begins)
         mixer.add(voice)
         first = -(-(begins + 1) // QUANTUM) * QUANTUM + 1280 if begins else 1280 + QUANTUM
@@ -188,28 +178,27 @@ def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
     assert np.abs(later[frame + len(at_once) - 64 :]).max() == 0
 
 
-def test_the_attack_is_short_and_smooth(struck: Strike, rung: Rung) -> None:
-    whole, found = rung(960, struck("truth"), attack=False)[:, 0], rung(960, struck("truth"))[:, 0]
+def test_the_attack_is_short_and_smooth() -> None:
+    whole, found = (rung(960, struck("truth"), attack=attack)[:, 0] for attack in (False, True))
     np.testing.assert_array_equal(found[96:], whole[96:])
     window = 0.5 - 0.5 * np.cos(np.pi * (np.arange(96) + 0.5) / 96)
     np.testing.assert_allclose(found[:96], window * whole[:96], atol=1e-7)
 
 
 @pytest.mark.parametrize("value", [float("nan"), 1e30, 50.0])
-def test_a_runaway_never_reaches_the_mix(
-    value: float, shipped: Shipped, initial_m: Initial, strike: Strike, rung: Rung
-) -> None:
+def test_a_runaway_never_reaches_the_mix(value: float) -> None:
     """A number of the model is spoilt: what nobody believes is found out before it is heard."""
     preset = shipped(KNOWING)
     assert isinstance(preset.model, IntegratedPhase)
     program = model_program(preset, RATE_HZ)
+    own = record_of(program.memory, BANK_PROGRAM)
     if value == 50.0:  # one latent grows
-        program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] + 2] = -value / RATE_HZ
+        program.memory[own["sigma"] + 2] = -value / RATE_HZ
     else:
-        program.memory[record_of(program.memory, BANK_PROGRAM)["omega"] + 3] = value
+        program.memory[own["omega"] + 3] = value
     initial = initial_m(preset.info, Pluck(0.3))
-    wild, mixer, parts = Voice(program, initial, EAR), Mixer(RATE_HZ, limited=False), []
-    mixer.add(wild, strike(STEEL))
+    wild, parts = Voice(program, initial, EAR), []
+    mixer = mixer_of(wild, strike(STEEL))
     while not wild.over and mixer.seconds < 3:
         parts.append(mixer.render(64))
     assert wild.ran_away
@@ -222,9 +211,7 @@ def test_a_runaway_never_reaches_the_mix(
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_whatever_is_asked_of_voices_each_minds_its_own_business(
-    seed: int, strike: Strike, small_info: Info, initial_m: Initial
-) -> None:
+def test_whatever_is_asked_of_voices_each_minds_its_own_business(seed: int) -> None:
     """The mix is the sum of what each voice is alone, when the same is asked of it at the same frames."""
 
     def chosen(number: int) -> Voice:
@@ -232,25 +219,22 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
         pickup = "velocity" if choice.random() < 0.4 else "displacement"
         ear = Ear((choice.uniform(0.1, 0.9),) * choice.integers(1, 3), pickup, int(choice.choice([0, 0, 5])))
         pluck, gain = Pluck(choice.uniform(0.1, 0.9), choice.uniform(1, 12)), float(choice.choice([0.0, 0.5, 1.0]))
-        kind = choice.choice(["knowing", "hinted", "steel", "truth", "samples"])
+        kind = str(choice.choice([KNOWING, f"{KNOWING}_hinted", STEEL, "truth", "samples"]))
         if kind == "samples":
-            voice = voice_of(choice.uniform(-1, 1, (6000, 1)).astype(np.float32))
-            voice.start_with_gain(gain)
+            voice = voice_of(choice.uniform(-1, 1, (6000, 1)).astype(np.float32), gain)
         elif kind == "truth":
             info = small_info(True)
             voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
         else:
-            name = {"knowing": KNOWING, "hinted": HINTED, "steel": STEEL}[str(kind)]
-            voice = strike(name, pluck, ear=ear, gain=gain)
+            voice = strike(kind, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:
             voice.skip(choice.uniform(0.1, 0.5), Mixer(RATE_HZ))
         return voice
 
-    def rendered(numbers: list[int]) -> Signal:
-        mixer, voices = Mixer(RATE_HZ, limited=False), {number: chosen(number) for number in numbers}
-        mixer.add(*voices.values())
-        parts = []
+    def rendered(numbers: range | list[int]) -> Signal:
+        voices, parts = {number: chosen(number) for number in numbers}, []
+        mixer = mixer_of(*voices.values())
         for step in range(24):
             for number, voice in voices.items():
                 choice = np.random.default_rng([seed, number, step])
@@ -266,9 +250,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
         assert mixer.new_gaps() == []
         return np.concatenate(parts).astype(np.float64)
 
-    everyone = list(range(8))
-    alone = sum(rendered([number]) for number in everyone)
-    np.testing.assert_allclose(rendered(everyone), alone, atol=2e-6)
+    np.testing.assert_allclose(rendered(range(8)), sum(rendered([number]) for number in range(8)), atol=2e-6)
 
 
 def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_without_steps() -> None:
@@ -284,10 +266,9 @@ def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_with
     np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
     assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
     parts = []
-    for gain in (0.0, 1.0, 0.3, 0.3, 2.0):
+    for gain, frames in ((0.0, 300), (1.0, 300), (0.3, 300), (0.3, 300), (2.0, 2300)):
         voice.set_gain(gain)
-        parts.append(mixer.render(300)[:, 0])
-    parts.append(mixer.render(2000)[:, 0])
+        parts.append(mixer.render(frames)[:, 0])
     assert np.abs(np.diff(np.concatenate(parts))).max() < 0.5 * 2.0 * 1.5 / FADE * 1.01
     assert parts[-1][-1] == 1.0
 
@@ -305,40 +286,95 @@ def test_it_begins_at_its_frame_and_is_released_at_its_quantum(frame: int) -> No
     assert voice.over and not found[1024 + QUANTUM + FADE :].any()
 
 
-def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(strike: Strike, rung: Rung) -> None:
-    voice, waiting, unheard = constant(), constant(), strike(KNOWING, gain=0.0)
+@pytest.mark.parametrize("rate_hz", [44_100, 48_000, 192_000])
+def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(rate_hz: int) -> None:
+    voice, waiting = (constant(rate_hz=rate_hz) for _ in range(2))
     waiting.begin_at(10_000)
-    mixer = mixer_of(voice, waiting)
+    mixer, frames = mixer_of(voice, waiting, rate_hz=rate_hz), round(0.01 * rate_hz)
     mixer.render(640)
     voice.release(0.01)
     voice.release(1.0)  # the one under way continues
     waiting.release(0.1)
-    unheard.release(1.0)
     found = mixer.render(20_000)[:, 0]
-    np.testing.assert_allclose(found[:480], 0.5 * (1 - faded(480)), atol=1e-7)
-    assert not found[480:].any()
+    np.testing.assert_allclose(found[:frames], 0.5 * (1 - faded(frames)), atol=1e-7)
+    assert not found[frames:].any()
+    unheard = strike(KNOWING, gain=0.0)
+    unheard.release(1.0)
     rung(64, unheard)
     assert voice.over and waiting.over and unheard.over and mixer.voices == []
 
 
-@pytest.mark.parametrize("rate_hz", [44_100, 192_000])
-@pytest.mark.parametrize("what", ["another place", "silence"])
-def test_fades_last_as_long_at_any_rate(what: str, rate_hz: int) -> None:
-    """Of a string that all but stands still meanwhile, so that every change of gain can be seen."""
-    slow = StringParameters(
-        length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
-    )
-    program = solver_program(resonator_of(slow, 1, tension_modulated=False), rate_hz)
-    voice = Voice(program, Pluck(0.5).displacement(program.grid_points), Ear((0.5,)))
-    voice.begin_at_once()
-    mixer, frames, first = mixer_of(voice, rate_hz=rate_hz), round(0.02 * rate_hz), 0
-    if what == "silence":
-        voice.record["silent"], first = 0.0, QUANTUM  # louder than it is
-    else:
-        mixer.render(4 * QUANTUM)
-        assert voice.listen(Ear((0.0,)))
-    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
-    expected = 1 - (faded(frames) if what == "silence" else np.arange(frames) / frames)
-    np.testing.assert_allclose(found[first : first + frames] / found[0], expected, atol=2e-3)
-    assert np.abs(found[first + frames :]).max() < 1e-6
-    assert voice.over == (what == "silence")
+def band_limited(rate_hz: int, seconds: float) -> Samples:
+    """Cosines up to 0.7 of half the rate: even about the first sample, as a string at rest is."""
+    time_s = np.arange(round(seconds * rate_hz)) / rate_hz
+    rates_hz = np.linspace(0.01, 0.35, 12) * rate_hz
+    return (0.05 * np.cos(2 * np.pi * rates_hz * time_s[:, None]).sum(1, keepdims=True)).astype(np.float32)
+
+
+def empty(
+    seconds: float, pickup: str = "displacement", program: Program | None = None, source_hz: int = RATE_HZ
+) -> Voice:
+    """A voice of samples of which there are none yet."""
+    program, ear = program or plain_program(RATE_HZ), Ear((0.5,), pickup)
+    voice = Voice(program, np.full(41, FULL_SCALE_M), ear, 1.0, seconds, source_hz)
+    voice.never_ends()
+    return voice
+
+
+@pytest.mark.parametrize("points", [1, 2])
+def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points: int) -> None:
+    samples = noise(5000, points)
+    once, loop = (Voice.of_samples(plain_program(RATE_HZ), each) for each in (samples, samples[:1000]))
+    found = rung(6000, once, attack=False)
+    np.testing.assert_array_equal(found[:5000], np.broadcast_to(samples, (5000, 2)))
+    assert not found[5100:].any()
+    loop.loop()
+    rounds = np.broadcast_to(np.tile(samples[:1000], (4, 1)), (4000, 2))
+    np.testing.assert_array_equal(rung(3500, loop, attack=False), rounds[:3500])
+
+
+@pytest.mark.parametrize(("source_hz", "rate_hz"), [(4_000, 48_000), (16_000, 44_100), (48_000, 44_100)])
+def test_other_rates_are_what_soxr_makes_of_them(source_hz: int, rate_hz: int) -> None:
+    info, samples = replace(small_info(True), rate_hz=source_hz), band_limited(source_hz, 0.5)
+    voice = empty(0.5, program=rendered_program(info, rate_hz), source_hz=source_hz)
+    voice.append(samples)
+    voice.end_here()
+    found = rung(rate_hz // 2, voice, attack=False)[:, 0]
+    expected = soxr.resample(samples[:, 0].astype(np.float64), source_hz, rate_hz, "VHQ")
+    inner = slice(rate_hz // 20, rate_hz * 9 // 20)  # both begin and end in their own way
+    assert 20 * np.log10(sounds.relative(found[inner], expected[inner])) < -90
+
+
+@PICKUPS
+def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -> None:
+    samples = np.concatenate([band_limited(RATE_HZ, 0.1), np.zeros((100, 1), np.float32)])
+    voice, whole = empty(0.1, pickup), empty(0.1, pickup)
+    whole.append(samples)
+    expected = mixer_of(whole).render(4096)[:, 0]
+    voice.append(samples[:1500])
+    mixer = mixer_of(voice)
+    before = mixer.render(2048)[:, 0]
+    assert voice.starved_s > 0
+    assert [gap.cause for gap in mixer.new_gaps()] == ["rendering"]
+    stood_at = round(voice.seconds * RATE_HZ)
+    voice.append(samples[1500:])
+    after = mixer.render(2048)[:, 0]
+    quiet = stood_at + (2 * QUANTUM if pickup == "velocity" else 0)  # its filter looks back and ahead
+    np.testing.assert_array_equal(before[: stood_at - 2 * QUANTUM], expected[: stood_at - 2 * QUANTUM])
+    assert not before[quiet:].any()
+    goes_on = after[3 * QUANTUM : 1024]
+    shift = stood_at + 3 * QUANTUM
+    np.testing.assert_allclose(goes_on, expected[shift : shift + len(goes_on)], atol=1e-6)
+    mixer.render(8192)
+    assert mixer.new_gaps() == []  # its samples have come to their end
+
+
+def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
+    voice, samples = empty(0.1), noise(4801, 1)
+    mixer = mixer_of(voice)
+    assert not mixer.render(640).any()
+    assert (voice.seconds, len(mixer.new_gaps())) == (0.0, 1)
+    voice.append(samples)
+    found = mixer.render(2048)[:, 0]
+    assert voice.began_frame == 640
+    np.testing.assert_array_equal(found[128:], samples[128:2048, 0])  # nothing was left out, and it has faded in

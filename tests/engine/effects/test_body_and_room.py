@@ -1,14 +1,16 @@
-"""The body: its modes are where the model has them, whatever the rate; how loud it is; what it refuses."""
+"""Body and room: their modes and bands at any rate, how long they ring, and that they are wide."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from engine.effects import Body, Impulse
 from engine.effects.body import modes_of
 from engine.effects.body_table import BODIES
+from engine.effects.room import room_response
 
 GUITAR = BODIES["guitar"]
 
@@ -84,3 +86,29 @@ def test_an_impulse_of_ones_own_sounds_in_its_place_and_at_its_size() -> None:
     long = Impulse(np.random.default_rng(0).standard_normal((2 * 48_000, 1)), 48_000)
     found = Body(size=2.0, impulse=long).response(48_000)  # it is stretched too long, and faded out
     assert len(found) == 3 * 48_000 and abs(found[-1, 0]) < 1e-12
+
+
+def t60_s(response: NDArray[np.float64], band_hz: tuple[float, float], rate_hz: int) -> float:
+    """Schroeder's backward integral, from -5 to -35 dB."""
+    heard = sosfiltfilt(butter(4, band_hz, "bandpass", fs=rate_hz, output="sos"), response)
+    left = np.cumsum(heard[::-1] ** 2)[::-1]
+    level_db = 10 * np.log10(left / left[0])
+    first, last = (int(np.argmax(level_db < level)) for level in (-5, -35))
+    return 2 * (last - first) / rate_hz
+
+
+@pytest.mark.parametrize("wanted_s", [0.3, 0.8, 1.5, 3.0])
+def test_it_rings_as_long_as_asked_and_shorter_where_it_is_high(wanted_s: float) -> None:
+    for side in room_response(wanted_s, 48_000).T:
+        middle_s = t60_s(side, (400.0, 630.0), 48_000)
+        assert middle_s == pytest.approx(wanted_s, rel=0.12)
+        assert t60_s(side, (7_000.0, 9_000.0), 48_000) == pytest.approx(0.4 * wanted_s, rel=0.2)
+        assert t60_s(side, (1_700.0, 2_300.0), 48_000) < middle_s
+
+
+def test_reflections_come_after_the_direct_sound_that_is_not_in_it() -> None:
+    found = np.abs(room_response(0.8, 48_000))
+    assert found[: round(0.002 * 48_000)].max() < 0.02 * found.max()
+    assert found[: round(0.02 * 48_000)].max() > 0.5 * found.max()
+    left, right = room_response(1.0, 48_000)[2_400:].T
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.1  # it is wide

@@ -1,0 +1,223 @@
+"""Compiled functions: Numba's replaced internals, where what is compiled is kept, and the order of writes."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.cpu import CPUContext
+from numba.core.types.misc import unliteral
+
+from engine import warm
+from engine.effects import Effects
+from engine.kernels import numba_internals
+from engine.kernels.compiled import COMPILED
+from engine.kernels.fields import slot
+from engine.kernels.memory import publish
+from engine.kernels.mixer_records import MIXER
+from engine.kernels.voice_records import VOICE
+from engine.levels import FULL_SCALE_M
+from engine.resonators.string import resonator_of
+from engine.values.ear import Ear
+from engine.values.effects import Room
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Voice, plain_program
+from engine.voices import memory as memory_module
+from engine.voices.programs import solver_program
+from tests.engine.sounds import EAR, PLUCK, RATE_HZ
+
+READ = "read engine/kernels/numba_internals.py beside its source"
+
+
+def test_the_version_is_the_one_that_was_read() -> None:
+    installed = ".".join(numba.__version__.split(".")[:2])
+    assert installed == numba_internals.VERSION, f"Numba is {numba.__version__}: {READ}, then raise VERSION"
+
+
+@pytest.mark.parametrize(
+    ("kept", "parameters"),
+    [
+        (CPUCodeLibrary.add_ir_module, ["self", "ir_module"]),
+        (CPUCodeLibrary._optimize_final_module, ["self"]),
+        (CPUCodeLibrary._finalize_final_module, ["self"]),
+        (CPUContext.get_executable, ["self", "library", "fndesc", "env"]),
+        (unliteral, ["lit_type"]),
+    ],
+)
+def test_what_stays_is_called_as_it_was(kept: Callable[..., Any], parameters: list[str]) -> None:
+    assert list(inspect.signature(kept).parameters) == parameters, f"{kept.__qualname__}: {READ}"
+
+
+def test_a_function_is_compiled_for_its_callers_once_for_all_numbers_and_for_python_where_that_calls_it() -> None:
+    options = {**COMPILED, "cache": False}
+
+    @njit(**options)
+    def add(one: int, other: int) -> int:
+        return one + other
+
+    @njit(**options)
+    def calls(one: int) -> int:
+        return int(add(one, 1) + add(one, 2) + add(one, 3))
+
+    assert calls(1) == 9
+    assert len(add.called.signatures) == 1
+    assert not next(iter(add.called.overloads.values())).library._finalized
+    assert add.signatures == []
+    assert add(1, 2) == 3
+    assert calls.inspect_llvm(calls.signatures[0])
+
+
+CALLED = """
+from numba import njit
+from engine.kernels.compiled import COMPILED
+called = njit("int64(int64)", **COMPILED)(lambda x: 3 * x + 1)
+"""
+
+
+LOADS = """
+import sys; sys.path.insert(0, sys.argv[1])
+from called import called
+print(sum(called.stats.cache_hits.values()), called(2))
+"""
+
+
+def printed(code: str, *arguments: str, **environment: str) -> list[str]:
+    """The words that a program prints."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment}
+    done = subprocess.run([sys.executable, "-c", code, *arguments], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its_source_changed(
+    tmp_path: Path,
+) -> None:
+    """Of what is loaded only machine code was kept: it is compiled again for a caller that is compiled."""
+    places = [tmp_path / name / "engine" / "package" for name in ("first", "second")]
+    for place in places:
+        place.mkdir(parents=True)
+        (place / "called.py").write_text(CALLED)
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    code = LOADS + "from numba import njit; print(njit(lambda x: called(x) + called(x + 1))(4))"
+    assert [printed(code, str(place), **kept) for place in places] == [["0", "7", "29"], ["1", "7", "29"]]
+    (places[1] / "called.py").write_text(CALLED.replace("3 * x", "5 * x"))
+    assert printed(LOADS, str(places[1]), **kept) == ["0", "11"]
+
+
+def test_code_is_neither_optimised_nor_made_into_machine_code_where_text_alone_is_wanted() -> None:
+    code = (
+        "from engine.kernels.compiled import COMPILED\n"
+        "from engine.kernels.numba_internals import NOWHERE, write_code_alone\n"
+        "write_code_alone()\n"
+        "from numba import njit\n"
+        "f = njit('int64(int64)', no_cpython_wrapper=True, no_cfunc_wrapper=True)(lambda x: x + 1)\n"
+        "library = next(iter(f.overloads.values())).library\n"
+        "assert library.get_pointer_to_function('anything') == NOWHERE\n"
+        "assert not library._finalized\n"
+    )
+    assert set("".join(printed(code))) == {"."}
+
+
+# no folder but the temporary one can be written, as of a program in a read-only image without a home
+READ_ONLY = (
+    "import tempfile; from pathlib import Path; temporary = tempfile.TemporaryFile\n"
+    "def refused(*a, dir=None, **k):\n"
+    "    if str(dir).startswith(tempfile.gettempdir()): return temporary(*a, dir=dir, **k)\n"
+    "    raise OSError(dir)\n"
+    "tempfile.TemporaryFile = refused\n"
+    "from engine.kernels import cache; from engine.kernels.compiled import tanh\n"
+)
+REPORT = (
+    "place = cache.folder()\n"
+    "print(place, place and place.is_dir(), cache.is_whole(), cache.set_whole(), cache.is_whole(), round(tanh(9.5)),"
+    " place and len(list(place.rglob('*.nbc'))), flush=True)\n"
+)
+
+
+def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_the_compiler() -> None:
+    code = (
+        "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)\n"
+        "from engine.models._ssm_kernel import stream; from engine.truth._splitting_kernel import advance\n"
+        "print(all(str(cache.folder()) in f._cache.cache_path for f in (stream, advance)))"
+    )
+    assert printed(code) == ["False", "True"]
+
+
+def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> None:
+    code = "from engine.kernels import cache; from engine.kernels.compiled import config, tanh\n" + REPORT
+    found = printed(code + "print(config.CACHE_DIR)", NUMBA_CACHE_DIR=str(tmp_path))
+    assert found == [str(tmp_path), "True", "False", "None", "True", "1", "1", str(tmp_path)]
+
+
+def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody(tmp_path: Path) -> None:
+    """What a killed run left there goes at the next start."""
+    killed = printed(READ_ONLY + REPORT + "import os; os._exit(0)", TMPDIR=str(tmp_path))
+    assert killed[1:] == ["True", "False", "None", "True", "1", "1"]
+    assert Path(killed[0]).is_dir()
+    ended = printed(READ_ONLY + REPORT, TMPDIR=str(tmp_path))
+    assert ended[0] != killed[0] and ended[1:] == killed[1:]
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
+    code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
+    assert printed(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
+
+
+def test_every_kind_of_voice_and_compiled_model_runs() -> None:
+    warm.voices()
+    warm.models()
+
+
+Published = list[tuple[int, int]]
+
+
+def test_what_is_published_lies_between_two_fences() -> None:
+    """x86 keeps the order of writes by itself, so that only the code can be looked at."""
+    uncached = njit(**{**COMPILED, "cache": False})(publish.py_func)
+    uncached(np.zeros(4, np.int64), 2, 7)
+    (code,) = uncached.inspect_llvm().values()
+    function = re.search(r"^define [^@]*i32 @.*?^}", code, re.DOTALL | re.MULTILINE)
+    assert function is not None
+    steps = re.findall(r"^\s*(fence seq_cst|store i64 %arg\.whole)", function[0], re.MULTILINE)
+    assert steps == ["fence seq_cst", "store i64 %arg.whole", "fence seq_cst"]
+
+
+@pytest.fixture
+def published(monkeypatch: pytest.MonkeyPatch) -> Published:
+    """What is published, slot and number, while nothing of it is written."""
+    found: Published = []
+
+    def note(slots: np.ndarray, slot: int, whole: int) -> None:
+        found.append((slot, whole))
+
+    monkeypatch.setattr(memory_module, "publish", note)
+    return found
+
+
+def test_what_a_device_shall_see_is_published_when_it_is_there(published: Published) -> None:
+    """The numbers that show samples, voices, places and responses to its thread change in no other way."""
+    program = solver_program(resonator_of(StringParameters(), 4), RATE_HZ)
+    voice = Voice(program, PLUCK.displacement(program.grid_points), EAR)
+    rendered = Voice(plain_program(RATE_HZ), np.full(3, FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
+    rendered.append(np.full((100, 1), 0.25, np.float32))
+    mixer = Mixer(RATE_HZ)
+    mixer.add(voice, rendered)
+    voice.listen(Ear((0.2,)))
+    mixer.set_effects(Effects(room=Room(mix=0.5)))
+    assert published[:2] == [(slot(VOICE, "ready"), 100), (slot(MIXER, "pushed"), 2)]
+    last = [slot(VOICE, "next_weights"), slot(MIXER, "convolver"), slot(MIXER, "effects")]
+    assert [place for place, _ in published[2:]] == last  # a response after the convolver
+    assert (rendered.record["ready"], voice.record["next_weights"], mixer.record["pushed"]) == (0, 0, 0)
+    assert mixer.record["ring"][:2].tolist() == [voice.address, rendered.address]
