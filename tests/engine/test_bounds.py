@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from engine.values.string import Losses, Polarisations, StringParameters
 
 GOOD = np.random.default_rng(0).standard_normal((4000, 2))
 LOW = np.sin(np.arange(96_000) * 2 * np.pi * 8 / 48_000)[:, None] * np.hanning(96_000)[:, None]
+FIVE, FOUR = resonator_of(StringParameters(), 5), ModalState.at_rest(np.zeros((1, 4)))
 ROUND = {"length_m": 0.33, "width_m": 0.33}
 REFUSED: list[tuple[type, dict[str, Any], str]] = [
     *((StringParameters, {name: bad}, name) for name in ("length_m", "tension_n") for bad in (0.0, -1, math.nan)),
@@ -72,22 +74,23 @@ def test_a_value_out_of_its_bounds_is_refused_by_name(kind: type, values: dict[s
         kind(**values)
 
 
-def test_what_does_not_go_together_is_refused() -> None:
-    resonator = resonator_of(StringParameters(), 5)
-    for words, make in (
-        ("mode 1 is overdamped", lambda: resonator_of(StringParameters(damping_d1_kg_m_s=10.0), 3).eigenvalues()),
-        ("sample rate must be above 0", lambda: SplittingSolver(resonator, 0)),
-        ("silence", lambda: SplittingSolver(resonator, 16_000, silence=1.0)),
-        ("substeps must lie in 1 … 1024", lambda: SplittingSolver(resonator, 4_000, substeps=0)),
-        ("one shape", lambda: ModalState(np.zeros((1, 3)), np.zeros((1, 4)))),
-        ("5 modes, the state 4", lambda: SplittingSolver(resonator, 4_000).advance(still(4), 3)),
-    ):
-        with pytest.raises(ValueError, match=words):
-            make()
-
-
-def still(modes: int) -> ModalState[Any]:
-    return ModalState.at_rest(np.zeros((1, modes)))
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: resonator_of(StringParameters(damping_d1_kg_m_s=10.0), 3).eigenvalues(), "mode 1 is overdamped"),
+        (lambda: SplittingSolver(FIVE, 0), "sample rate must be above 0"),
+        (lambda: SplittingSolver(FIVE, 16_000, silence=1.0), "silence"),
+        (lambda: SplittingSolver(FIVE, 4_000, substeps=0), "substeps must lie in 1 … 1024"),
+        (lambda: ModalState(np.zeros((1, 3)), np.zeros((1, 4))), "one shape"),
+        (
+            lambda: SplittingSolver(FIVE, 4_000).advance(ModalState.at_rest(np.zeros((1, 4))), 3),
+            "5 modes, the state 4",
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused(make: Callable[[], Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        make()
 
 
 def test_every_shipped_preset_is_within_bounds() -> None:
@@ -96,14 +99,11 @@ def test_every_shipped_preset_is_within_bounds() -> None:
 
 @pytest.mark.parametrize("frequency_hz", [0.0, 100.0, 246.93, 20_000.0, 1e6])
 @pytest.mark.parametrize("change", [{}, {"second_moment_m4": 0}, {"length_m": 90}])
-def test_modes_below_counts_them(change: dict[str, float], frequency_hz: float) -> None:
+def test_modes_below_counts_them_and_costs_nothing(change: dict[str, float], frequency_hz: float) -> None:
     string = StringParameters(**change)
     count = string.modes_below(frequency_hz)
     omega = undamped_frequencies(string, count + 2)
-    assert int((omega < 2 * 3.141592653589793 * frequency_hz).sum()) == count
-
-
-def test_modes_below_costs_nothing_of_any_string() -> None:
-    """The table of all modes would take 15 TB here."""
+    assert int((omega < 2 * math.pi * frequency_hz).sum()) == count
+    # the table of all modes would take 15 TB here
     string = StringParameters(length_m=100.0, tension_n=1e-3, area_m2=1e-2, density_kg_m3=1e5, second_moment_m4=0)
     assert string.modes_below(1e9) > 10**12

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-import torch
 
 from engine.compare.partials import (
     Array,
@@ -97,9 +96,8 @@ def test_a_glide_is_reported_of_truth_and_prediction() -> None:
     assert found.glide_error_cents[0, 0, RESOLVED] == pytest.approx(predicted - true, rel=0.02)
     assert np.isnan(found.glide_cents[0, 1]).all()  # ten segments have no thirds of four
     assert np.isnan(found.glide_error_cents[0, 1]).all()
-    (row, *_) = found.by_mode(0)
-    assert row.glide_cents == found.glide_cents[0, 0, 0]
-    assert row.glide_error_cents == found.glide_error_cents[0, 0, 0]
+    row = found.by_mode(0)[0]
+    assert (row.glide_cents, row.glide_error_cents) == (found.glide_cents[0, 0, 0], found.glide_error_cents[0, 0, 0])
     assert found.weighted(0).glide_error_cents == pytest.approx(predicted - true, rel=0.02)
 
 
@@ -135,40 +133,30 @@ def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
 
 def test_blocks_join_to_the_whole() -> None:
     time_s, hz, sigma = ten_modes(1)
-    truth = partial(time_s, hz, sigma)
-    predicted = partial(time_s, 1.001 * hz, sigma).real
+    truth, predicted = partial(time_s, hz, sigma), partial(time_s, 1.001 * hz, sigma).real
     length = segment_frames(RATE_HZ, LINEAR_HZ[0])
-    blocks = [
-        track_partials(predicted[:, first : first + 7 * length], truth[:, first : first + 7 * length], length)
-        for first in range(0, 4000, 7 * length)
-    ]
+    parts = [slice(first, first + 7 * length) for first in range(0, 4000, 7 * length)]
+    joined = PartialTrack.join([track_partials(predicted[:, part], truth[:, part], length) for part in parts])
     whole = track_partials(predicted, truth, length)
-    joined = PartialTrack.join(blocks)
     assert np.array_equal(whole.match, joined.match)
     assert np.array_equal(whole.turn, joined.turn)
     trajectories = PartialErrors.join([errors(predicted, truth, (0, 1))] * 2)
     assert trajectories.cents.shape == (2, 1, 10)
 
 
-def test_the_phasors_of_the_linear_string_are_exact() -> None:
-    eigenvalues = resonator_of(STRING, 10).eigenvalues()
-    amplitude = np.linspace(1, 2, 10)
-    spacing_s = 1 / 16_000
-    expected = amplitude * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
+def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circles() -> None:
+    eigenvalues, spacing_s = resonator_of(STRING, 10).eigenvalues(), 1 / 16_000
+    expected = np.linspace(1, 2, 10) * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
     around = [(expected * np.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
     found = phasors(*around, spacing_s, resonator_of(STRING, 10, tension_modulated=False))
     assert np.allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_the_phasors_of_a_tense_string_are_circles() -> None:
-    """One mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest."""
-    state = ModalState.at_rest(torch.tensor([[0.0137]]))
-    assert resonator_of(STRING, 1).relative_tension_rise(state.amplitude.numpy()) == pytest.approx(0.05, abs=0.01)
-    samples = SplittingSolver(resonator_of(STRING, 1), 16_000).solve(state, 4000).numpy()
-    around = (samples[:, :-2], samples[:, 1:-1], samples[:, 2:])
-    roundness = []
+    # one mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest
+    state = ModalState.at_rest(np.array([[0.0137]]))
+    assert resonator_of(STRING, 1).relative_tension_rise(state.amplitude) == pytest.approx(0.05, abs=0.01)
+    samples = SplittingSolver(resonator_of(STRING, 1), 16_000).solve(state, 4000)
+    around, roundness = [samples[:, :-2], samples[:, 1:-1], samples[:, 2:]], []
     for modulated in (True, False):
-        z = phasors(*around, 1 / 16_000, resonator_of(STRING, 1, tension_modulated=modulated))
+        z = phasors(*around, spacing_s, resonator_of(STRING, 1, tension_modulated=modulated))
         roundness.append(float(np.linalg.norm(z.imag) / np.linalg.norm(z.real)))
     assert roundness[0] == pytest.approx(1, abs=0.002)
     assert roundness[1] > 1.01

@@ -34,7 +34,6 @@ LINEAR = Physics(resonator_of(StringParameters(), MODES, tension_modulated=False
 REFERENCES = Path(__file__).parent / "references"
 
 Model = StringModel[Any]
-Arrays = dict[str, Tensor]
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class ModelLaws:
         linear: the error of each start that knows the string at rest, on that string.
         too_small: sizes that a start with knowledge refuses, and its words.
         unused: parameters that no frame depends on.
-        reference: the error against the vector in `references`, of a model of `reference_sizes`.
+        reference: the error against the authors' code, whose weights and output `references` has by our names.
         stable: whether no value of a weight brings an eigenvalue out of the unit circle.
     """
 
@@ -85,10 +84,6 @@ class ModelLaws:
     reference: ClassVar[float | None] = None
     reference_sizes: ClassVar[dict[str, Any]] = {}
     stable: ClassVar[bool] = True
-
-    def weights(self, arrays: Arrays) -> Arrays:
-        """The model's weights by their names, from those of the reference."""
-        raise NotImplementedError
 
     def stir(self, model: Any, generator: torch.Generator) -> None:
         """Give a model that starts from its source weights with which it uses all it has."""
@@ -107,14 +102,6 @@ class ModelLaws:
         self.stir(model, torch.Generator().manual_seed(5))
         return model
 
-    def of_the_reference(self) -> tuple[Any, Tensor, Tensor]:
-        """A model with the reference's weights, its input and its output."""
-        arrays = {name: torch.from_numpy(array) for name, array in np.load(REFERENCES / f"{self.name}.npz").items()}
-        expected = arrays["output_trajectory"]
-        model = build_model(self.name, self.reference_sizes).to(expected.dtype).eval()
-        model.load_state_dict(model.state_dict() | self.weights(arrays))
-        return model, arrays["input_displacement"], expected
-
     @pytest.fixture(scope="class")
     @classmethod
     def motion(cls, request: pytest.FixtureRequest) -> Motion:
@@ -132,7 +119,10 @@ class ModelLaws:
     def test_it_is_the_reference_vector_on_both_routes(self) -> None:
         if self.reference is None:
             pytest.skip("its source has none")
-        model, start, expected = self.of_the_reference()
+        arrays = {name: torch.from_numpy(array) for name, array in np.load(REFERENCES / f"{self.name}.npz").items()}
+        start, expected = arrays.pop("input_displacement"), arrays.pop("output_trajectory")
+        model = build_model(self.name, self.reference_sizes).to(expected.dtype).eval()
+        model.load_state_dict(model.state_dict() | arrays)
         with torch.enable_grad():
             trained = model(start, expected.shape[1])
         assert trained.requires_grad

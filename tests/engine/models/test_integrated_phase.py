@@ -11,14 +11,13 @@ import torch
 from torch import Tensor
 
 from engine.models._averaging import FIXED_POINT_STEPS
-from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import GAIN_LIMIT, IntegratedPhase
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
-from tests.engine.models.laws import POINTS, ModelLaws, Motion, relative, released
+from tests.engine.models.laws import PHYSICS, POINTS, ModelLaws, Motion, relative, released
 from tests.engine.tensors import draw, listening_weights, to_grid, to_modes
 
 RESONATOR = resonator_of(StringParameters(), 10)
@@ -40,15 +39,11 @@ class TestIntegratedPhase(ModelLaws):
 
     def stir(self, model: Any, generator: torch.Generator) -> None:
         """Every last layer and the real part of K are away from zero."""
-        model.initialise("averaging", self.physics(), generator)
+        model.initialise("averaging", PHYSICS, generator)
         for name, parameter in model.named_parameters():
             if not parameter.any() and name != "K":
                 parameter.normal_(0, 0.1, generator=generator)
         model.K[:12].normal_(0, 0.02, generator=generator)
-
-    @staticmethod
-    def physics() -> Physics:
-        return Physics(resonator_of(StringParameters(), 10, grid_points=POINTS), 4_000, 1e-3)
 
     @torch.no_grad()
     @pytest.mark.parametrize("sizes", variants, ids=str)
@@ -152,14 +147,6 @@ def averaged(how: str = "averaging", rate_hz: int = 4_000, adiabatic: bool = Fal
     model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10, adiabatic=adiabatic))
     model.initialise(how, Physics(RESONATOR, rate_hz, 1e-3), torch.Generator().manual_seed(0))
     return model
-
-
-@torch.no_grad()
-def test_integration_is_exact_for_parabolas() -> None:
-    half_nodes, times = torch.arange(7).double() / 2, torch.tensor([0, 0.3, 1, 1.5, 2.9, 3]).double()
-    integral, slope = integrate_parabolas((1 + 2 * half_nodes - 3 * half_nodes**2)[None, :, None], times)
-    torch.testing.assert_close(integral[0, :, 0], times + times**2 - times**3)
-    torch.testing.assert_close(slope[0, :, 0], 1 + 2 * times - 3 * times**2)
 
 
 @torch.no_grad()

@@ -9,16 +9,7 @@ import torch
 from torch import Tensor
 
 from engine.models.koopman import SHARPEST
-from tests.engine.models.laws import MODES, PHYSICS, Arrays, ModelLaws, released
-
-
-def layer(arrays: Arrays, ours: str, theirs: str) -> Arrays:
-    """A dense layer's weights."""
-    return {f"{ours}.weight": arrays[f"params/{theirs}/kernel"].T, f"{ours}.bias": arrays[f"params/{theirs}/bias"]}
-
-
-def eigenvalues(arrays: Arrays) -> Arrays:
-    return {name: arrays[f"params/dynamics/{name}"] for name in ("nu_log", "theta_log")}
+from tests.engine.models.laws import MODES, PHYSICS, ModelLaws, released
 
 
 class TestKoopman(ModelLaws):
@@ -36,12 +27,6 @@ class TestKoopman(ModelLaws):
         "decoder_widths": (7, 7),
         "mixing_layer": False,
     }
-
-    def weights(self, arrays: Arrays) -> Arrays:
-        parts = [
-            layer(arrays, f"{part}.{2 * i}", f"{part}/Dense_{i}") for part in ("encoder", "decoder") for i in range(3)
-        ]
-        return {name: array for part in (eigenvalues(arrays), *parts) for name, array in part.items()}
 
     @torch.no_grad()
     def test_it_is_its_equations(self) -> None:
@@ -82,8 +67,3 @@ class TestKoopmanVar(ModelLaws):
     too_small: ClassVar = ({"state_size": 5}, "at least the 10 modes, not 5")
     reference = 1e-12
     reference_sizes: ClassVar = {"grid_points": 11, "state_size": 8, "multiplier_widths": (7, 7, 7)}
-
-    def weights(self, arrays: Arrays) -> Arrays:
-        parts = [layer(arrays, part, part) for part in ("encoder", "decoder")]
-        parts += [layer(arrays, f"multiplier.{2 * i}", f"dynamics/model/Dense_{i}") for i in range(4)]
-        return {name: array for part in (eigenvalues(arrays), *parts) for name, array in part.items()}

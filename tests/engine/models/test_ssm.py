@@ -11,43 +11,15 @@ from torch import Tensor
 from engine.models._ssm_kernel import stream
 from engine.models.s5 import S5Layer, hippo_normal
 from engine.models.ssm import GatedBlock, evolve, recur
-from tests.engine.models.laws import Arrays, ModelLaws, relative, released
+from tests.engine.models.laws import ModelLaws, relative, released
 
 
 class StateSpaceLaws(ModelLaws):
-    """Laws of both; `stored` names a layer's weights."""
+    """Laws of both."""
 
     linear: ClassVar = {"physics": 2e-3}
     unused = frozenset({"first_layer.D"})  # as in the source: counted, not used
     reference = 1e-13
-    stored: tuple[str, ...]
-
-    def layer_weights(self, arrays: Arrays) -> Arrays:
-        """Those of a layer by our names, from theirs."""
-        raise NotImplementedError
-
-    def weights(self, arrays: Arrays) -> Arrays:
-        found = {}
-        for ours, theirs in (
-            ("first_layer", "first_layer"),
-            ("layers.0.seq", "layers_0/seq"),
-            ("layers.1.seq", "layers_1/seq"),
-        ):
-            stored = self.layer_weights({name: arrays[f"params/{theirs}/{name}"] for name in self.stored})
-            found |= {f"{ours}.{name}": array for name, array in stored.items()}
-        for number in range(2):
-            theirs = f"layers_{number}"
-            dense = [f"params/{theirs}/out{each}" for each in (1, 2)]
-            block = {
-                "gate.weight": torch.cat([arrays[f"{name}/kernel"].T for name in dense]),
-                "gate.bias": torch.cat([arrays[f"{name}/bias"] for name in dense]),
-                "normalization.weight": arrays[f"params/{theirs}/normalization/scale"],
-                "normalization.bias": arrays[f"params/{theirs}/normalization/bias"],
-                "normalization.running_mean": arrays[f"batch_stats/{theirs}/normalization/mean"],
-                "normalization.running_var": arrays[f"batch_stats/{theirs}/normalization/var"],
-            }
-            found |= {f"layers.{number}.{name}": array for name, array in block.items()}
-        return found
 
     def stir(self, model: Any, generator: torch.Generator) -> None:
         for block in model.layers:
@@ -87,13 +59,6 @@ class TestLRU(StateSpaceLaws):
     sizes: ClassVar = {"state_size": 24, "layers": 3}
     too_small: ClassVar = ({"state_size": 8}, "each of the 10 modes")
     reference_sizes: ClassVar = {"grid_points": 11, "state_size": 8, "layers": 2}
-    stored = ("B_re", "B_im", "C_re", "C_im", "D", "nu_log", "theta_log", "gamma_log")
-
-    def layer_weights(self, arrays: Arrays) -> Arrays:
-        stacked = {name: array for name, array in arrays.items() if name[0] not in "BC"}
-        for matrix, axis in (("B", 1), ("C", -1)):
-            stacked[matrix] = torch.stack([arrays[f"{matrix}_{part}"] for part in ("re", "im")], axis)
-        return stacked
 
     @torch.no_grad()
     def test_its_papers_start_lies_in_the_ring_with_its_gamma(self) -> None:
@@ -110,10 +75,6 @@ class TestS5(StateSpaceLaws):
     too_small: ClassVar = ({"state_size": 16}, "each of the 10 modes")
     reference_sizes: ClassVar = {"grid_points": 11, "state_size": 16, "hippo_blocks": 1, "layers": 2}
     stable = False
-    stored = ("B", "C", "D", "Lambda_re", "Lambda_im", "log_step")
-
-    def layer_weights(self, arrays: Arrays) -> Arrays:
-        return arrays | {"B": arrays["B"].mT}
 
     @torch.no_grad()
     def test_its_papers_start_is_hippo_in_blocks_with_steps_in_range(self) -> None:

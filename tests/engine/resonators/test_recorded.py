@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,29 +34,20 @@ def recorded() -> RecordedString:
     )
 
 
-def test_at_its_pitch_the_notes_own_modes() -> None:
+def test_at_its_pitch_it_has_the_notes_own_modes_far_away_the_law_and_the_smooth_decay() -> None:
     resonator, law = recorded().resonator(STRING, 6), resonator_of(STRING, 3)
     cents = 1200 * np.log2(resonator.omega / np.repeat(law.omega, 2))
     assert np.allclose(cents, [5, 6, -3, -1, 2, 5], atol=1e-6)
     assert np.allclose(resonator.sigma / np.repeat(law.sigma, 2), [1, 2, 4, 4, 2, 1])
-
-
-def test_other_keys_have_the_decays_of_the_notes_partials_at_their_frequencies() -> None:
+    # an octave below, partials 2 and 4 lie at the note's first and second
     octave = replace(STRING, length_m=STRING.length_m * 2)
-    resonator, law = recorded().resonator(octave, 8), resonator_of(octave, 4)
-    ratios = resonator.sigma / np.repeat(law.sigma, 2)
-    fade = np.exp(-((12 / FADES_SEMITONES) ** 2))
-    assert fade < 1e-4
-    # partials 2 and 4 lie at the note's first and second
+    ratios = recorded().resonator(octave, 8).sigma / np.repeat(resonator_of(octave, 4).sigma, 2)
+    assert np.exp(-((12 / FADES_SEMITONES) ** 2)) < 1e-4
     assert np.allclose(ratios[[2, 3, 6, 7]], [1, 2, 4, 4], rtol=1e-4)
-
-
-def test_two_octaves_away_the_smooth_decay_alone() -> None:
     far = replace(STRING, length_m=STRING.length_m / 4)
     resonator, law = recorded().resonator(far, 6), resonator_of(far, 3)
-    first = slice(0, None, 2)
-    assert np.allclose(resonator.omega[first], law.omega, rtol=1e-9)
-    assert np.allclose(resonator.sigma[first], 2 * law.sigma, rtol=1e-6)
+    assert np.allclose(resonator.omega[::2], law.omega, rtol=1e-9)
+    assert np.allclose(resonator.sigma[::2], 2 * law.sigma, rtol=1e-6)
 
 
 def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
@@ -100,28 +92,30 @@ def test_at_another_rate_it_is_the_same_sound_without_what_lies_above_half_of_it
     assert np.abs(low).max() > 1 and np.abs(note(5).sound()[::4] - low).max() > 1
 
 
-def test_it_is_written_and_read_and_checked() -> None:
-    assert read(RecordedString, write(recorded()), "metadata") == recorded()
-    for field, value in (
-        ("pitch_hz", -1.0),
-        ("cents", (1.0,)),
-        ("smooth_hz", (5_000.0, 200.0)),
-        ("ratio", (1, 1, 99)),
-    ):
-        with pytest.raises(SchemaError):
-            read(RecordedString, write(recorded()) | {field: value}, "metadata")
+SAMPLES = np.random.default_rng(0).standard_normal(2_500)
+ATTACK = RecordedAttack.of(SAMPLES, 48_000)
+
+
+def test_it_is_written_and_read_and_an_attack_is_kept_whole() -> None:
+    assert [len(row) for row in ATTACK.rows] == [1_000, 1_000, 500]
+    assert np.corrcoef(ATTACK.samples, SAMPLES)[0, 1] > 0.9999
+    assert np.sum(ATTACK.samples**2) / 48_000 == pytest.approx(1)
+    for own in (recorded(), replace(recorded(), attack=ATTACK)):
+        assert read(RecordedString, write(own), "metadata") == own
+
+
+@pytest.mark.parametrize(
+    ("good", "field", "value"),
+    [
+        (recorded(), "pitch_hz", -1.0),
+        (recorded(), "cents", (1.0,)),
+        (recorded(), "smooth_hz", (5_000.0, 200.0)),
+        (recorded(), "ratio", (1, 1, 99)),
+        (NOTE, "begins", 99_999_999),
+        (ATTACK, "rate_hz", 10),
+        *((ATTACK, "rows", rows) for rows in ([[0, 0]], [[99_999]], [[1] * 1_000] * 10)),
+    ],
+)
+def test_what_is_no_recorded_string_is_refused(good: Any, field: str, value: Any) -> None:
     with pytest.raises(SchemaError):
-        read(RecordedNote, write(NOTE) | {"begins": 99_999_999}, "metadata")
-
-
-def test_an_attack_is_kept_whole_and_checked() -> None:
-    samples = np.random.default_rng(0).standard_normal(2_500)
-    attack = RecordedAttack.of(samples, 48_000)
-    assert [len(row) for row in attack.rows] == [1_000, 1_000, 500]
-    own = replace(recorded(), attack=attack)
-    assert read(RecordedString, write(own), "metadata") == own
-    assert np.corrcoef(attack.samples, samples)[0, 1] > 0.9999
-    assert np.sum(attack.samples**2) / 48_000 == pytest.approx(1)
-    for field, value in (("rate_hz", 10), ("rows", [[0, 0]]), ("rows", [[99_999]]), ("rows", [[1] * 1_000] * 10)):
-        with pytest.raises(SchemaError):
-            read(RecordedAttack, write(attack) | {field: value}, "metadata")
+        read(type(good), write(good) | {field: value}, "metadata")
