@@ -1,7 +1,5 @@
 """A copy of the small preset that a test may damage, its model, and the laws of motion of each variant."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

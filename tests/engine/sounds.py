@@ -1,23 +1,16 @@
 """Shipped presets, voices, what they sound like, and errors, for tests of kernels, voices and effects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
 
 from engine.effects import Effects
-from engine.kernels.amplifier import amplify, drive
-from engine.kernels.constants import QUANTUM
-from engine.kernels.mixer_records import MIXER
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, Preset, PresetInfo, load_preset
 from engine.resonators.sine_transform import project
 from engine.values.ear import Ear
-from engine.values.effects import Amp
 from engine.voices import Mixer, Program, Voice, model_program, plain_program
 
 RATE_HZ = 48_000
@@ -40,7 +33,7 @@ def program_of(name: str, rate_hz: int) -> Program:
     return model_program(shipped(name), rate_hz)
 
 
-def small_info(tension_modulated: bool) -> PresetInfo:
+def small(tension_modulated: bool) -> PresetInfo:
     """A string of six modes at 4 kHz, tension-modulated or linear."""
     plain = replace(shipped(KNOWING).info, model="dmd", model_configuration={}, modes=6, grid_points=41)
     return replace(plain, tension_modulated=tension_modulated)
@@ -92,27 +85,16 @@ def faded(frames: int) -> Signal:
     return np.asarray(share**2 * (3 - 2 * share))
 
 
-def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> Signal:
-    """Sound (frames, 1 or 2) through effects, by SciPy: its first frames, as many, (frames, 2)."""
-    stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
-    if effects is not None and effects.amp is not None and effects.amp.drive_db:
-        stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
-    if effects is None or not effects.rings:
-        return stereo
-    return np.asarray(oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)])
+def wet(samples: Samples, gain: float = 1.0, rate_hz: int = RATE_HZ) -> Voice:
+    """A voice that sounds through the effects."""
+    voice = voice_of(samples, gain, rate_hz)
+    voice.sound_through_effects()
+    return voice
 
 
-def amplified(amp: Amp, sound: Signal, rate_hz: int, level_db: float = 0.0) -> Signal:
-    """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
-    mixer = np.zeros(1, MIXER)[0]
-    mix = mixer["mix"]
-    mixer["rate_hz"] = rate_hz
-    drive(mixer, float(amp.drive_db), float(amp.tone_db), float(level_db))
-    blocks = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
-    blocks[: len(sound)] = sound
-    for first in range(0, len(blocks), QUANTUM):
-        mix[:] = blocks[first : first + QUANTUM]
-        amplify(mixer)
-        blocks[first : first + QUANTUM] = mix
-        mixer["frames"] += QUANTUM
-    return blocks[: len(sound)]
+def through(effects: Effects | None, samples: Samples, rate_hz: int = RATE_HZ) -> Samples:
+    """Samples as they sound through the effects of a mixer: as many."""
+    mixer = Mixer(rate_hz, limited=False)
+    mixer.set_effects(effects)
+    mixer.add(wet(samples, rate_hz=rate_hz))
+    return mixer.render(len(samples))

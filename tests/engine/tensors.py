@@ -1,7 +1,5 @@
 """The engine's NumPy functions on tensors, for tests of models and solvers; results have the tensor's own type."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

@@ -1,7 +1,5 @@
 """Values out of their bounds are refused by name, and large numbers cost nothing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -10,9 +8,7 @@ import numpy as np
 import pytest
 
 from engine.effects import Body, Impulse
-from engine.models.base import Physics
 from engine.pluck import Pluck
-from engine.presets import preset_files, read_info
 from engine.resonators.string import resonator_of, undamped_frequencies
 from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
@@ -21,6 +17,12 @@ from engine.values.string import Losses, Polarisations, StringParameters
 
 GOOD = np.random.default_rng(0).standard_normal((4000, 2))
 LOW = np.sin(np.arange(96_000) * 2 * np.pi * 8 / 48_000)[:, None] * np.hanning(96_000)[:, None]
+
+
+def with_one(value: float) -> np.ndarray:
+    return np.where(np.arange(4000)[:, None] == 1234, value, GOOD)
+
+
 FIVE, FOUR = resonator_of(StringParameters(), 5), ModalState.at_rest(np.zeros((1, 4)))
 ROUND = {"length_m": 0.33, "width_m": 0.33}
 REFUSED: list[tuple[type, dict[str, Any], str]] = [
@@ -44,20 +46,14 @@ REFUSED: list[tuple[type, dict[str, Any], str]] = [
     (Body, {"size": 0.1}, "size"),
     (Body, {"name": "lute"}, "guitar"),
     *((Impulse, {"samples": GOOD, "rate_hz": bad}, "rate") for bad in (4_000, 10**9)),
-    *(
-        (Impulse, {"samples": samples, "rate_hz": 48_000}, words)
-        for samples, words in (
-            (GOOD[:, :1].repeat(3, 1), "channels"),
-            (GOOD[:, :0], "channels"),
-            (GOOD[:, 0], "dimensions"),
-            (GOOD.repeat(37, 0), "length"),
-            (GOOD[:0], "silent"),
-            (1e-9 * GOOD, "silent"),
-            *((np.where(np.arange(4000)[:, None] == 1234, bad, GOOD), "no numbers") for bad in (np.nan, -np.inf)),
-            (np.where(np.arange(4000)[:, None] == 1234, 1e300, GOOD), "largest sample"),
-            (LOW, "80"),
-        )
-    ),
+    *((Impulse, {"samples": with_one(bad), "rate_hz": 48_000}, "no numbers") for bad in (math.nan, -math.inf)),
+    (Impulse, {"samples": with_one(1e300), "rate_hz": 48_000}, "largest sample"),
+    (Impulse, {"samples": GOOD[:, :1].repeat(3, 1), "rate_hz": 48_000}, "channels"),
+    (Impulse, {"samples": GOOD[:, :0], "rate_hz": 48_000}, "channels"),
+    (Impulse, {"samples": GOOD[:, 0], "rate_hz": 48_000}, "dimensions"),
+    (Impulse, {"samples": GOOD.repeat(37, 0), "rate_hz": 48_000}, "length"),
+    *((Impulse, {"samples": each, "rate_hz": 48_000}, "silent") for each in (GOOD[:0], 1e-9 * GOOD)),
+    (Impulse, {"samples": LOW, "rate_hz": 48_000}, "80"),
     (DrumParameters, {"thickness_m": -1.0}, "thickness_m must lie in"),
     (DrumParameters, {"tension_n_m": 1e9}, "tension_n_m must lie in"),
     (DrumParameters, {**ROUND, "width_m": 0.2}, "two diameters, nearly the same"),
@@ -91,10 +87,6 @@ def test_a_value_out_of_its_bounds_is_refused_by_name(kind: type, values: dict[s
 def test_what_does_not_go_together_is_refused(make: Callable[[], Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         make()
-
-
-def test_every_shipped_preset_is_within_bounds() -> None:
-    assert all(Physics(read_info(path).resonator, 1.0).modes > 0 for path in preset_files())
 
 
 @pytest.mark.parametrize("frequency_hz", [0.0, 100.0, 246.93, 20_000.0, 1e6])

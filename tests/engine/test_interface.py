@@ -1,14 +1,24 @@
-"""What a notebook uses: README's example runs, and the names that `engine` lists are there."""
+"""What a notebook uses: README's example, the names of `engine`, and model and truth behind one face, in metres."""
 
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import soundfile
+import torch
 
 import engine
+from engine.models.koopman_var import KoopmanVar
+from engine.pluck import Pluck
+from engine.presets import Preset, load_preset, of_string
+from engine.resonators.sine_transform import listening_weights
+from engine.sources import ModelSource, Runaway, StringSource, TruthSource
+from engine.values.string import StringParameters
+from tests.engine.sounds import initial_m, shipped
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,16 +35,82 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert 0.01 < abs(sound).max() <= 1
 
 
-def test_every_name_is_there() -> None:
+def test_every_name_is_there_and_the_engine_itself_loads_nothing_nor_effects_a_compiler() -> None:
     for name in engine.__all__:
         assert getattr(engine, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         engine.nothing  # noqa: B018
+    for module, unloaded in (("engine", {"torch", "numpy", "numba"}), ("engine.effects", {"torch", "numba"})):
+        code = f"import sys, {module}; assert not {unloaded} & set(sys.modules)"
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
-@pytest.mark.parametrize(
-    ("module", "unloaded"), [("engine", {"torch", "numpy", "numba"}), ("engine.effects", {"torch", "numba"})]
-)
-def test_the_engine_itself_loads_nothing_and_effects_no_compiler(module: str, unloaded: set[str]) -> None:
-    code = f"import sys, {module}; assert not {unloaded} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
+
+
+def any_string() -> Preset:
+    return of_string(shipped("studio_any_string"), STEEL, 16_000)
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_blocks_chain_and_listening_is_the_grid_there(small_preset: Path, kind: str) -> None:
+    preset, weights = load_preset(small_preset), listening_weights(np.array([0.37]), 101)
+    source: StringSource = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
+    initial = initial_m(preset.info, Pluck(0.4, 3.0))[None]
+    whole, _ = source.advance(source.start(initial), 300)
+    state, heard = source.start(initial), []
+    for steps in (1, 64, 235):
+        block, state = source.advance(state, steps, weights)
+        heard.append(block)
+    assert state.frame == 300
+    assert source.advance(source.start(initial[:0]), 8)[0].shape == (0, 8, 101)
+    with pytest.raises(ValueError, match=r"must have shape \(batch, 101\), not \(1, 50\)"):
+        source.start(np.zeros((1, 50)))
+    atol = 1e-5 * float(np.abs(whole).max())
+    np.testing.assert_allclose(np.concatenate(heard, 1), whole @ weights, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("factor", [float("nan"), 1e9])
+def test_runaway_output_is_detected_with_its_time(
+    small_preset: Path, factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    preset = load_preset(small_preset)
+    assert isinstance(preset.model, KoopmanVar)
+    decode = preset.model.decode
+
+    def faulty(latents: torch.Tensor, readout: torch.Tensor | None = None) -> torch.Tensor:
+        frames = decode(latents, readout)
+        frames[:, 30:] *= factor
+        return frames
+
+    monkeypatch.setattr(preset.model, "decode", faulty)
+    source = ModelSource(preset)
+    state = source.start(initial_m(preset.info, Pluck())[None])
+    with pytest.raises(Runaway, match=r"diverges 0\.008 s after the pluck") as caught:
+        source.advance(state, 64)
+    assert caught.value.time_s == pytest.approx(31 / 4_000)
+
+
+def test_a_model_of_many_strings_moves_in_numpy_as_in_torch() -> None:
+    preset = any_string()
+    plucks = [Pluck(0.17, 1.0), Pluck(0.3, 12.0, "triangular"), Pluck(0.03, 12.0, width=0.03)]
+    initial = np.stack([initial_m(preset.info, pluck) for pluck in plucks])
+    source, frames = ModelSource(preset), np.arange(3, 2_401, 3)
+    found, state = source.sample(source.start(initial), frames, 2_400)
+    assert len(np.unique(state.inner.nodes)) > 1  # soft and hard plucks step differently
+    following, _ = source.advance(state, 100)
+    with torch.inference_mode():
+        released = torch.from_numpy(initial / preset.info.scale_m).float()
+        expected = preset.model(released, 2_500).numpy() * preset.info.scale_m
+    atol = 1e-9 * np.abs(expected).max()
+    np.testing.assert_allclose(found, expected[:, frames - 1], rtol=0, atol=atol)
+    np.testing.assert_allclose(following, expected[:, 2_400:], rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("size", [1e3, 1e308])
+def test_a_model_of_many_strings_stays_bounded_for_wild_weights(size: float) -> None:
+    preset = any_string()
+    wild = size * np.random.default_rng(0).choice([-1.0, 1.0], (3, len(preset.weights["A"])))
+    source = ModelSource(replace(preset, weights={**preset.weights, **dict(zip("Arp", wild, strict=True))}))
+    found, _ = source.advance(source.start(initial_m(preset.info, Pluck(0.3, 8.0))[None]), 500)
+    assert np.isfinite(found).all()

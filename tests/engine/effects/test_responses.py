@@ -1,16 +1,15 @@
-"""Impulse responses of kernels against NumPy, a plug-in's against the app's; loudness and peak in closed form."""
-
-from __future__ import annotations
+"""Responses of bodies and rooms, their kernels against NumPy, a plug-in's; loudness and peak in closed form."""
 
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+from scipy.signal import butter, fftconvolve, sosfiltfilt
 
 from engine.effects import Body, Effects, Impulse, responses
-from engine.effects.body import body_memory, curves_of
+from engine.effects.body import body_memory, curves_of, modes_of
+from engine.effects.body_table import BODIES
 from engine.effects.responses import partitioned
 from engine.effects.room import room_noise, room_response
 from engine.kernels import constants as of
@@ -92,45 +91,116 @@ def test_sounds_are_as_they_were(name: str) -> None:
     elif kind == "body":
         found = Body(1.0, float(values[1]), values[0]).response(int(values[2]))
     else:
-        samples = noise(5_000) * np.exp(-np.arange(5_000) / 900)[:, None]
-        found = Body(1.0, float(values[0]), impulse=Impulse(samples, 44_100)).response(int(values[1]))
+        impulse = Impulse(decaying(5_000, 2, 900), 44_100)
+        found = Body(1.0, float(values[0]), impulse=impulse).response(int(values[1]))
     waves = np.cos(0.01 * np.arange(len(found)))[:, None]
     np.testing.assert_allclose([(found * waves).sum(), np.abs(found).max()], FROZEN[name], rtol=1e-10)
 
 
-def body_record(kind: str) -> tuple[Array, Body | None]:
-    body = {
-        "none": None,
-        "guitar": Body(),
-        "mono": Body(impulse=Impulse(noise(4_001, 1) * np.exp(-np.arange(4_001) / 700)[:, None], 44_100)),
-        "stereo": Body(impulse=Impulse(noise(9_000) * np.exp(-np.arange(9_000) / 700)[:, None], 96_000)),
-    }[kind]
-    return body_memory(body), body
+def spectrum(body: Body, rate_hz: int) -> tuple[Array, Array]:
+    """Frequencies in Hz, and how strongly the body alone answers."""
+    size = 2 * rate_hz
+    found = np.abs(np.fft.rfft(body.response(rate_hz)[:, 0], size))
+    return np.fft.rfftfreq(size, 1 / rate_hz), found
 
 
-@pytest.mark.parametrize("kind", ["none", "guitar", "mono", "stereo"])
+@pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000])
+@pytest.mark.parametrize("size", [0.5, 1.0, 1.6])
+def test_the_lowest_modes_are_at_their_frequencies(size: float, rate_hz: int) -> None:
+    frequency_hz, found = spectrum(Body(size=size), rate_hz)
+    for mode in BODIES["guitar"].lowest[:2]:  # the strong ones, alone in their range
+        expected_hz = mode.frequency_hz / size
+        near = (frequency_hz > 0.85 * expected_hz) & (frequency_hz < 1.15 * expected_hz)
+        assert frequency_hz[near][found[near].argmax()] == pytest.approx(expected_hz, rel=0.01)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_each_body_has_its_modes_rings_out_and_names_its_sources(name: str) -> None:
+    wood = BODIES[name]
+    lowest_hz = [mode.frequency_hz for mode in wood.lowest]
+    assert lowest_hz == sorted(lowest_hz) and len(lowest_hz) >= 4
+    assert len(wood.sources) > 40 and wood.title
+    modes = modes_of(wood)
+    frequency_hz, decay = modes[:2, modes[0] < 20_000.0]
+    assert (np.diff(frequency_hz) >= 0).all() and 0.5 < frequency_hz[-1] / 20_000 <= 1
+    assert len(frequency_hz) < 1_500
+    found = Body(name=name).response(48_000)
+    assert found.shape[1] == 2 and np.isfinite(found).all()
+    assert np.abs(found[-480:]).max() < 3e-3 * np.abs(found).max()
+    assert np.exp(-decay[: len(lowest_hz)] * wood.seconds).max() < 0.05  # what is cut is faint
+
+
+def test_an_impulse_of_ones_own_sounds_in_its_place_and_at_its_size() -> None:
+    time_s = np.arange(22_050) / 44_100
+    rung = np.exp(-20 * time_s) * np.sin(2 * np.pi * 300 * time_s)
+    own = Impulse(np.stack([rung, rung], 1), 44_100)
+    for size in (1.0, 1.5):
+        frequency_hz, found = spectrum(Body(size=size, impulse=own), 48_000)
+        assert frequency_hz[found.argmax()] == pytest.approx(300 / size, abs=1)
+        assert Body(size=size, impulse=own).response(48_000).shape == (round(24_000 * size), 2)
+    long = Impulse(np.random.default_rng(0).standard_normal((2 * 48_000, 1)), 48_000)
+    found = Body(size=2.0, impulse=long).response(48_000)  # it is stretched too long, and faded out
+    assert len(found) == 3 * 48_000 and abs(found[-1, 0]) < 1e-12
+
+
+def t60_s(response: Array, band_hz: tuple[float, float], rate_hz: int) -> float:
+    """Schroeder's backward integral, from -5 to -35 dB."""
+    heard = sosfiltfilt(butter(4, band_hz, "bandpass", fs=rate_hz, output="sos"), response)
+    left = np.cumsum(heard[::-1] ** 2)[::-1]
+    level_db = 10 * np.log10(left / left[0])
+    first, last = (int(np.argmax(level_db < level)) for level in (-5, -35))
+    return 2 * (last - first) / rate_hz
+
+
+@pytest.mark.parametrize("wanted_s", [0.3, 0.8, 1.5, 3.0])
+def test_it_rings_as_long_as_asked_and_shorter_where_it_is_high(wanted_s: float) -> None:
+    for side in room_response(wanted_s, 48_000).T:
+        middle_s = t60_s(side, (400.0, 630.0), 48_000)
+        assert middle_s == pytest.approx(wanted_s, rel=0.12)
+        assert t60_s(side, (7_000.0, 9_000.0), 48_000) == pytest.approx(0.4 * wanted_s, rel=0.2)
+        assert t60_s(side, (1_700.0, 2_300.0), 48_000) < middle_s
+
+
+def test_reflections_come_after_the_direct_sound_that_is_not_in_it() -> None:
+    found = np.abs(room_response(0.8, 48_000))
+    assert found[: round(0.002 * 48_000)].max() < 0.02 * found.max()
+    assert found[: round(0.02 * 48_000)].max() > 0.5 * found.max()
+    left, right = room_response(1.0, 48_000)[2_400:].T
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.1  # it is wide
+
+
+def decaying(frames: int, channels: int, time: int = 700) -> Array:
+    return noise(frames, channels) * np.exp(-np.arange(frames) / time)[:, None]
+
+
+PLUG_IN_BODIES = {
+    "none": None,
+    "guitar": Body(),
+    "mono": Body(impulse=Impulse(decaying(4_001, 1), 44_100)),
+    "stereo": Body(impulse=Impulse(decaying(9_000, 2), 96_000)),
+}
+
+
+@pytest.mark.parametrize("kind", PLUG_IN_BODIES)
 @pytest.mark.parametrize(("rate_hz", "size", "t60_s"), [(48_000, 1.0, 0.3), (44_100, 1.37, 0.2), (8_000, 0.5, 0.5)])
 def test_a_plug_in_has_the_responses_of_the_app_within_its_memory(
     kind: str, rate_hz: int, size: float, t60_s: float
 ) -> None:
     """Noise and samples are whole numbers in it."""
-    memory, body = body_record(kind)
-    needs = np.zeros(len(NEEDS), np.int64)
-    prepared.measure(memory.ctypes.data, float(rate_hz), size, t60_s, needs.ctypes.data)
+    body, needs = PLUG_IN_BODIES[kind], np.zeros(len(NEEDS), np.int64)
+    memory, whole = body_memory(body), np.rint(room_noise() / prepared.NOISE_UNIT).astype(np.int32)
+    given = (memory.ctypes.data, float(rate_hz), size, t60_s)
+    prepared.measure(*given, needs.ctypes.data)
     need = needs.view(NEEDS)[0]
-    whole = np.rint(room_noise() / prepared.NOISE_UNIT).astype(np.int32)
     found, work = np.zeros(need["found"] + 1), np.full(need["memory"] + 1, np.nan)
     found[-1] = work[-1] = GUARD
-    address = found.ctypes.data
-    prepared.prepare(memory.ctypes.data, whole.ctypes.data, float(rate_hz), size, t60_s, address, work.ctypes.data)
+    prepared.prepare(given[0], whole.ctypes.data, *given[1:], found.ctypes.data, work.ctypes.data)
     assert found[-1] == work[-1] == GUARD
-    for body_mix, room_mix in ((0.0, 0.4), (0.6, 0.0), (0.8, 0.3)):
-        if body is None and body_mix:
-            continue
+    for body_mix, room_mix in ((0.0, 0.4), *(((0.6, 0.0), (0.8, 0.3)) if body else ())):
         weights, mixed = np.zeros(4), np.full(need["part"] + 1, GUARD)
-        prepared.weigh(address, body_mix, room_mix, weights.ctypes.data)
+        prepared.weigh(found.ctypes.data, body_mix, room_mix, weights.ctypes.data)
         for first in range(0, need["part"], 5_000):
-            prepared.mix(address, weights.ctypes.data, mixed.ctypes.data, first, 5_000)
+            prepared.mix(found.ctypes.data, weights.ctypes.data, mixed.ctypes.data, first, 5_000)
         assert mixed[-1] == GUARD
         own = body and Body(body_mix, size, body.name, body.impulse)
         expected = Effects(own, Room(room_mix, t60_s)).impulse(rate_hz)

@@ -1,7 +1,5 @@
 """Compiled functions: Numba's replaced internals, where what is compiled is kept, and the order of writes."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import re
@@ -115,20 +113,6 @@ def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its
     assert printed(LOADS, str(places[1]), **kept) == ["0", "11"]
 
 
-def test_code_is_neither_optimised_nor_made_into_machine_code_where_text_alone_is_wanted() -> None:
-    code = (
-        "from engine.kernels.compiled import COMPILED\n"
-        "from engine.kernels.numba_internals import NOWHERE, write_code_alone\n"
-        "write_code_alone()\n"
-        "from numba import njit\n"
-        "f = njit('int64(int64)', no_cpython_wrapper=True, no_cfunc_wrapper=True)(lambda x: x + 1)\n"
-        "library = next(iter(f.overloads.values())).library\n"
-        "assert library.get_pointer_to_function('anything') == NOWHERE\n"
-        "assert not library._finalized\n"
-    )
-    assert set("".join(printed(code))) == {"."}
-
-
 # no folder but the temporary one can be written, as of a program in a read-only image without a home
 READ_ONLY = (
     "import tempfile; from pathlib import Path; temporary = tempfile.TemporaryFile\n"
@@ -154,10 +138,12 @@ def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_th
     assert printed(code) == ["False", "True"]
 
 
-def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> None:
+def test_the_users_own_folder_is_used_and_without_any_it_is_compiled_and_not_kept(tmp_path: Path) -> None:
     code = "from engine.kernels import cache; from engine.kernels.compiled import config, tanh\n" + REPORT
     found = printed(code + "print(config.CACHE_DIR)", NUMBA_CACHE_DIR=str(tmp_path))
     assert found == [str(tmp_path), "True", "False", "None", "True", "1", "1", str(tmp_path)]
+    code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
+    assert printed(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
 
 
 def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody(tmp_path: Path) -> None:
@@ -168,11 +154,6 @@ def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_no
     ended = printed(READ_ONLY + REPORT, TMPDIR=str(tmp_path))
     assert ended[0] != killed[0] and ended[1:] == killed[1:]
     assert not list(tmp_path.iterdir())
-
-
-def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
-    code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
-    assert printed(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
 
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:

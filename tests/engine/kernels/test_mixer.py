@@ -1,7 +1,5 @@
 """The sum of all voices, and what is done to it: volume, channels, tone, guards, and the safety limiter."""
 
-from __future__ import annotations
-
 import ctypes
 
 import numpy as np
@@ -89,15 +87,6 @@ def test_what_is_no_number_is_silence(value: float) -> None:
     assert float(wild.record["limiter"]) <= LARGEST_LEVEL  # is soon forgotten
 
 
-def test_a_device_is_given_what_a_file_is() -> None:
-    called, rendered = (mixer_of(voice_of(noise(3000)), limited=True) for _ in range(2))
-    blocks = [ask(called, frames, now_s=number / 100) for number, frames in enumerate((256, 1, 63, 480, 1000))]
-    np.testing.assert_array_equal(np.concatenate(blocks), rendered.render(1800))
-    assert called.calls == 5
-    assert called.seconds == 1800 / RATE_HZ
-    assert called.output_latency_s == pytest.approx(0.01 + AHEAD / RATE_HZ)
-
-
 def test_voices_of_one_hand_over_begin_with_one_frame_and_say_when_the_device_had_it() -> None:
     mixer, voices = Mixer(RATE_HZ), [voice_of(noise(3000, level=0.1)) for _ in range(5)]
     for voice in voices:
@@ -133,7 +122,7 @@ def test_an_underflow_counts_as_a_gap_where_something_sounds_and_the_latest_are_
     assert mixer.new_gaps() == []
 
 
-def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
+def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over() -> None:
     voices = [voice_of(noise(2000, level=0.001)) for _ in range(MOST_VOICES + 3)]
     mixer = mixer_of(*voices)
     mixer.render(64)
@@ -141,18 +130,10 @@ def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
     assert len(mixer.voices) == MOST_VOICES
     mixer.render(4000)
     assert mixer.voices == []
-    mixer.add(voice_of(noise(2000)))
-    assert mixer.render(640).any()
-
-
-def test_a_full_ring_refuses_and_reports() -> None:
-    samples = noise(64)
-    voices = [voice_of(samples) for _ in range(RING + 2)]
-    mixer = mixer_of(*voices)  # and nobody takes any
-    assert [voice.over for voice in voices] == [False] * RING + [True] * 2
-    mixer.render(64)
-    again = voice_of(samples)
-    mixer.add(again)
+    mixer.add(*(waiting := [voice_of(noise(64)) for _ in range(RING + 2)]))  # and nobody takes any
+    assert [voice.over for voice in waiting] == [False] * RING + [True] * 2
+    assert mixer.render(64).any()
+    mixer.add(again := voice_of(noise(64)))
     assert not again.over
 
 
@@ -170,11 +151,9 @@ def test_ended_voices_are_forgotten_the_others_go_on_and_another_rate_is_refused
 ROUNDING = 1e-6  # of a gain that is read off single-precision samples
 
 
-def limited(sound: Samples, block: int = 1000) -> Samples:
+def limited(sound: Samples) -> Samples:
     """As a device is given it, without the delay."""
-    mixer, total = mixer_of(voice_of(sound), limited=True), len(sound) + AHEAD
-    blocks = [mixer.render(min(block, total - first)) for first in range(0, total, block)]
-    return np.concatenate(blocks)[AHEAD:]
+    return mixer_of(voice_of(sound), limited=True).render(len(sound) + AHEAD)[AHEAD:]
 
 
 def swell(seed: int = 0) -> Samples:
@@ -240,10 +219,13 @@ def test_it_begins_no_earlier_than_it_looks_reports_what_it_did_and_the_gain_ret
     assert (np.diff(gain[begin + 200 :]) > -ROUNDING).all()
 
 
-@pytest.mark.parametrize("block", [1, 63, 64, 480])
-def test_blocks_make_no_difference_to_the_limiter(block: int) -> None:
-    sound = LOUD["noise"][:6000]
-    np.testing.assert_array_equal(limited(sound, block), limited(sound, len(sound) + AHEAD))
+def test_a_device_is_given_what_a_file_is_in_blocks_of_any_size() -> None:
+    called, rendered = (mixer_of(voice_of(LOUD["noise"][6000:9000]), limited=True) for _ in range(2))
+    sizes = [256, 1, 63, 480, *[1] * 65, 935]
+    blocks = [ask(called, frames, now_s=number / 100) for number, frames in enumerate(sizes)]
+    np.testing.assert_array_equal(np.concatenate(blocks), rendered.render(1800))
+    assert (called.calls, called.seconds) == (len(sizes), 1800 / RATE_HZ)
+    assert called.output_latency_s == pytest.approx(0.01 + AHEAD / RATE_HZ)
 
 
 def test_after_a_loud_sound_soft_ones_are_as_they_were() -> None:

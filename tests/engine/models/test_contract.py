@@ -1,7 +1,5 @@
 """What concerns every learned string: its laws are tested, its resonator need be no string; the dense product."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from itertools import product
@@ -85,8 +83,7 @@ def error(name: str, sizes: dict[str, Any], how: str, steps: int, stiffening: fl
 
 
 @pytest.mark.parametrize(
-    ("name", "sizes", "how"),
-    [("dmd", {"rank": 18}, "physics"), ("lru", {"state_size": 16, "layers": 1}, "physics")],
+    ("name", "sizes", "how"), [("dmd", {"rank": 18}, "physics"), ("lru", {"state_size": 16, "layers": 1}, "physics")]
 )
 def test_a_model_starts_as_a_linear_membrane(name: str, sizes: dict[str, Any], how: str) -> None:
     assert error(name, sizes, how, 800) < 0.05  # a release from rest, to about σ/ω

@@ -1,7 +1,5 @@
 """DMD: the laws, and its fit against PyDMD and the linear string."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """FGRU and FRNN: the laws, plain recurrences, the kernel, and the way that learns."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import pytest

@@ -1,15 +1,12 @@
 """Koopman and Koopman_var: the laws, plain recurrences, and their starts."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import pytest
 import torch
-from torch import Tensor
 
 from engine.models.koopman import SHARPEST
-from tests.engine.models.laws import MODES, PHYSICS, ModelLaws, released
+from tests.engine.models.laws import MODES, PHYSICS, ModelLaws, relative, released
 
 
 class TestKoopman(ModelLaws):
@@ -29,24 +26,14 @@ class TestKoopman(ModelLaws):
     }
 
     @torch.no_grad()
-    def test_it_is_its_equations(self) -> None:
-        """Every weight by its name, real and imaginary parts by hand."""
-        model = self.made(decoder_widths=(16, 16)).double()
-        weights = model.state_dict()
-
-        def dense(name: str, x: Tensor) -> Tensor:
-            return x @ weights[f"{name}.weight"].T + weights[f"{name}.bias"]
-
-        def selu(x: Tensor) -> Tensor:
-            return 1.0507009873554805 * torch.where(x > 0, x, 1.6732632423543772 * (x.exp() - 1))
-
-        x, y = dense("encoder.3", dense("encoder.2", selu(dense("encoder.0", released().double())))).chunk(2, dim=1)
-        decay, angle = torch.exp(-weights["nu_log"].exp()), weights["theta_log"].exp()
-        a, b = decay * angle.cos(), decay * angle.sin()
-        for frame in model(released().double(), 200).unbind(1):
-            x, y = a * x - b * y, b * x + a * y
-            hidden = selu(dense("decoder.2", selu(dense("decoder.0", torch.cat([x, y], 1)))))
-            torch.testing.assert_close(frame, dense("decoder.4", hidden), rtol=0, atol=1e-11)
+    def test_its_mixing_layer_is_linear_behind_the_encoder(self) -> None:
+        mixed, plain = (self.made(mixing_layer=mixing).double() for mixing in (True, False))
+        weights = mixed.state_dict()
+        weight, bias = (weights.pop(f"encoder.3.{name}") for name in ("weight", "bias"))
+        weights["encoder.2.weight"] = weight @ weights["encoder.2.weight"]
+        weights["encoder.2.bias"] = weight @ weights["encoder.2.bias"] + bias
+        plain.load_state_dict(weights)
+        assert relative(mixed(released().double(), 200), plain(released().double(), 200)) < 1e-12
 
     def test_the_starts_lie_where_they_should(self) -> None:
         radius = torch.exp(-self.made().nu_log.detach().exp())

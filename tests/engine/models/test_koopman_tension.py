@@ -1,7 +1,5 @@
 """Latents that share a tension: the laws, the truth on many strings and at any rate, from rest and ringing."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar
 

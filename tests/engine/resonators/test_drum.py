@@ -160,11 +160,9 @@ def test_shapes_are_orthonormal_and_their_transforms_are_the_integrals(own: Surf
 
 def test_the_mean_over_a_disc() -> None:
     place, radius = np.array([0.3, -0.2]), 0.02
-    disc = GRID[np.hypot(*GRID.T) <= 1] * (radius / 0.2) + place
-    expected = CIRCLE.shapes(disc).mean(1)
+    expected = CIRCLE.shapes(GRID[np.hypot(*GRID.T) <= 1] * (radius / 0.2) + place).mean(1)
     spread = [kernel.spread(each * radius, tools()) for each in CIRCLE.wavenumber]
-    found = CIRCLE.shapes(place[None])[:, 0] * spread
-    assert np.allclose(found, expected, atol=2e-3)
+    assert np.allclose(CIRCLE.shapes(place[None])[:, 0] * spread, expected, atol=2e-3)
 
 
 def test_bessel_functions_their_table_and_zeros_are_scipys() -> None:

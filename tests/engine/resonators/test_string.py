@@ -1,6 +1,4 @@
-"""The string's closed forms, losses by mode, transform, which is exact on the grid, and two polarisations."""
-
-from __future__ import annotations
+"""The string's closed forms, losses by mode, and transform, which is exact on the grid."""
 
 import math
 from dataclasses import replace
@@ -8,14 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
-from engine.kernels import strings
-from engine.kernels.constants import MOST_PAIRS
-from engine.models.base import Physics
-from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import Pluck
-from engine.resonators.base import Resonator
 from engine.resonators.losses import loss_rates
 from engine.resonators.sine_transform import (
     LARGEST_KEPT,
@@ -26,9 +17,7 @@ from engine.resonators.sine_transform import (
     to_modes,
 )
 from engine.resonators.string import decay_rates, resonator_of, undamped_frequencies, wavenumbers
-from engine.truth import ModalState, SplittingSolver, solve_dop853
-from engine.values.string import Losses, Polarisations, StringParameters
-from tests.engine.sounds import relative, shipped
+from engine.values.string import Losses, StringParameters
 
 STRING = StringParameters()
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 0.0, 0.0, 75.0)
@@ -67,12 +56,15 @@ def test_losses_have_their_limits() -> None:
     assert float(loss_rates(Losses(1.0, 0.0, 0.0), thin, 1)[0]) == pytest.approx(by_hand, rel=1e-3)
 
 
-@pytest.mark.parametrize("modes", [1, 25, 99])
-def test_modes_come_back_from_the_grid(modes: int) -> None:
+@pytest.mark.parametrize(("grid_points", "modes"), [(101, 1), (101, 25), (101, 99), (801, 799), (1_201, 90)])
+def test_modes_come_back_from_the_grid_and_a_large_picture_is_that_of_its_table(grid_points: int, modes: int) -> None:
     amplitudes = np.random.default_rng(1).normal(size=(4, modes))
-    displacement = to_grid(amplitudes, 101)
+    displacement = to_grid(amplitudes, grid_points)
     assert (displacement[:, [0, -1]] == 0).all()
-    np.testing.assert_allclose(to_modes(displacement, modes), amplitudes, rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(to_modes(displacement, modes), amplitudes, rtol=1e-7, atol=1e-10)
+    assert (grid_points * modes > LARGEST_KEPT) == (grid_points > 101)
+    np.testing.assert_allclose(to_grid(amplitudes[0], grid_points), displacement[0], atol=1e-11)
+    assert np.array_equal(synthesis_matrix(grid_points, modes)[:7], synthesis_matrix(grid_points, min(modes, 7)))
     with pytest.raises(ValueError, match="holds 1 to 99 modes, not 100"):
         to_modes(np.zeros(101), 100)
 
@@ -87,16 +79,6 @@ def test_listening_is_exact_on_the_grid_and_between_its_points() -> None:
     np.testing.assert_allclose(heard, amplitudes @ mode_shapes(place, 3), rtol=1e-12)
 
 
-@pytest.mark.parametrize(("grid_points", "modes"), [(801, 799), (1_201, 90)])
-def test_a_large_picture_is_that_of_its_table(grid_points: int, modes: int) -> None:
-    amplitudes = np.random.default_rng(0).normal(size=modes)
-    assert grid_points * modes > LARGEST_KEPT
-    found, table = to_grid(amplitudes, grid_points), to_grid(amplitudes[None], grid_points)[0]
-    np.testing.assert_allclose(found, table, atol=1e-11)
-    assert found[0] == found[-1] == 0
-    assert np.array_equal(synthesis_matrix(grid_points, modes)[:7], synthesis_matrix(grid_points, 7))
-
-
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
@@ -108,55 +90,3 @@ def test_a_large_picture_is_that_of_its_table(grid_points: int, modes: int) -> N
 def test_a_resonator_of_what_does_not_go_together_is_refused(changed: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         replace(resonator_of(STRING, 5, grid_points=9), **changed)
-
-
-MOVING = Polarisations(angle_deg=40, second_heard=0.25, second_cents=2.0, conductance_s_kg=0.02)
-
-
-def polarised(moving: Polarisations, partials: int) -> Resonator:
-    """Pairs of modes, then single ones."""
-    law, pairs = resonator_of(STRING, partials), min(MOST_PAIRS, partials)
-    modes = range(partials + pairs)
-    partial = [strings.partial_of(mode, pairs) - 1 for mode in modes]
-    direction = [strings.direction_of(mode, pairs) for mode in modes]
-    conductances = moving.conductance_s_kg, moving.second_conductance_s_kg
-    rows = np.empty(4 * len(modes))
-    strings.rows(STRING.row, len(modes), pairs, moving.detuning, conductances, (0.0, 0.0, 0.0), rows)
-    squares, sigma, coupling, stretch = rows.reshape(4, -1)
-    pulled, heard = (np.array(each)[direction] for each in (moving.pulled, moving.heard))
-    pulled[2 * pairs :] = 1 / moving.heard[0]  # so that it is heard as the others are
-    return Resonator(
-        omega=np.sqrt(squares),
-        sigma=sigma,
-        coupling=coupling,
-        stretch=stretch,
-        tension_rise=law.tension_rise,
-        shapes=law.shapes[partial] * heard[:, None],
-        analysis=law.analysis[:, partial] * pulled,
-    )
-
-
-def test_both_share_one_tension_in_the_truth_and_in_the_learned_curves() -> None:
-    """Against DOP853, at velocities that glide by a quarter-tone; the model as accurate as in one direction.
-
-    A pluck is heard as high as it is pulled.
-    """
-    pluck, rate_hz, law = Pluck(0.17, 3.0, "rounded", 0.08), 48_000, resonator_of(STRING, 60)
-    resonator, wide = polarised(MOVING, 12), polarised(MOVING, 60)
-    shape = pluck.displacement(101)
-    np.testing.assert_allclose(wide.to_grid(wide.to_modes(shape)), law.to_grid(law.to_modes(shape)), atol=1e-12)
-    q = resonator.to_modes(Pluck(0.17, 8.0, "rounded", 0.2).displacement(101))[None]
-    assert float(resonator.relative_tension_rise(q[0])) > 0.02
-    state = ModalState(q, q[:, ::-1].copy())
-    found = SplittingSolver(resonator, rate_hz).solve(state, 1_000)
-    assert relative(found, solve_dop853(resonator, state, rate_hz, 1_000)) < 1e-7
-    model = shipped("studio_any_string").model
-    assert isinstance(model, KoopmanTension)
-    heard = wide.shapes @ np.linspace(0, 1, 101)[:, None]
-    for amplitude_mm in (1.0, 6.0):
-        displacement = pluck.moved(amplitude_mm=amplitude_mm).displacement(101)[None]
-        tuned = model.for_resonator(Physics(wide, rate_hz, 1.0))
-        moved = tuned.amplitudes(tuned.encode(torch.from_numpy(displacement)), rate_hz // 4).detach().numpy()
-        start = ModalState.at_rest(wide.to_modes(displacement))
-        true, _ = SplittingSolver(wide, rate_hz).advance(start, rate_hz // 4)
-        assert relative(moved @ heard, true @ heard) ** 2 < 1e-6

@@ -1,28 +1,33 @@
-"""What all voices share: blocks, gains, listening points, beginning and end; samples that somebody else renders."""
+"""What all voices share: blocks, gains, listening points, beginning and end; samples of others; files."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import soxr
 
-from engine.kernels.constants import QUANTUM
+from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.fields import record_of
 from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
+from engine.presets import load_preset
+from engine.sources import ModelSource, Runaway
 from engine.values.ear import Ear
-from engine.voices import Mixer, Program, Voice, model_program, plain_program, rendered_program, truth_program
-from engine.voices.ear import REACH_FRAMES
-from engine.voices.voice import FADE_S
+from engine.voices import Mixer, Program, Voice, model_program, plain_program, render_voice
+from engine.voices.ear import REACH_FRAMES, weights_of
+from engine.voices.program import voice_ends_s
+from engine.voices.programs import rendered_program, truth_program
+from engine.voices.voice import END_FADE_S, FADE_S
 from tests.engine import sounds
 from tests.engine.sounds import (
     EAR,
     KNOWING,
+    PLUCK,
     RATE_HZ,
     STEEL,
     Samples,
@@ -33,7 +38,7 @@ from tests.engine.sounds import (
     noise,
     rung,
     shipped,
-    small_info,
+    small,
     strike,
     voice_of,
 )
@@ -46,7 +51,7 @@ PICKUPS = pytest.mark.parametrize("pickup", ["displacement", "velocity"])
 def struck(kind: str, ear: Ear = EAR, gain: float = 1.0, rate_hz: int = RATE_HZ) -> Voice:
     if kind != "truth":
         return strike({"bank": KNOWING, "tension": "studio_any_string"}[kind], rate_hz=rate_hz, ear=ear, gain=gain)
-    info = small_info(True)
+    info = small(True)
     return Voice(truth_program(info, rate_hz), initial_m(info, Pluck(0.3)), ear, gain)
 
 
@@ -210,49 +215,6 @@ def test_a_runaway_never_reaches_the_mix(value: float) -> None:
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_whatever_is_asked_of_voices_each_minds_its_own_business(seed: int) -> None:
-    """The mix is the sum of what each voice is alone, when the same is asked of it at the same frames."""
-
-    def chosen(number: int) -> Voice:
-        choice = np.random.default_rng([seed, number])
-        pickup = "velocity" if choice.random() < 0.4 else "displacement"
-        ear = Ear((choice.uniform(0.1, 0.9),) * choice.integers(1, 3), pickup, int(choice.choice([0, 0, 5])))
-        pluck, gain = Pluck(choice.uniform(0.1, 0.9), choice.uniform(1, 12)), float(choice.choice([0.0, 0.5, 1.0]))
-        kind = str(choice.choice([KNOWING, f"{KNOWING}_hinted", STEEL, "truth", "samples"]))
-        if kind == "samples":
-            voice = voice_of(choice.uniform(-1, 1, (6000, 1)).astype(np.float32), gain)
-        elif kind == "truth":
-            info = small_info(True)
-            voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
-        else:
-            voice = strike(kind, pluck, ear=ear, gain=gain)
-        voice.begin_at(int(choice.integers(0, 4000)))
-        if choice.random() < 0.3:
-            voice.skip(choice.uniform(0.1, 0.5), Mixer(RATE_HZ))
-        return voice
-
-    def rendered(numbers: range | list[int]) -> Signal:
-        voices, parts = {number: chosen(number) for number in numbers}, []
-        mixer = mixer_of(*voices.values())
-        for step in range(24):
-            for number, voice in voices.items():
-                choice = np.random.default_rng([seed, number, step])
-                what = choice.integers(0, 12)
-                if what < 3:
-                    voice.set_gain(float(choice.choice([0.0, 0.3, 1.0])))
-                elif what == 3:
-                    points = tuple(choice.uniform(0, 1, len(voice.ear.points)))
-                    voice.listen(Ear(points, voice.ear.pickup, int(choice.choice([0, 0, 3]))))
-                elif what == 4:
-                    voice.release(0.02)
-            parts.append(mixer.render(1024))
-        assert mixer.new_gaps() == []
-        return np.concatenate(parts).astype(np.float64)
-
-    np.testing.assert_allclose(rendered(range(8)), sum(rendered([number]) for number in range(8)), atol=2e-6)
-
-
 def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_without_steps() -> None:
     """Where a loud string is stopped within 6 ms, a corner would be a click."""
     voice = constant()
@@ -273,19 +235,6 @@ def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_with
     assert parts[-1][-1] == 1.0
 
 
-@pytest.mark.parametrize("frame", [0, 1, 63, 64, 641])
-def test_it_begins_at_its_frame_and_is_released_at_its_quantum(frame: int) -> None:
-    voice = constant()
-    voice.begin_at(frame)
-    voice.release_at(1000)
-    assert not voice.sounding
-    found = mixer_of(voice).render(2048 + FADE)[:, 0]
-    assert int(np.argmax(found != 0)) == frame == voice.began_frame
-    end = (1000 - frame + QUANTUM - 1) // QUANTUM * QUANTUM + frame
-    np.testing.assert_array_equal(found[frame : min(end, 1000)], 0.5)
-    assert voice.over and not found[1024 + QUANTUM + FADE :].any()
-
-
 @pytest.mark.parametrize("rate_hz", [44_100, 48_000, 192_000])
 def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(rate_hz: int) -> None:
     voice, waiting = (constant(rate_hz=rate_hz) for _ in range(2))
@@ -298,6 +247,14 @@ def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(ra
     found = mixer.render(20_000)[:, 0]
     np.testing.assert_allclose(found[:frames], 0.5 * (1 - faded(frames)), atol=1e-7)
     assert not found[frames:].any()
+    timed = constant()
+    timed.begin_at(641)
+    timed.release_at(1000)
+    assert not timed.sounding
+    found = mixer_of(timed).render(2048 + FADE)[:, 0]
+    assert int(np.argmax(found != 0)) == 641 == timed.began_frame
+    np.testing.assert_array_equal(found[641:1000], 0.5)
+    assert timed.over and not found[1024 + QUANTUM + FADE :].any()
     unheard = strike(KNOWING, gain=0.0)
     unheard.release(1.0)
     rung(64, unheard)
@@ -335,7 +292,7 @@ def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points: i
 
 @pytest.mark.parametrize(("source_hz", "rate_hz"), [(4_000, 48_000), (16_000, 44_100), (48_000, 44_100)])
 def test_other_rates_are_what_soxr_makes_of_them(source_hz: int, rate_hz: int) -> None:
-    info, samples = replace(small_info(True), rate_hz=source_hz), band_limited(source_hz, 0.5)
+    info, samples = replace(small(True), rate_hz=source_hz), band_limited(source_hz, 0.5)
     voice = empty(0.5, program=rendered_program(info, rate_hz), source_hz=source_hz)
     voice.append(samples)
     voice.end_here()
@@ -378,3 +335,114 @@ def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
     found = mixer.render(2048)[:, 0]
     assert voice.began_frame == 640
     np.testing.assert_array_equal(found[128:], samples[128:2048, 0])  # nothing was left out, and it has faded in
+
+
+PRESET, SECONDS, CD_HZ = shipped(KNOWING), 0.2, 44_100
+
+
+def program_of(kind: str) -> Program:
+    return truth_program(PRESET.info, CD_HZ) if kind == "truth" else model_program(PRESET, CD_HZ)
+
+
+@pytest.mark.parametrize("kind", ["bank", "truth"])
+@pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
+def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear) -> None:
+    program, frames = program_of(kind), round(SECONDS * CD_HZ)
+    found = render_voice(program, ModelSource(PRESET), PRESET.info, PLUCK, ear, SECONDS)
+    mixer = mixer_of(Voice(program, initial_m(PRESET.info, PLUCK), ear), rate_hz=CD_HZ, limited=True)
+    given = mixer.render(frames + AHEAD)[AHEAD:, : len(ear.points)]  # as a device is, by the limiter's delay later
+    np.testing.assert_array_equal(found, given)
+    assert mixer.take_reduction_db() == 0.0
+
+
+def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path) -> None:
+    preset, ear = load_preset(small_preset), Ear((0.3, 0.6))
+    info, source = preset.info, ModelSource(preset)
+    assert model_program(preset, CD_HZ).rendered
+    found = render_voice(rendered_program(info, info.rate_hz), source, info, PLUCK, ear, SECONDS)
+    let_go_m, weights = initial_m(info, PLUCK), weights_of(ear, info.grid_points)
+    frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
+    expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
+    attack = round(0.002 * info.rate_hz)
+    np.testing.assert_allclose(found[attack:], expected[attack:], atol=1e-6)  # its own rate: as it is
+    higher = render_voice(rendered_program(info, 48_000), source, info, PLUCK, ear, SECONDS)
+    np.testing.assert_allclose(higher[::12][attack:-4], found[attack:-4], atol=1e-5)
+
+
+def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time() -> None:
+    shares: list[float] = []
+    program, source = program_of("bank"), ModelSource(PRESET)
+    render_voice(program, source, PRESET.info, PLUCK, EAR, SECONDS, shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+    def refuse(share: float) -> None:
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        render_voice(program, source, PRESET.info, PLUCK, EAR, SECONDS, refuse)
+    program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"]] = -5e-3  # an e-fold in 50 ms
+    with pytest.raises(Runaway) as caught:
+        render_voice(program, source, PRESET.info, PLUCK, EAR, 2.0)
+    assert 0.05 < caught.value.time_s < 1.0
+
+
+def undying(kind: str) -> tuple[Program, ModelSource]:
+    """Of a model that does not decay, compiled or rendered ahead, whose voice ends after 0.3 s."""
+    source = ModelSource(PRESET)
+    if kind == "bank":
+        program = program_of("bank")
+        program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] :][: program.modes] = 1e-9
+    else:
+        program = rendered_program(PRESET.info, CD_HZ)
+
+        shape_m = Pluck(0.3, 0.1).displacement(PRESET.info.grid_points)
+
+        def hum(state: object, steps: int) -> tuple[Signal, object]:
+            return np.cos(np.arange(steps) * math.pi / 4)[None, :, None] * shape_m, state
+
+        source.advance = hum
+    return replace(program, ends_s=0.3), source
+
+
+@pytest.mark.parametrize("kind", ["bank", "rendered"])
+@pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
+def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear) -> None:
+    program, source = undying(kind)
+    found = render_voice(program, source, PRESET.info, PLUCK, ear, 1.0)
+    endless = render_voice(replace(program, ends_s=math.inf), source, PRESET.info, PLUCK, ear, 1.0)
+    assert np.abs(endless[-CD_HZ // 10 :]).max() > 1e-3
+    first, faded = -(-round(0.3 * CD_HZ) // QUANTUM) * QUANTUM, round(END_FADE_S * CD_HZ)
+    done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
+    np.testing.assert_array_equal(found[:first], endless[:first])
+    np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
+    cut = render_voice(program, source, PRESET.info, PLUCK, ear, 5.0, until_db=60.0)
+    assert first + faded < len(cut) < CD_HZ
+
+
+@pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
+def test_what_is_played_ends_as_in_a_file(skipped_s: float) -> None:
+    """Also where it begins later in its motion, or behind its end."""
+    program, source = undying("bank")
+    first, faded_in = round(skipped_s * CD_HZ / QUANTUM) * QUANTUM, 2 * round(0.02 * CD_HZ) * bool(skipped_s)
+    file = render_voice(program, source, PRESET.info, PLUCK, EAR, 1.0)[first:, 0]
+    voice = Voice(program, initial_m(PRESET.info, PLUCK), EAR, 0.0 if skipped_s else 1.0)
+    if skipped_s:
+        voice.skip(skipped_s, Mixer(CD_HZ))
+        voice.set_gain(1.0)
+    played = mixer_of(voice, rate_hz=CD_HZ).render(CD_HZ - first)[:, 0]
+    assert voice.over
+    np.testing.assert_array_equal(played[faded_in:], file[faded_in:] * (skipped_s < 0.3))
+
+
+def test_it_ends_where_its_string_is_silent_and_not_within_its_training() -> None:
+    info = PRESET.info
+    slowest = float(info.resonator.sigma.min())
+    assert voice_ends_s(info) == pytest.approx(2 * math.log(1e3) / slowest)  # twice 60 dB
+    for program in (program_of("bank"), rendered_program(info, CD_HZ)):
+        assert program.ends_s == voice_ends_s(info)
+    assert program_of("truth").ends_s == math.inf
+    damped = replace(info, string=replace(info.string, damping_d1_kg_m_s=1e3 * info.string.damping_d1_kg_m_s))
+    assert voice_ends_s(damped) == info.horizon_s
+    endless = replace(info, string=replace(info.string, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0))
+    assert voice_ends_s(endless) == math.inf
