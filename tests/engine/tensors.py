@@ -5,11 +5,9 @@ import torch
 from torch import Tensor
 
 from engine.models.fno import FourierConvolution
-from engine.pluck import Pluck
 from engine.resonators import sine_transform
 from engine.resonators.base import Resonator
 from engine.truth import ModalState
-from training.data import draws
 
 
 def to_modes(displacement: Tensor, modes: int) -> Tensor:
@@ -22,21 +20,6 @@ def to_grid(amplitudes: Tensor, grid_points: int) -> Tensor:
 
 def listening_weights(positions: list[float], grid_points: int) -> Tensor:
     return torch.from_numpy(sine_transform.listening_weights(np.array(positions), grid_points))
-
-
-def displacement_of(pluck: Pluck, grid_points: int = 101) -> Tensor:
-    return torch.from_numpy(pluck.displacement(grid_points))
-
-
-def draw(kind: str, count: int, modes: int, seed: int = 0) -> Tensor:
-    """Modal amplitudes of random strings of the protocol, (count, modes)."""
-    drawn = draws.DRAWS[kind](count, 101, torch.Generator().manual_seed(seed))
-    return torch.from_numpy(sine_transform.to_modes(drawn, modes))
-
-
-def of_tension_rise(resonator: Resonator, amplitudes: Tensor, rise: float) -> Tensor:
-    """The amplitudes, scaled to a rise of tension."""
-    return amplitudes * float(np.sqrt(rise / resonator.relative_tension_rise(amplitudes.numpy())))
 
 
 def solve_linear(resonator: Resonator, state: ModalState, times_s: Tensor) -> Tensor:

@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,8 @@ import soundfile
 import torch
 
 import engine
-from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
-from engine.presets import Preset, load_preset, of_string
+from engine.presets import load_preset, of_string
 from engine.resonators.sine_transform import listening_weights
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 from engine.values.string import StringParameters
@@ -45,13 +43,6 @@ def test_every_name_is_there_and_the_engine_itself_loads_nothing_nor_effects_a_c
         subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
-STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
-
-
-def any_string() -> Preset:
-    return of_string(shipped("studio_any_string"), STEEL, 16_000)
-
-
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_blocks_chain_and_listening_is_the_grid_there(small_preset: Path, kind: str) -> None:
     preset, weights = load_preset(small_preset), listening_weights(np.array([0.37]), 101)
@@ -74,16 +65,9 @@ def test_blocks_chain_and_listening_is_the_grid_there(small_preset: Path, kind: 
 def test_runaway_output_is_detected_with_its_time(
     small_preset: Path, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    preset = load_preset(small_preset)
-    assert isinstance(preset.model, KoopmanVar)
-    decode = preset.model.decode
-
-    def faulty(latents: torch.Tensor, readout: torch.Tensor | None = None) -> torch.Tensor:
-        frames = decode(latents, readout)
-        frames[:, 30:] *= factor
-        return frames
-
-    monkeypatch.setattr(preset.model, "decode", faulty)
+    preset, scale = load_preset(small_preset), torch.ones(64, 1)
+    decode, scale[30:] = preset.model.decode, factor
+    monkeypatch.setattr(preset.model, "decode", lambda *given: decode(*given) * scale)
     source = ModelSource(preset)
     state = source.start(initial_m(preset.info, Pluck())[None])
     with pytest.raises(Runaway, match=r"diverges 0\.008 s after the pluck") as caught:
@@ -92,7 +76,8 @@ def test_runaway_output_is_detected_with_its_time(
 
 
 def test_a_model_of_many_strings_moves_in_numpy_as_in_torch() -> None:
-    preset = any_string()
+    steel = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
+    preset = of_string(shipped("studio_any_string"), steel, 16_000)
     plucks = [Pluck(0.17, 1.0), Pluck(0.3, 12.0, "triangular"), Pluck(0.03, 12.0, width=0.03)]
     initial = np.stack([initial_m(preset.info, pluck) for pluck in plucks])
     source, frames = ModelSource(preset), np.arange(3, 2_401, 3)
@@ -105,12 +90,3 @@ def test_a_model_of_many_strings_moves_in_numpy_as_in_torch() -> None:
     atol = 1e-9 * np.abs(expected).max()
     np.testing.assert_allclose(found, expected[:, frames - 1], rtol=0, atol=atol)
     np.testing.assert_allclose(following, expected[:, 2_400:], rtol=0, atol=atol)
-
-
-@pytest.mark.parametrize("size", [1e3, 1e308])
-def test_a_model_of_many_strings_stays_bounded_for_wild_weights(size: float) -> None:
-    preset = any_string()
-    wild = size * np.random.default_rng(0).choice([-1.0, 1.0], (3, len(preset.weights["A"])))
-    source = ModelSource(replace(preset, weights={**preset.weights, **dict(zip("Arp", wild, strict=True))}))
-    found, _ = source.advance(source.start(initial_m(preset.info, Pluck(0.3, 8.0))[None]), 500)
-    assert np.isfinite(found).all()

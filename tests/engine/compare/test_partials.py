@@ -5,15 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from engine.compare.partials import (
-    Array,
-    PartialErrors,
-    PartialTrack,
-    partial_errors,
-    phasors,
-    segment_frames,
-    track_partials,
-)
+from engine.compare import partials
+from engine.compare.partials import Array, PartialErrors, PartialTrack, partial_errors, segment_frames, track_partials
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
@@ -146,7 +139,7 @@ def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circl
     eigenvalues, spacing_s = resonator_of(STRING, 10).eigenvalues(), 1 / 16_000
     expected = np.linspace(1, 2, 10) * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
     around = [(expected * np.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
-    found = phasors(*around, spacing_s, resonator_of(STRING, 10, tension_modulated=False))
+    found = partials.phasors(*around, spacing_s, resonator_of(STRING, 10, tension_modulated=False))
     assert np.allclose(found, expected, rtol=0, atol=1e-12)
     # one mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest
     state = ModalState.at_rest(np.array([[0.0137]]))
@@ -154,7 +147,7 @@ def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circl
     samples = SplittingSolver(resonator_of(STRING, 1), 16_000).solve(state, 4000)
     around, roundness = [samples[:, :-2], samples[:, 1:-1], samples[:, 2:]], []
     for modulated in (True, False):
-        z = phasors(*around, spacing_s, resonator_of(STRING, 1, tension_modulated=modulated))
+        z = partials.phasors(*around, spacing_s, resonator_of(STRING, 1, tension_modulated=modulated))
         roundness.append(float(np.linalg.norm(z.imag) / np.linalg.norm(z.real)))
     assert roundness[0] == pytest.approx(1, abs=0.002)
     assert roundness[1] > 1.01

@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from engine.compare.audible import FLOOR_DB as LEAST_DB
+from engine.compare import audible, relative
 from engine.compare.audible import audible_errors, heard_level_db
-from engine.compare.relative import (
-    NULL_FLOOR_DB,
-    ErrorSums,
-    ErrorWindows,
-    RelativeError,
-    error_to_signal,
-    relative_error,
-)
+from engine.compare.relative import ErrorSums, ErrorWindows, RelativeError, error_to_signal, relative_error
 from engine.compare.spectra import FLOOR_DB, log_spectral_distance, spectral_distances
 
 
@@ -84,7 +77,8 @@ def test_windows_frames_trajectories_and_batches_have_their_own_errors() -> None
 @pytest.mark.parametrize("rows_first", [True, False])
 def test_trajectories_are_known_again_in_blocks(rows_first: bool) -> None:
     predicted, truth, whole = motions(5, 30, 3)
-    sums, parts, blocks = ErrorSums(30), ((0, 2), (2, 5)), ((0, 7), (7, 20), (20, 30))
+    sums = ErrorSums(30)
+    parts, blocks = ((0, 2), (2, 5)), ((0, 7), (7, 20), (20, 30))
     for outer in parts if rows_first else blocks:
         for inner in blocks if rows_first else parts:
             rows, frames = (slice(*each) for each in ((outer, inner) if rows_first else (inner, outer)))
@@ -121,6 +115,13 @@ def test_a_standard_error_is_that_of_a_ratio_of_sums() -> None:
     assert spoilt([0.1, math.inf]).standard_error() == RelativeError(math.inf, math.inf)
     assert spoilt([0.1, 0.2, 0.4]).standard_error() == spoilt([0.1, 0.2, 0.4]).standard_error()
     assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
+    for rel_mse, depth_db in (
+        (1e-3, -30),
+        (0, relative.NULL_FLOOR_DB),
+        (1e-30, relative.NULL_FLOOR_DB),
+        (math.inf, math.inf),
+    ):
+        assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
 
 
 def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> None:
@@ -133,13 +134,6 @@ def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> 
     assert (found.rel_mse, found.rel_mae) == pytest.approx((wanted.rel_mse, wanted.rel_mae))
     with pytest.raises(ValueError, match="edges"):
         whole.standard_error(first=11, last=20)
-
-
-@pytest.mark.parametrize(
-    ("rel_mse", "depth_db"), [(1e-3, -30), (0, NULL_FLOOR_DB), (1e-30, NULL_FLOOR_DB), (math.inf, math.inf)]
-)
-def test_the_depth_of_a_null(rel_mse: float, depth_db: float) -> None:
-    assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e200])
@@ -277,7 +271,7 @@ def test_what_is_not_heard_does_not_count_and_silence_is_finite() -> None:
         found = errors(string() + beside)
         assert found.level_db == pytest.approx(0, abs=0.01)
         assert found.distance_db < 0.01
-    assert errors(np.where(TIME_S < 1, string(), 0)).level_db == -LEAST_DB
+    assert errors(np.where(TIME_S < 1, string(), 0)).level_db == -audible.FLOOR_DB
     assert errors(silent).pitch_cents is None
     assert errors(silent, silent).distance_db == 0
     assert np.isfinite(errors(string(), silent).distance_db)

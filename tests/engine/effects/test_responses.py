@@ -130,17 +130,11 @@ def test_each_body_has_its_modes_rings_out_and_names_its_sources(name: str) -> N
     assert np.exp(-decay[: len(lowest_hz)] * wood.seconds).max() < 0.05  # what is cut is faint
 
 
-def test_an_impulse_of_ones_own_sounds_in_its_place_and_at_its_size() -> None:
-    time_s = np.arange(22_050) / 44_100
-    rung = np.exp(-20 * time_s) * np.sin(2 * np.pi * 300 * time_s)
-    own = Impulse(np.stack([rung, rung], 1), 44_100)
-    for size in (1.0, 1.5):
-        frequency_hz, found = spectrum(Body(size=size, impulse=own), 48_000)
-        assert frequency_hz[found.argmax()] == pytest.approx(300 / size, abs=1)
-        assert Body(size=size, impulse=own).response(48_000).shape == (round(24_000 * size), 2)
-    long = Impulse(np.random.default_rng(0).standard_normal((2 * 48_000, 1)), 48_000)
-    found = Body(size=2.0, impulse=long).response(48_000)  # it is stretched too long, and faded out
+def test_an_impulse_of_ones_own_that_is_stretched_too_long_is_faded_out() -> None:
+    long = Impulse(noise(2 * 48_000, 1), 48_000)
+    found = Body(size=2.0, impulse=long).response(48_000)
     assert len(found) == 3 * 48_000 and abs(found[-1, 0]) < 1e-12
+    assert len(Body(size=1.5, impulse=long).response(44_100)) == round(1.5 * 2 * 44_100)
 
 
 def t60_s(response: Array, band_hz: tuple[float, float], rate_hz: int) -> float:
@@ -159,14 +153,6 @@ def test_it_rings_as_long_as_asked_and_shorter_where_it_is_high(wanted_s: float)
         assert middle_s == pytest.approx(wanted_s, rel=0.12)
         assert t60_s(side, (7_000.0, 9_000.0), 48_000) == pytest.approx(0.4 * wanted_s, rel=0.2)
         assert t60_s(side, (1_700.0, 2_300.0), 48_000) < middle_s
-
-
-def test_reflections_come_after_the_direct_sound_that_is_not_in_it() -> None:
-    found = np.abs(room_response(0.8, 48_000))
-    assert found[: round(0.002 * 48_000)].max() < 0.02 * found.max()
-    assert found[: round(0.02 * 48_000)].max() > 0.5 * found.max()
-    left, right = room_response(1.0, 48_000)[2_400:].T
-    assert abs(np.corrcoef(left, right)[0, 1]) < 0.1  # it is wide
 
 
 def decaying(frames: int, channels: int, time: int = 700) -> Array:

@@ -5,9 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -38,23 +36,17 @@ from tests.engine.sounds import EAR, PLUCK, RATE_HZ
 READ = "read engine/kernels/numba_internals.py beside its source"
 
 
-def test_the_version_is_the_one_that_was_read() -> None:
+def test_numba_is_the_one_whose_internals_were_read_and_what_stays_is_called_as_it_was() -> None:
     installed = ".".join(numba.__version__.split(".")[:2])
     assert installed == numba_internals.VERSION, f"Numba is {numba.__version__}: {READ}, then raise VERSION"
-
-
-@pytest.mark.parametrize(
-    ("kept", "parameters"),
-    [
+    for kept, parameters in (
         (CPUCodeLibrary.add_ir_module, ["self", "ir_module"]),
         (CPUCodeLibrary._optimize_final_module, ["self"]),
         (CPUCodeLibrary._finalize_final_module, ["self"]),
         (CPUContext.get_executable, ["self", "library", "fndesc", "env"]),
         (unliteral, ["lit_type"]),
-    ],
-)
-def test_what_stays_is_called_as_it_was(kept: Callable[..., Any], parameters: list[str]) -> None:
-    assert list(inspect.signature(kept).parameters) == parameters, f"{kept.__qualname__}: {READ}"
+    ):
+        assert list(inspect.signature(kept).parameters) == parameters, f"{kept.__qualname__}: {READ}"
 
 
 def test_a_function_is_compiled_for_its_callers_once_for_all_numbers_and_for_python_where_that_calls_it() -> None:
@@ -81,8 +73,6 @@ from numba import njit
 from engine.kernels.compiled import COMPILED
 called = njit("int64(int64)", **COMPILED)(lambda x: 3 * x + 1)
 """
-
-
 LOADS = """
 import sys; sys.path.insert(0, sys.argv[1])
 from called import called
@@ -161,9 +151,6 @@ def test_every_kind_of_voice_and_compiled_model_runs() -> None:
     warm.models()
 
 
-Published = list[tuple[int, int]]
-
-
 def test_what_is_published_lies_between_two_fences() -> None:
     """x86 keeps the order of writes by itself, so that only the code can be looked at."""
     uncached = njit(**{**COMPILED, "cache": False})(publish.py_func)
@@ -175,20 +162,10 @@ def test_what_is_published_lies_between_two_fences() -> None:
     assert steps == ["fence seq_cst", "store i64 %arg.whole", "fence seq_cst"]
 
 
-@pytest.fixture
-def published(monkeypatch: pytest.MonkeyPatch) -> Published:
-    """What is published, slot and number, while nothing of it is written."""
-    found: Published = []
-
-    def note(slots: np.ndarray, slot: int, whole: int) -> None:
-        found.append((slot, whole))
-
-    monkeypatch.setattr(memory_module, "publish", note)
-    return found
-
-
-def test_what_a_device_shall_see_is_published_when_it_is_there(published: Published) -> None:
+def test_what_a_device_shall_see_is_published_when_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """The numbers that show samples, voices, places and responses to its thread change in no other way."""
+    published: list[tuple[int, int]] = []  # slot and number, while nothing of it is written
+    monkeypatch.setattr(memory_module, "publish", lambda slots, slot, whole: published.append((slot, whole)))
     program = solver_program(resonator_of(StringParameters(), 4), RATE_HZ)
     voice = Voice(program, PLUCK.displacement(program.grid_points), EAR)
     rendered = Voice(plain_program(RATE_HZ), np.full(3, FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)

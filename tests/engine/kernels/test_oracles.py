@@ -100,6 +100,10 @@ def edge_force(before: float, free: float, give: float, stiffness: float, loss: 
 RATIOS = (DRAW.uniform(8_000, 384_000, 200).round() / DRAW.uniform(8_000, 384_000, 200).round()).tolist()
 
 
+def nearest(ratio: float) -> tuple[int, int]:
+    return Fraction(ratio).limit_denominator(responses.FINEST_RATIO).as_integer_ratio()
+
+
 def k_weighting(hz: Signal) -> Signal:
     """By the filters for 48 kHz of ITU-R BS.1770, tables 1 and 2."""
     shelf = [1.53512485958697, -2.69169618940638, 1.19839281085285], [1.0, -1.69065929318241, 0.73248077421585]
@@ -120,13 +124,9 @@ def transformed(kernel: Any) -> Signal:
     return np.concatenate(found)
 
 
-def by_numpy() -> Signal:
-    found = []
-    for size in SIZES:
-        re, im = np.random.default_rng(size).standard_normal((2, size))
-        spectrum = np.fft.fft(re + 1j * im)
-        found += [spectrum.real, spectrum.imag, re, im]
-    return np.concatenate(found)
+def by_numpy(re: Signal, im: Signal, *_: Signal) -> None:
+    spectrum = np.fft.fft(re + 1j * im)
+    re[:], im[:] = spectrum.real, spectrum.imag
 
 
 VELOCITIES = [(each, curve) for each in range(1, 128, 3) for curve in (-0.7, 0.0, 0.4)]
@@ -135,6 +135,7 @@ VALUES = [
     *((0.2, 8.0, value, 0.4) for value in (0.0, 0.1, 9.0)),
     (3.0, 3.0, 3.0, 0.0),
 ]
+WANTED = [*(each for each, _ in VELOCITIES), 1, 1, 127, 1]
 SINGLE = np.linspace(-12, 12, 501).astype(np.float32)
 PULSES = (0.0, 0.3, 0.5, 1.0, 1 + 1e-7, 7.5)
 FLOWS = [(3.0, 900.0, 0.01), (0.0, 2e4, 1e-3), (900.0, 30.0, 0.002)]
@@ -149,23 +150,11 @@ KERNELS: dict[str, tuple[Any, Any, Callable[[], ArrayLike], float, float]] = {
     "the modes of a string": (strings.rows, rows, modes_of_the_equation, 1e-13, 1e-15),
     "both directions of its modes": (strings.rows, polarised_rows, polarised_modes, 1e-13, 1e-15),
     "the time of a contact": (velocities.contact_s, CONTACTS, lambda: [0.004, 0.002, 0.001, 0.0, 0.0], 1e-12, 1e-15),
-    "a velocity from its value": (
-        velocities.velocity,
-        VALUES,
-        lambda: [*(each for each, _ in VELOCITIES), 1, 1, 127, 1],
-        1e-12,
-        1e-15,
-    ),
+    "a velocity from its value": (velocities.velocity, VALUES, lambda: WANTED, 1e-12, 1e-15),
     "the force of a bridge's edge": (javari.force, EDGES, lambda: [edge_force(*each) for each in EDGES], 1e-5, 1e-9),
-    "a ratio of rates": (
-        responses.fraction,
-        list(zip(RATIOS)),
-        lambda: [Fraction(each).limit_denominator(responses.FINEST_RATIO).as_integer_ratio() for each in RATIOS],
-        1e-12,
-        1e-15,
-    ),
+    "a ratio of rates": (responses.fraction, list(zip(RATIOS)), lambda: list(map(nearest, RATIOS)), 1e-12, 1e-15),
     "K-weighting": (loudness.k_weight, [(HEARD_HZ,)], lambda: [k_weighting(HEARD_HZ)], 0.02, 1e-15),
-    "a Fourier transform": (fourier.transform, transformed, by_numpy, 0, 1e-10),
+    "a Fourier transform": (fourier.transform, transformed, lambda: transformed(by_numpy), 0, 1e-10),
 }
 
 
@@ -248,10 +237,11 @@ def test_what_parameters_refuse_is_impossible_and_what_does_not_swing_is_overdam
 
 def rung(force: Signal, omega: Signal, sigma: Signal, lost: Signal, played: bool = False) -> Signal:
     """The sound of strings that ring with others, by a force at the bridge."""
-    bank, count, out = np.zeros(1, SYMPATHY)[0], len(omega), np.zeros(len(force))
-    shrunk = np.exp(-sigma / RATE_HZ)
-    bank["partials"], bank["gain"][:count], bank["played"][:count] = count, -2 * lost / RATE_HZ, played
-    bank["cosine"][:count], bank["sine"][:count] = shrunk * np.cos(omega / RATE_HZ), shrunk * np.sin(omega / RATE_HZ)
+    bank, out = np.zeros(1, SYMPATHY)[0], np.zeros(len(force))
+    turned = np.exp((1j * omega - sigma) / RATE_HZ)
+    bank["partials"] = count = len(omega)
+    bank["cosine"][:count], bank["sine"][:count] = turned.real, turned.imag
+    bank["gain"][:count], bank["played"][:count] = -2 * lost / RATE_HZ, played
     ring(bank, force, out)
     return out
 

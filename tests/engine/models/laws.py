@@ -31,13 +31,11 @@ PHYSICS = Physics(resonator_of(StringParameters(), MODES, grid_points=POINTS), 4
 LINEAR = Physics(resonator_of(StringParameters(), MODES, tension_modulated=False, grid_points=POINTS), 8_000, SCALE_M)
 REFERENCES = Path(__file__).parent / "references"
 
-Model = StringModel[Any]
-
 
 class Motion(NamedTuple):
     """Three strings that were released, and their frames."""
 
-    model: Model
+    model: StringModel[Any]
     released: Tensor
     whole: Tensor
 

@@ -15,7 +15,7 @@ from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
 from tests.engine.models.laws import ModelLaws, released
-from tests.engine.tensors import displacement_of, of_tension_rise, to_grid, to_modes
+from tests.engine.tensors import to_grid, to_modes
 
 NYLON = StringParameters()
 STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
@@ -58,17 +58,21 @@ def made(string: StringParameters, modes: int, how: str = "series", rate_hz: flo
     return model.eval()
 
 
+def tense(string: StringParameters, modes: int, rise: float, shape: Tensor | Pluck = TRIANGLE) -> Tensor:
+    """Modal amplitudes in m that raise the tension by `rise`, (1, modes)."""
+    amplitudes = to_modes(torch.from_numpy(shape.displacement(101)), modes) if isinstance(shape, Pluck) else shape
+    known = float(resonator_of(string, modes).relative_tension_rise(amplitudes.numpy()))
+    return amplitudes[None] * math.sqrt(rise / known)
+
+
 def pluck_m(string: StringParameters, modes: int, rise: float) -> Tensor:
     """A displacement (1, 101) in m that raises the tension by `rise`."""
-    amplitudes = to_modes(displacement_of(TRIANGLE), modes)
-    return to_grid(of_tension_rise(resonator_of(string, modes), amplitudes, rise), 101)[None]
+    return to_grid(tense(string, modes, rise), 101)
 
 
-def modes_alike_m(rise: float, modes: int = 25) -> Tensor:
+def modes_alike_m(rise: float) -> Tensor:
     """A displacement (1, 101) in m to which all modes of the nylon string add alike, as no soft pluck's do."""
-    amplitudes = torch.ones(modes, dtype=torch.float64)
-    amplitudes[::2] = -1
-    return to_grid(of_tension_rise(resonator_of(NYLON, modes), amplitudes, rise), 101)[None]
+    return to_grid(tense(NYLON, 25, rise, (-1.0) ** torch.arange(1, 26, dtype=torch.float64)), 101)
 
 
 def relative_mse(found: Tensor, truth: Tensor) -> float:
@@ -76,14 +80,12 @@ def relative_mse(found: Tensor, truth: Tensor) -> float:
 
 
 @torch.no_grad()
-def error(
-    model: KoopmanTension, string: StringParameters, displacement_m: Tensor, rate_hz: float, steps: int
-) -> float:
+def error(model: KoopmanTension, string: StringParameters, pulled_m: Tensor, rate_hz: float, steps: int) -> float:
     """Relative MSE against the truth."""
     resonator = resonator_of(string, model.configuration.modes)
-    state = ModalState.at_rest(to_modes(displacement_m, resonator.modes))
+    state = ModalState.at_rest(to_modes(pulled_m, resonator.modes))
     truth_m = to_grid(SplittingSolver(resonator, rate_hz).solve(state, steps)[:, 1:], 101)
-    return relative_mse(model((displacement_m / 1e-3).float(), steps).double() * 1e-3, truth_m)
+    return relative_mse(model((pulled_m / 1e-3).float(), steps).double() * 1e-3, truth_m)
 
 
 @pytest.mark.parametrize(("string", "modes"), [(NYLON, 57), (STEEL, 40)], ids=["nylon", "steel"])
@@ -143,14 +145,6 @@ def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
     assert state.nodes.tolist() == [5, 2, 3, 2]
 
 
-def ringing(string: StringParameters, modes: int, pluck: Pluck, rise: float, frames: int) -> tuple[Tensor, Tensor]:
-    """A string so long after a pluck that raises the tension by `rise`: amplitudes in m, speeds in m a frame."""
-    resonator = resonator_of(string, modes)
-    amplitudes = of_tension_rise(resonator, to_modes(displacement_of(pluck), modes), rise)
-    _, state = SplittingSolver(resonator, 48_000).advance(ModalState.at_rest(amplitudes[None]), frames)
-    return state.amplitude, state.velocity / 48_000
-
-
 @pytest.mark.parametrize(
     ("string", "modes", "pluck", "frames", "allowed"),
     [
@@ -165,10 +159,11 @@ def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
     string: StringParameters, modes: int, pluck: Pluck, frames: int, allowed: float
 ) -> None:
     """Relative MSE with a tension rise of 50 %; speeds as they are instead of w: 1e-7 to 1e-4 in a second."""
-    resonator, model, steps = resonator_of(string, modes), made(string, modes), 16_000
-    amplitudes, speeds = ringing(string, modes, pluck, 0.5, frames)
-    truth, _ = SplittingSolver(resonator, 48_000).advance(ModalState(amplitudes, speeds * 48_000), steps)
-    displacement, velocity = (to_grid(each, 101) / 1e-3 for each in (amplitudes, speeds))
+    model, steps = made(string, modes), 16_000
+    solver = SplittingSolver(resonator_of(string, modes), 48_000)
+    _, ringing = solver.advance(ModalState.at_rest(tense(string, modes, 0.5, pluck)), frames)
+    truth, _ = solver.advance(ringing, steps)
+    displacement, velocity = (to_grid(each, 101) / 1e-3 for each in (ringing.amplitude, ringing.velocity / 48_000))
     state, rest = model.encode(displacement, velocity), model.encode(displacement, torch.zeros_like(velocity))
     assert relative_mse(model.amplitudes(state, steps) * 1e-3, truth) < allowed
     assert relative_mse(model.advance(state, steps)[0] * 1e-3, to_grid(truth, 101)) < allowed + 1e-11

@@ -6,7 +6,6 @@ import pytest
 import torch
 from torch import Tensor
 
-from engine.models._ssm_kernel import stream
 from engine.models.s5 import S5Layer, hippo_normal
 from engine.models.ssm import GatedBlock, evolve, recur
 from tests.engine.models.laws import ModelLaws, relative, released
@@ -118,22 +117,6 @@ def random_recurrence(steps: int) -> tuple[Tensor, Tensor, Tensor]:
 
     log_eigenvalues = torch.complex(-0.1 * draw(5).abs(), 2 * draw(5).real)
     return draw(steps, 2, 5), log_eigenvalues, draw(2, 5)
-
-
-@pytest.mark.parametrize("steps", [1, 2, 31, 32, 33, 64, 100])
-def test_both_routes_are_the_plain_recurrence(steps: int) -> None:
-    inputs, log_eigenvalues, state = random_recurrence(steps)
-    expected, x = [], state
-    for v in inputs:
-        x = log_eigenvalues.exp() * x + v
-        expected.append(x)
-    parallel, last = recur(inputs, log_eigenvalues, state)
-    streamed, end = torch.stack([inputs.real, inputs.imag], dim=-2), state.clone()
-    stream(streamed.numpy(), torch.view_as_real(log_eigenvalues.exp()).numpy(), torch.view_as_real(end).numpy())
-    for found in (parallel, torch.complex(*streamed.unbind(-2))):
-        torch.testing.assert_close(found, torch.stack(expected), rtol=0, atol=1e-12)
-    for found in (last, end):
-        torch.testing.assert_close(found, expected[-1], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("steps", [1, 34])

@@ -19,7 +19,6 @@ from engine.models.base import count_parameters
 from engine.pluck import Pluck
 from engine.presets import (
     PresetError,
-    described_parameters,
     find_preset,
     load_preset,
     outside_training,
@@ -27,7 +26,7 @@ from engine.presets import (
     read_info,
     save_preset,
 )
-from engine.presets.file import METADATA_KEY
+from engine.presets.file import METADATA_KEY, described_parameters
 
 
 @dataclass(frozen=True)
@@ -47,19 +46,14 @@ class Fault:
     many: bool = False
 
     def write(self, path: Path) -> None:
-        data = path.read_bytes()
-        facts, tensors = facts_of(path), load(data)
+        with safe_open(path, "pt") as file:
+            facts = json.loads(file.metadata()[METADATA_KEY])
+        tensors = load(path.read_bytes())
         self.facts(facts)
         if self.tensors is not None:
             self.tensors(tensors)
         written = save(tensors, {METADATA_KEY: self.text(json.dumps(facts))})
         path.write_bytes(self.raw(written) if self.raw is not None else written)
-
-
-def facts_of(path: Path) -> dict[str, Any]:
-    """The metadata of a preset's file."""
-    with safe_open(path, "pt") as file:
-        return dict(json.loads(file.metadata()[METADATA_KEY]))
 
 
 def sets(**values: Any) -> Callable[[dict[str, Any]], None]:
@@ -78,7 +72,6 @@ OTHER_STRING = r"metadata\.string: tensor '(%s)' is of another string, .*; get t
 FAULTS = {
     "newer format": Fault("format_version 99 is newer .* update the program", sets(format_version=99)),
     "no version": Fault("format_version None is not known", lambda facts: facts.pop("format_version")),
-    "unknown field": Fault("unknown field 'colour'", sets(colour="red")),
     "missing field": Fault("field 'rate_hz' is missing", lambda facts: facts.pop("rate_hz")),
     "impossible rate": Fault("rate_hz must be above 0", sets(rate_hz=0)),
     "unknown model": Fault("model 'oracle' is not one of", sets(model="oracle")),
@@ -98,10 +91,7 @@ FAULTS = {
     "no object": Fault("no JSON object", text=lambda text: "[1, 2]"),
     "2**63 states": Fault("state_size: must be a number of at most 64 bits", sets(state_size=2**63)),
     "10**9 states": Fault("state_size must lie in", sets(state_size=10**9)),
-    "wide layers": Fault("multiplier_widths must lie in", sets(multiplier_widths=[10**9])),
     "a billion layers of frnn": Fault("depth must lie in", sets(model="frnn", model_configuration={"depth": 10**9})),
-    "a string of 1000 km": Fault("length_m must lie in 0.01 … 100", sets(length_m=1e6)),
-    "a stiffness beyond any": Fault("second_moment_m4 must lie in", sets(second_moment_m4=1e10)),
     "too high a mode": Fault("too high for a rate_hz|sub-steps", sets(second_moment_m4=1e-6, youngs_modulus_pa=1e13)),
     "10,001 points at 1 MHz": Fault(
         "grid_points times rate_hz", lambda facts: facts.update(grid_points=10_001, rate_hz=1_000_000)
@@ -158,7 +148,8 @@ def test_a_wrong_or_hostile_file_is_refused_in_one_line_that_names_it(preset_fil
 
 
 def test_round_trip_bit_for_bit_and_a_model_that_is_not_finite_is_not_saved(preset_file: Path) -> None:
-    preset, again, before = load_preset(preset_file), preset_file.with_name("again"), preset_file.read_bytes()
+    preset, again = load_preset(preset_file), preset_file.with_name("again")
+    before = preset_file.read_bytes()
     assert preset.info == read_info(preset_file)
     assert preset.name == "small"
     assert described_parameters(preset_file, preset.info) == count_parameters(preset.model)
@@ -194,12 +185,9 @@ def test_other_files_are_refused_and_names_are_found(tmp_path: Path, preset_file
 def test_shipped_presets_are_better_than_the_paper() -> None:
     """Table 2a of the paper, Koopman_var, Gaussian, 4000 steps: relative MAE 0.0977 at 4 kHz, 0.0888 at 16 kHz."""
     wanted = ("koopman_var", "gaussian", 4000, True)
-    infos = map(read_info, preset_files())
-    found = {
-        info.rate_hz: info.rel_mae
-        for info in infos
-        if (info.model, info.initial, info.horizon_steps, info.tension_modulated) == wanted
-    }
+    infos = [read_info(path) for path in preset_files()]
+    kinds = [(info.model, info.initial, info.horizon_steps, info.tension_modulated) for info in infos]
+    found = {info.rate_hz: info.rel_mae for info, kind in zip(infos, kinds, strict=True) if kind == wanted}
     assert found[4_000] <= 0.0977 and found[16_000] <= 0.0888
 
 

@@ -64,7 +64,8 @@ def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
 
 def test_a_displacement_is_shared_by_both_polarisations_and_one_tension() -> None:
     """In the truth against DOP853, at velocities that glide; learned curves are as accurate as in one direction."""
-    resonator, wide, rate_hz = recorded().resonator(STRING, 24), recorded().resonator(STRING, 120), 48_000
+    resonator, wide = (recorded().resonator(STRING, modes) for modes in (24, 120))
+    rate_hz = 48_000
     shape = resonator.shapes[0]
     amplitudes = resonator.to_modes(shape)
     assert np.allclose(amplitudes, [0.8, 0.2, *[0] * 22], atol=1e-9)

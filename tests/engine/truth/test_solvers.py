@@ -49,13 +49,9 @@ def test_the_linear_string_is_exact() -> None:
     assert relative(found, solve_linear(resonator_of(STRING, state.modes), state, times_s)) < 1e-11
 
 
-@pytest.mark.parametrize(
-    ("string", "low", "high"),
-    [(StringParameters(damping_d1_kg_m_s=0, damping_d3_kg_m_s=0), 1 - 1e-7, 1 + 1e-7), (STRING, 0.0, 0.9)],
-)
-def test_without_damping_the_energy_stays_and_with_it_it_falls(
-    string: StringParameters, low: float, high: float
-) -> None:
+def test_without_damping_the_energy_stays() -> None:
+    string = StringParameters(damping_d1_kg_m_s=0, damping_d3_kg_m_s=0)
+
     def energy(state: ModalState) -> float:
         q, v = state.amplitude.numpy(), state.velocity.numpy()
         stretch = float(np.square(wavenumbers(string, 10) * q).sum())
@@ -65,7 +61,7 @@ def test_without_damping_the_energy_stays_and_with_it_it_falls(
     amplitudes = to_modes(draw_noise(1, 101, torch.Generator().manual_seed(1)), 10)
     state = ModalState.at_rest(torch.from_numpy(amplitudes))
     _, later = SplittingSolver(resonator_of(string, 10), 16_000).advance(state, 4000)
-    assert low < energy(later) / energy(state) < high
+    assert energy(later) == pytest.approx(energy(state), rel=1e-7)
 
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
@@ -136,43 +132,30 @@ def test_a_rounded_triangle_is_the_triangle_under_a_spread_force() -> None:
     np.testing.assert_allclose(narrow, sharp, atol=2e-5, rtol=0)  # except modes beyond the grid
 
 
-@pytest.mark.parametrize("release_s", [0.5e-3, 2e-3, 6e-3])
-def test_a_release_in_a_time_is_one_at_once_from_a_smaller_displacement(release_s: float) -> None:
-    """Against DOP853 of modes whose force falls as a raised cosine, without losses: from the middle of the fall."""
+@pytest.mark.parametrize("time_s", [0.5e-3, 2e-3, 6e-3])
+@pytest.mark.parametrize("blow", [False, True])
+def test_a_release_or_a_blow_in_a_time_is_a_smaller_one_at_its_middle(blow: bool, time_s: float) -> None:
+    """Against DOP853 of modes without losses under a force: amplitude and speed after it.
+
+    The force that holds them falls as a raised cosine; that of a hammer is one, and brings speeds that are given.
+    """
     omega = 2 * np.pi * np.array([110.0, 333.0, 1000.0, 2500.0])
+    given = 1e-3 * omega if blow else omega**2
 
     def right_side(t: float, y: np.ndarray) -> np.ndarray:
-        share = min(max(t / release_s, 0.0), 1.0)
-        force = 1 - share + np.sin(2 * np.pi * share) / (2 * np.pi)
-        return np.concatenate([y[4:], omega**2 * (force - y[:4])])
+        share = min(t / time_s, 1.0)
+        held = 1 - share + np.sin(2 * np.pi * share) / (2 * np.pi)
+        force = (1 - np.cos(2 * np.pi * share)) / time_s if blow else held
+        return np.concatenate([y[4:], given * force - omega**2 * y[:4]])
 
-    end_s = release_s + 0.01
-    start = np.concatenate([np.ones(4), np.zeros(4)])
-    most = {"rtol": 1e-11, "atol": 1e-13, "max_step": release_s / 50}
-    found = solve_ivp(right_side, (0, end_s), start, "DOP853", **most)
-    left = spectrum(omega * release_s / (2 * np.pi))
-    np.testing.assert_allclose(found.y[:4, -1], left * np.cos(omega * (end_s - release_s / 2)), atol=1e-8)
-
-
-@pytest.mark.parametrize("contact_s", [0.5e-3, 2e-3, 4e-3])
-def test_a_blow_is_the_force_of_a_hammer_for_a_time(contact_s: float) -> None:
-    """Against DOP853 of a linear string's modes under that force, from rest: amplitude and speed after it."""
-    partial = np.arange(1, 7)
-    omega = 220 * np.pi * partial * np.sqrt(1 + 1e-3 * partial**2)
-    shape_m = displacement("raised_cosine", 0.2, 0.1, 1e-3, 401)
-    swings = to_modes(shape_m, 6) * blow_factor(omega, shape_m / 1e-3)
-    unit = omega * swings  # the speeds that a blow in no time gives
-
-    def right_side(t: float, y: np.ndarray) -> np.ndarray:
-        force = (1 - np.cos(2 * np.pi * t / contact_s)) / contact_s if t < contact_s else 0.0
-        return np.concatenate([y[6:], unit * force - omega**2 * y[:6]])
-
-    most = {"rtol": 1e-11, "atol": 1e-15, "max_step": contact_s / 50}
-    end_s = contact_s + 0.003
-    found = solve_ivp(right_side, (0, end_s), np.zeros(12), "DOP853", **most).y[:, -1]
-    after_s, left = end_s - contact_s / 2, spectrum(omega * contact_s / (2 * np.pi))
-    np.testing.assert_allclose(found[:6], left * swings * np.sin(omega * after_s), atol=1e-10)
-    np.testing.assert_allclose(found[6:], left * unit * np.cos(omega * after_s), atol=1e-6)
+    start = np.concatenate([np.full(4, 0.0 if blow else 1.0), np.zeros(4)])
+    most = {"rtol": 1e-11, "atol": 1e-15, "max_step": time_s / 50}
+    found = solve_ivp(right_side, (0, time_s + 0.003), start, "DOP853", **most).y[:, -1]
+    left, turned = spectrum(omega * time_s / (2 * np.pi)), omega * (time_s / 2 + 0.003)
+    swing = 1e-3 * np.sin(turned) if blow else np.cos(turned)
+    speed = omega * (1e-3 * np.cos(turned) if blow else -np.sin(turned))
+    np.testing.assert_allclose(found[:4], left * swing, atol=1e-8)
+    np.testing.assert_allclose(found[4:], left * speed, atol=1e-4)
 
 
 def test_a_blow_sends_out_a_wave_as_high_as_the_pluck_is() -> None:

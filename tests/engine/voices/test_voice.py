@@ -24,24 +24,7 @@ from engine.voices.program import voice_ends_s
 from engine.voices.programs import rendered_program, truth_program
 from engine.voices.voice import END_FADE_S, FADE_S
 from tests.engine import sounds
-from tests.engine.sounds import (
-    EAR,
-    KNOWING,
-    PLUCK,
-    RATE_HZ,
-    STEEL,
-    Samples,
-    Signal,
-    faded,
-    initial_m,
-    mixer_of,
-    noise,
-    rung,
-    shipped,
-    small,
-    strike,
-    voice_of,
-)
+from tests.engine.sounds import EAR, KNOWING, RATE_HZ, initial_m, mixer_of, rung, shipped, small, strike, voice_of
 
 FADE = round(FADE_S * RATE_HZ)
 KINDS = pytest.mark.parametrize("kind", ["bank", "truth"])
@@ -63,7 +46,7 @@ def constant(frames: int = 48_000, level: float = 0.5, rate_hz: int = RATE_HZ) -
 @KINDS
 @PICKUPS
 def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str) -> None:
-    def rendered(sizes: list[int]) -> Signal:
+    def rendered(sizes: list[int]) -> sounds.Signal:
         mixer = mixer_of(struck(kind, Ear((0.3, 0.6), pickup)), limited=True)
         return np.concatenate([mixer.render(size) for size in sizes])
 
@@ -75,7 +58,9 @@ def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str) -> None:
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 3])
-def test_velocity_is_the_derivative_of_displacement(kind: str, solo: int, derivative: Callable[..., Signal]) -> None:
+def test_velocity_is_the_derivative_of_displacement(
+    kind: str, solo: int, derivative: Callable[..., np.ndarray]
+) -> None:
     points = (0.3, 0.6)
     displacement = rung(9600, struck(kind, Ear(points, solo=solo)), attack=False)
     found = rung(9600, struck(kind, Ear(points, "velocity", solo)), attack=False)
@@ -86,7 +71,7 @@ def test_velocity_is_the_derivative_of_displacement(kind: str, solo: int, deriva
 
 @pytest.mark.parametrize("amplitude_mm", [0.1, 20.0])
 def test_no_pluck_as_velocity_is_taken_for_a_runaway(amplitude_mm: float) -> None:
-    info, pluck = shipped(STEEL).info, Pluck(0.02, amplitude_mm, "triangular")
+    info, pluck = shipped(sounds.STEEL).info, Pluck(0.02, amplitude_mm, "triangular")
     voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), Ear((0.05,), "velocity"))
     assert rung(4800, voice).any()
     assert not voice.ran_away
@@ -153,7 +138,7 @@ def test_at_its_end_it_fades_as_long_at_any_rate(kind: str, rate_hz: int) -> Non
     voice, frames = struck(kind, rate_hz=rate_hz), round(0.02 * rate_hz)
     voice.record["silent"] = 0.0  # louder than it is
     found, whole = (rung(8000, each) for each in (voice, struck(kind, rate_hz=rate_hz)))
-    way = np.concatenate([np.zeros(QUANTUM), faded(frames), np.ones(8000 - QUANTUM - frames)])[:, None]
+    way = np.concatenate([np.zeros(QUANTUM), sounds.faded(frames), np.ones(8000 - QUANTUM - frames)])[:, None]
     np.testing.assert_allclose(found, (1 - way) * whole, atol=1e-7)
     assert voice.over
 
@@ -164,7 +149,7 @@ def test_at_its_end_it_fades_as_long_at_any_rate(kind: str, rate_hz: int) -> Non
 def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(kind: str, pickup: str, frame: int) -> None:
     """All of it, with a change of gain and the release, later by so many frames."""
 
-    def rendered(begins: int) -> Signal:
+    def rendered(begins: int) -> sounds.Signal:
         voice, mixer = struck(kind, Ear((0.3, 0.6), pickup)), Mixer(RATE_HZ, limited=False)
         voice.begin_at(begins)
         mixer.add(voice)
@@ -203,14 +188,14 @@ def test_a_runaway_never_reaches_the_mix(value: float) -> None:
         program.memory[own["omega"] + 3] = value
     initial = initial_m(preset.info, Pluck(0.3))
     wild, parts = Voice(program, initial, EAR), []
-    mixer = mixer_of(wild, strike(STEEL))
+    mixer = mixer_of(wild, strike(sounds.STEEL))
     while not wild.over and mixer.seconds < 3:
         parts.append(mixer.render(64))
     assert wild.ran_away
     assert [gap.cause for gap in mixer.new_gaps()] == ["runaway"]
     largest = 20 * float(np.abs(initial).max()) / FULL_SCALE_M + 1
     assert np.abs(np.concatenate(parts)).max() <= largest
-    expected = rung(len(parts) * 64 + 640, strike(STEEL))
+    expected = rung(len(parts) * 64 + 640, strike(sounds.STEEL))
     np.testing.assert_allclose(mixer.render(640), expected[-640:], atol=1e-6)  # the other voice continues
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)
 
@@ -224,7 +209,7 @@ def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_with
     found = mixer.render(2000)[:, 0]
     first = int(np.argmax(found != 0.5))
     assert first < QUANTUM and voice.sounding
-    np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * faded(FADE)), atol=1e-7)
+    np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * sounds.faded(FADE)), atol=1e-7)
     np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
     assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
     parts = []
@@ -245,7 +230,7 @@ def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(ra
     voice.release(1.0)  # the one under way continues
     waiting.release(0.1)
     found = mixer.render(20_000)[:, 0]
-    np.testing.assert_allclose(found[:frames], 0.5 * (1 - faded(frames)), atol=1e-7)
+    np.testing.assert_allclose(found[:frames], 0.5 * (1 - sounds.faded(frames)), atol=1e-7)
     assert not found[frames:].any()
     timed = constant()
     timed.begin_at(641)
@@ -261,7 +246,7 @@ def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(ra
     assert voice.over and waiting.over and unheard.over and mixer.voices == []
 
 
-def band_limited(rate_hz: int, seconds: float) -> Samples:
+def band_limited(rate_hz: int, seconds: float) -> sounds.Samples:
     """Cosines up to 0.7 of half the rate: even about the first sample, as a string at rest is."""
     time_s = np.arange(round(seconds * rate_hz)) / rate_hz
     rates_hz = np.linspace(0.01, 0.35, 12) * rate_hz
@@ -280,7 +265,7 @@ def empty(
 
 @pytest.mark.parametrize("points", [1, 2])
 def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points: int) -> None:
-    samples = noise(5000, points)
+    samples = sounds.noise(5000, points)
     once, loop = (Voice.of_samples(plain_program(RATE_HZ), each) for each in (samples, samples[:1000]))
     found = rung(6000, once, attack=False)
     np.testing.assert_array_equal(found[:5000], np.broadcast_to(samples, (5000, 2)))
@@ -327,7 +312,7 @@ def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -
 
 
 def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
-    voice, samples = empty(0.1), noise(4801, 1)
+    voice, samples = empty(0.1), sounds.noise(4801, 1)
     mixer = mixer_of(voice)
     assert not mixer.render(640).any()
     assert (voice.seconds, len(mixer.new_gaps())) == (0.0, 1)
@@ -337,7 +322,8 @@ def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
     np.testing.assert_array_equal(found[128:], samples[128:2048, 0])  # nothing was left out, and it has faded in
 
 
-PRESET, SECONDS, CD_HZ = shipped(KNOWING), 0.2, 44_100
+PRESET = shipped(KNOWING)
+SECONDS, CD_HZ = 0.2, 44_100
 
 
 def program_of(kind: str) -> Program:
@@ -348,8 +334,8 @@ def program_of(kind: str) -> Program:
 @pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
 def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear) -> None:
     program, frames = program_of(kind), round(SECONDS * CD_HZ)
-    found = render_voice(program, ModelSource(PRESET), PRESET.info, PLUCK, ear, SECONDS)
-    mixer = mixer_of(Voice(program, initial_m(PRESET.info, PLUCK), ear), rate_hz=CD_HZ, limited=True)
+    found = render_voice(program, ModelSource(PRESET), PRESET.info, sounds.PLUCK, ear, SECONDS)
+    mixer = mixer_of(Voice(program, initial_m(PRESET.info, sounds.PLUCK), ear), rate_hz=CD_HZ, limited=True)
     given = mixer.render(frames + AHEAD)[AHEAD:, : len(ear.points)]  # as a device is, by the limiter's delay later
     np.testing.assert_array_equal(found, given)
     assert mixer.take_reduction_db() == 0.0
@@ -359,20 +345,20 @@ def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path) -
     preset, ear = load_preset(small_preset), Ear((0.3, 0.6))
     info, source = preset.info, ModelSource(preset)
     assert model_program(preset, CD_HZ).rendered
-    found = render_voice(rendered_program(info, info.rate_hz), source, info, PLUCK, ear, SECONDS)
-    let_go_m, weights = initial_m(info, PLUCK), weights_of(ear, info.grid_points)
+    found = render_voice(rendered_program(info, info.rate_hz), source, info, sounds.PLUCK, ear, SECONDS)
+    let_go_m, weights = initial_m(info, sounds.PLUCK), weights_of(ear, info.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
     expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
     attack = round(0.002 * info.rate_hz)
     np.testing.assert_allclose(found[attack:], expected[attack:], atol=1e-6)  # its own rate: as it is
-    higher = render_voice(rendered_program(info, 48_000), source, info, PLUCK, ear, SECONDS)
+    higher = render_voice(rendered_program(info, 48_000), source, info, sounds.PLUCK, ear, SECONDS)
     np.testing.assert_allclose(higher[::12][attack:-4], found[attack:-4], atol=1e-5)
 
 
 def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time() -> None:
     shares: list[float] = []
     program, source = program_of("bank"), ModelSource(PRESET)
-    render_voice(program, source, PRESET.info, PLUCK, EAR, SECONDS, shares.append)
+    render_voice(program, source, PRESET.info, sounds.PLUCK, EAR, SECONDS, shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 
@@ -380,53 +366,39 @@ def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time() -> None:
         raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        render_voice(program, source, PRESET.info, PLUCK, EAR, SECONDS, refuse)
+        render_voice(program, source, PRESET.info, sounds.PLUCK, EAR, SECONDS, refuse)
     program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"]] = -5e-3  # an e-fold in 50 ms
     with pytest.raises(Runaway) as caught:
-        render_voice(program, source, PRESET.info, PLUCK, EAR, 2.0)
+        render_voice(program, source, PRESET.info, sounds.PLUCK, EAR, 2.0)
     assert 0.05 < caught.value.time_s < 1.0
 
 
-def undying(kind: str) -> tuple[Program, ModelSource]:
-    """Of a model that does not decay, compiled or rendered ahead, whose voice ends after 0.3 s."""
-    source = ModelSource(PRESET)
-    if kind == "bank":
-        program = program_of("bank")
-        program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] :][: program.modes] = 1e-9
-    else:
-        program = rendered_program(PRESET.info, CD_HZ)
-
-        shape_m = Pluck(0.3, 0.1).displacement(PRESET.info.grid_points)
-
-        def hum(state: object, steps: int) -> tuple[Signal, object]:
-            return np.cos(np.arange(steps) * math.pi / 4)[None, :, None] * shape_m, state
-
-        source.advance = hum
-    return replace(program, ends_s=0.3), source
+def undying() -> Program:
+    """Of a model that does not decay, whose voice ends after 0.3 s."""
+    program = program_of("bank")
+    program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] :][: program.modes] = 1e-9
+    return replace(program, ends_s=0.3)
 
 
-@pytest.mark.parametrize("kind", ["bank", "rendered"])
 @pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
-def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear) -> None:
-    program, source = undying(kind)
-    found = render_voice(program, source, PRESET.info, PLUCK, ear, 1.0)
-    endless = render_voice(replace(program, ends_s=math.inf), source, PRESET.info, PLUCK, ear, 1.0)
+def test_a_voice_ends_though_its_model_hums_on(ear: Ear) -> None:
+    program, given = undying(), (ModelSource(PRESET), PRESET.info, sounds.PLUCK, ear)
+    found = render_voice(program, *given, 1.0)
+    endless = render_voice(replace(program, ends_s=math.inf), *given, 1.0)
     assert np.abs(endless[-CD_HZ // 10 :]).max() > 1e-3
     first, faded = -(-round(0.3 * CD_HZ) // QUANTUM) * QUANTUM, round(END_FADE_S * CD_HZ)
     done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
     np.testing.assert_array_equal(found[:first], endless[:first])
     np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
-    cut = render_voice(program, source, PRESET.info, PLUCK, ear, 5.0, until_db=60.0)
-    assert first + faded < len(cut) < CD_HZ
+    assert first + faded < len(render_voice(program, *given, 5.0, until_db=60.0)) < CD_HZ
 
 
 @pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
 def test_what_is_played_ends_as_in_a_file(skipped_s: float) -> None:
     """Also where it begins later in its motion, or behind its end."""
-    program, source = undying("bank")
     first, faded_in = round(skipped_s * CD_HZ / QUANTUM) * QUANTUM, 2 * round(0.02 * CD_HZ) * bool(skipped_s)
-    file = render_voice(program, source, PRESET.info, PLUCK, EAR, 1.0)[first:, 0]
-    voice = Voice(program, initial_m(PRESET.info, PLUCK), EAR, 0.0 if skipped_s else 1.0)
+    file = render_voice(undying(), ModelSource(PRESET), PRESET.info, sounds.PLUCK, EAR, 1.0)[first:, 0]
+    voice = Voice(undying(), initial_m(PRESET.info, sounds.PLUCK), EAR, 0.0 if skipped_s else 1.0)
     if skipped_s:
         voice.skip(skipped_s, Mixer(CD_HZ))
         voice.set_gain(1.0)
