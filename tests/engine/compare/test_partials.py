@@ -17,10 +17,6 @@ LINEAR_HZ = (resonator_of(STRING, 10).eigenvalues().imag / (2 * math.pi)).tolist
 RESOLVED = [0, 1, 2, 3, 4, 5, 6, 8, 9]  # mode 8 is at 1994 Hz
 
 
-def times(seconds: float) -> Array:
-    return np.arange(1, round(seconds * RATE_HZ) + 1)[:, None] / RATE_HZ
-
-
 def partial(time_s: Array, hz: Array, sigma: Array, level: float = 1.0, cycles: float = 0.1) -> Array:
     """Phasors (1, frames, modes)."""
     return (level * np.exp(-sigma * time_s + 2j * math.pi * (hz * time_s + cycles)))[None]
@@ -33,7 +29,8 @@ def errors(predicted: Array, truth: Array, *windows_s: tuple[float, float]) -> P
 
 def ten_modes(seconds: float = 2.0) -> tuple[Array, Array, Array]:
     """Times, frequencies, and decay rates so low that every mode is there throughout."""
-    return times(seconds), np.array(LINEAR_HZ), np.linspace(1, 3, 10)
+    time_s = np.arange(1, round(seconds * RATE_HZ) + 1)[:, None] / RATE_HZ
+    return time_s, np.array(LINEAR_HZ), np.linspace(1, 3, 10)
 
 
 def test_detuning_level_and_decay_are_what_they_were_made() -> None:

@@ -157,7 +157,6 @@ def test_what_is_published_lies_between_two_fences() -> None:
     uncached(np.zeros(4, np.int64), 2, 7)
     (code,) = uncached.inspect_llvm().values()
     function = re.search(r"^define [^@]*i32 @.*?^}", code, re.DOTALL | re.MULTILINE)
-    assert function is not None
     steps = re.findall(r"^\s*(fence seq_cst|store i64 %arg\.whole)", function[0], re.MULTILINE)
     assert steps == ["fence seq_cst", "store i64 %arg.whole", "fence seq_cst"]
 

@@ -13,7 +13,6 @@ from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.fields import record_of
 from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
 from engine.presets import load_preset
 from engine.sources import ModelSource, Runaway
@@ -179,7 +178,6 @@ def test_the_attack_is_short_and_smooth() -> None:
 def test_a_runaway_never_reaches_the_mix(value: float) -> None:
     """A number of the model is spoilt: what nobody believes is found out before it is heard."""
     preset = shipped(KNOWING)
-    assert isinstance(preset.model, IntegratedPhase)
     program = model_program(preset, RATE_HZ)
     own = record_of(program.memory, BANK_PROGRAM)
     if value == 50.0:  # one latent grows
