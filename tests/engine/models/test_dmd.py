@@ -14,6 +14,7 @@ from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
 from tests.engine.models.laws import ModelLaws
+from tests.engine.sounds import relative
 from tests.engine.tensors import to_grid, to_modes
 
 STRING, MODES, RATE_HZ = StringParameters(), 25, 16_000
@@ -51,10 +52,6 @@ def assert_same_eigenvalues(model: DMD, expected: np.ndarray, tolerance: float) 
     assert max(distance.min(0).max(), distance.min(1).max()) < tolerance
 
 
-def relative_mse(found: torch.Tensor, truth: torch.Tensor) -> float:
-    return float((found - truth).square().sum() / truth.square().sum())
-
-
 # PyDMD warns of every string: both of its ends are zero in all frames
 @pytest.mark.filterwarnings("ignore:Input data condition number")
 @pytest.mark.parametrize(
@@ -82,7 +79,7 @@ def test_it_finds_the_linear_string_and_follows_others_of_it() -> None:
     half = np.exp(resonator_of(STRING, MODES).eigenvalues() / RATE_HZ)
     assert_same_eigenvalues(fitted(), np.concatenate([half, half.conj()]), 1e-7)
     truth = trajectories()
-    assert relative_mse(fitted()(truth[:, 0].float(), 1000), truth[:, 1:]) < 1e-9
+    assert relative(fitted()(truth[:, 0].float(), 1000), truth[:, 1:]) ** 2 < 1e-9
 
 
 @torch.no_grad()
@@ -99,7 +96,7 @@ def test_modes_that_the_data_do_not_hold_vanish() -> None:
     two_modes = to_grid(to_modes(trajectories()[:1], 2), 101).float()
     model = DMD.fit(two_modes, DMDConfiguration())
     assert int((model.magnitude_log > -600).sum()) == 4
-    assert relative_mse(model(two_modes[:, 0], 1000), two_modes[:, 1:]) < 1e-3
+    assert relative(model(two_modes[:, 0], 1000), two_modes[:, 1:]) ** 2 < 1e-3
     silent = DMD.fit(torch.zeros(1, 10, 101), DMDConfiguration())
     assert torch.equal(silent(torch.ones(1, 101), 5), torch.zeros(1, 5, 101))
 

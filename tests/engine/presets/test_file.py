@@ -72,10 +72,8 @@ OTHER_STRING = r"metadata\.string: tensor '(%s)' is of another string, .*; get t
 FAULTS = {
     "newer format": Fault("format_version 99 is newer .* update the program", sets(format_version=99)),
     "no version": Fault("format_version None is not known", lambda facts: facts.pop("format_version")),
-    "missing field": Fault("field 'rate_hz' is missing", lambda facts: facts.pop("rate_hz")),
     "impossible rate": Fault("rate_hz must be above 0", sets(rate_hz=0)),
     "unknown model": Fault("model 'oracle' is not one of", sets(model="oracle")),
-    "bad string": Fault("length_m must lie in", sets(length_m=-1)),
     "too many modes": Fault("cannot hold 100 modes", sets(modes=100)),
     "other grid": Fault("grid_points is 51, the model's grid has 101", lambda facts: facts.update(grid_points=51)),
     "other size": Fault("has shape .* expected", sets(state_size=17), tensors=dict),
@@ -83,7 +81,7 @@ FAULTS = {
     "no bounds": Fault(r"metadata\.trained_range.*peak_m or tension_rise must be given", sets(peak_m=None)),
     "a shape": Fault("width is of 'square', not of one of gaussian", sets(width={"square": [0.1, 0.2]})),
     # small files that would hang or eat memory: refused by what they ask for, before anything is built
-    "nested a thousand deep": Fault(
+    "1000 deep": Fault(
         "nested|recursion", text=lambda text: text[:-1] + ', "training": ' + "[" * 1000 + "]" * 1000 + "}"
     ),
     "nested a hundred thousand deep": Fault("recursion", text=lambda text: "[" * 100_000 + "]" * 100_000),
@@ -98,7 +96,6 @@ FAULTS = {
     ),
     "an overdamped mode": Fault("mode 1 is overdamped", sets(damping_d3_kg_m_s=10.0)),
     "no unit": Fault("scale_m must lie in", sets(scale_m=1e-300)),
-    "a title of 100 kB": Fault("title: has 100000 characters", sets(title="x" * 100_000)),
     "a field of 100 kB": Fault("unknown field", sets(**{"y" * 100_000: 1})),
     "an escape in a field": Fault("unknown field", sets(**{"\x1b]0;owned\x07\nfield": 1})),
     "metadata of 2 MB": Fault("header|longer", text=lambda text: text[:-1] + " " * 2_000_000 + "}"),
