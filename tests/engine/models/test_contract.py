@@ -26,7 +26,7 @@ def test_every_model_has_its_laws_tested() -> None:
     assert {kind.name for kind in subclasses() if hasattr(kind, "name")} == MODELS.keys()
 
 
-@pytest.mark.parametrize("shape", [(32, 100), (2053,), (4, 8)], ids=["parts of images", "a prime", "few"])
+@pytest.mark.parametrize("shape", [(32, 100), (3200,), (2053,), (4, 8)], ids=["images", "parts", "a prime", "few"])
 @pytest.mark.parametrize("has_bias", [True, False])
 @pytest.mark.parametrize("parted", [True, False])
 def test_a_product_in_parts_is_torchs_with_its_gradients(

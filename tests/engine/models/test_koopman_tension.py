@@ -15,6 +15,7 @@ from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
 from tests.engine.models.laws import ModelLaws, released
+from tests.engine.sounds import relative
 from tests.engine.tensors import to_grid, to_modes
 
 NYLON = StringParameters()
@@ -74,17 +75,13 @@ def modes_alike_m(rise: float) -> Tensor:
     return to_grid(tense(NYLON, 25, rise, (-1.0) ** torch.arange(1, 26, dtype=torch.float64)), 101)
 
 
-def relative_mse(found: Tensor, truth: Tensor) -> float:
-    return float((found - truth).square().sum() / truth.square().sum())
-
-
 @torch.no_grad()
 def error(model: KoopmanTension, string: StringParameters, pulled_m: Tensor, rate_hz: float, steps: int) -> float:
     """Relative MSE against the truth."""
     resonator = resonator_of(string, model.configuration.modes)
     state = ModalState.at_rest(to_modes(pulled_m, resonator.modes))
     truth_m = to_grid(SplittingSolver(resonator, rate_hz).solve(state, steps)[:, 1:], 101)
-    return relative_mse(model((pulled_m / 1e-3).float(), steps).double() * 1e-3, truth_m)
+    return relative(model((pulled_m / 1e-3).float(), steps).double() * 1e-3, truth_m) ** 2
 
 
 @pytest.mark.parametrize(("string", "modes"), [(NYLON, 57), (STEEL, 40)], ids=["nylon", "steel"])
@@ -162,11 +159,12 @@ def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
     truth, _ = solver.advance(ringing, steps)
     displacement, velocity = (to_grid(each, 101) / 1e-3 for each in (ringing.amplitude, ringing.velocity / 48_000))
     state, rest = model.encode(displacement, velocity), model.encode(displacement, torch.zeros_like(velocity))
-    assert relative_mse(model.amplitudes(state, steps) * 1e-3, truth) < allowed
-    assert relative_mse(model.advance(state, steps)[0] * 1e-3, to_grid(truth, 101)) < allowed + 1e-11
+    assert relative(model.amplitudes(state, steps) * 1e-3, truth) ** 2 < allowed
+    assert relative(model.advance(state, steps)[0] * 1e-3, to_grid(truth, 101)) ** 2 < allowed + 1e-11
     assert torch.equal(model.advance(rest, 300)[0], model(displacement, 300))  # a speed of nothing, bit for bit
 
 
+@torch.no_grad()
 def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() -> None:
     """It swings as far as one that was pulled so: what bounds it is the energy, not the displacement it begins at."""
     model, resonator = made(NYLON, 25, rate_hz=16_000), resonator_of(NYLON, 25)
@@ -174,12 +172,10 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
     speeds = amplitudes * torch.from_numpy(resonator.eigenvalues().imag) / 16_000
     pulled = model.encode(to_grid(amplitudes, 101) / 1e-3)
     struck = model.encode(torch.zeros(1, 101).double(), to_grid(speeds, 101) / 1e-3)
-    with torch.no_grad():
-        nodes = [model.advance(state, 1)[1].nodes.tolist() for state in (struck, pulled)]
-    assert nodes == [[5], [5]]
+    assert [model.advance(state, 1)[1].nodes.tolist() for state in (struck, pulled)] == [[5], [5]]
     assert 0.5 < float(struck.largest_energy / pulled.largest_energy) <= 1
     truth, _ = SplittingSolver(resonator, 16_000).advance(ModalState(0 * amplitudes, speeds * 16_000), 1_600)
-    assert relative_mse(model.amplitudes(struck, 1_600) * 1e-3, truth) < 1e-4
+    assert relative(model.amplitudes(struck, 1_600) * 1e-3, truth) ** 2 < 1e-4
 
 
 @torch.no_grad()

@@ -81,7 +81,7 @@ FAULTS = {
     "no bounds": Fault(r"metadata\.trained_range.*peak_m or tension_rise must be given", sets(peak_m=None)),
     "a shape": Fault("width is of 'square', not of one of gaussian", sets(width={"square": [0.1, 0.2]})),
     # small files that would hang or eat memory: refused by what they ask for, before anything is built
-    "1000 deep": Fault(
+    "nested a thousand deep": Fault(
         "nested|recursion", text=lambda text: text[:-1] + ', "training": ' + "[" * 1000 + "]" * 1000 + "}"
     ),
     "nested a hundred thousand deep": Fault("recursion", text=lambda text: "[" * 100_000 + "]" * 100_000),
