@@ -89,6 +89,7 @@ FAULTS = {
     "no object": Fault("no JSON object", text=lambda text: "[1, 2]"),
     "2**63 states": Fault("state_size: must be a number of at most 64 bits", sets(state_size=2**63)),
     "10**9 states": Fault("state_size must lie in", sets(state_size=10**9)),
+    "300,000 widths": Fault("50000 entries", sets(multiplier_widths=[8] * 300_000)),
     "a billion layers of frnn": Fault("depth must lie in", sets(model="frnn", model_configuration={"depth": 10**9})),
     "too high a mode": Fault("too high for a rate_hz|sub-steps", sets(second_moment_m4=1e-6, youngs_modulus_pa=1e13)),
     "10,001 points at 1 MHz": Fault(
