@@ -14,7 +14,7 @@ from engine.resonators.recorded import RecordedAttack, RecordedNote, RecordedStr
 from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, write
 from engine.truth import ModalState, SplittingSolver, solve_dop853
-from engine.values.string import StringParameters
+from engine.values.string import Polarisations, StringParameters
 from tests.engine.sounds import relative, shipped
 
 STRING = StringParameters()
@@ -65,8 +65,9 @@ def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
 def test_a_displacement_is_shared_by_both_polarisations_and_one_tension() -> None:
     """In the truth against DOP853, at velocities that glide; learned curves are as accurate as in one direction."""
     resonator, wide = (recorded().resonator(STRING, modes) for modes in (24, 120))
-    rate_hz = 48_000
-    shape = resonator.shapes[0]
+    shape, rate_hz = resonator.shapes[0], 48_000
+    moving = Polarisations(angle_deg=40, second_heard=0.25)
+    assert np.dot(moving.pulled, moving.heard) == pytest.approx(1)  # heard as high as it is pulled
     amplitudes = resonator.to_modes(shape)
     assert np.allclose(amplitudes, [0.8, 0.2, *[0] * 22], atol=1e-9)
     assert np.allclose(resonator.to_grid(amplitudes), shape, atol=1e-9)
