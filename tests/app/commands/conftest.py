@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -17,30 +18,32 @@ import soundfile
 import torch
 
 from app.commands.cli import main
+from app.export.recipe import SoundRecipe
+from app.export.wav import WavSettings
 from app.player.events import NoteOff, NoteOn, TimedEvent
 from app.player.midi_file import midi_bytes
+from app.rendering.note_sound import NoteSound
+from app.rendering.subject import StringOf
 from engine.excitation import displacement
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.presets import find_string, load_preset, save_preset
+from engine.pluck import Pluck
+from engine.presets import SHIPPED, find_string, load_preset, read_string, save_preset
 from engine.resonators.string import resonator_of
 from engine.schema import write
+from engine.values.ear import Ear
 from training.cli import console
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 
 DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_modulated=False, steps=600, count=20)
 HORIZON = 500  # frames of `tiny`
+STEEL_G3 = find_string("steel_g3")
 EVENTS = [TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.1, NoteOff(57))]
 CONFIGURATION = """
 title = "Tiny"
 model = "koopman_var"
 model_configuration = { state_size = 8, multiplier_widths = [4] }
-[data]
-initial = "gaussian"
-rate_hz = 4000
-modes = 5
-steps = 50
-count = 20
+data = { initial = "gaussian", rate_hz = 4000, modes = 5, steps = 50, count = 20 }
 [recipe]
 epochs = 3
 batch_size = 8
@@ -50,9 +53,7 @@ validate_every = 1
 """
 PLAN = """
 description = "Two runs."
-[data]
-count = 10
-steps = 60
+data = { count = 10, steps = 60 }
 [[block]]
 models = ["koopman_var", "koopman"]
 strings = ["linear"]
@@ -76,13 +77,14 @@ BYTES = {
     "text": b"1 2 3",
     "riff": b"RIFF nothing",
     "table": b"a,b\n1,2\n",
+    "tiny": CONFIGURATION.encode(),
+    "plan": PLAN.encode(),
     "epoch": CONFIGURATION.replace("epochs", "epoch").encode(),
     "koopmann": PLAN.replace('"koopman"', '"koopmann"').encode(),
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What a command line did."""
 
     status: int
@@ -97,9 +99,9 @@ class Outcome:
     @property
     def failure(self) -> str:
         """The one line of a failure."""
-        lines = self.err.splitlines()
-        assert (self.status, self.out, len(lines)) == (1, "", 1), self.err
-        return lines[0]
+        (line,) = self.err.splitlines()
+        assert (self.status, self.out) == (1, ""), self.err
+        return line
 
     @property
     def usage(self) -> str:
@@ -145,8 +147,7 @@ def full_disk() -> FullDisk:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """An empty folder for results."""
-    path = tmp_path / "results"
-    path.mkdir()
+    (path := tmp_path / "results").mkdir()
     return path
 
 
@@ -184,11 +185,18 @@ def tiny(small_preset: Path, tmp_path: Path) -> Path:
 @pytest.fixture
 def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of shipped presets with one file, `good`."""
-    shipped = tmp_path / "shipped"
-    shipped.mkdir()
+    (shipped := tmp_path / "shipped").mkdir()
     shutil.copy(small_preset, shipped / "good.safetensors")
     monkeypatch.setattr("engine.presets.finding.SHIPPED", shipped)
     return shipped
+
+
+def with_recipe(path: Path, recipe: dict[str, Any]) -> Path:
+    """A WAV with a recipe, as a stranger may send it."""
+    with soundfile.SoundFile(path, "w", 4000, 1, "PCM_16", format="WAV") as file:
+        file.comment = json.dumps(recipe)
+        file.write(np.zeros(8))
+    return path
 
 
 class Made:
@@ -203,6 +211,8 @@ class Made:
         stem, _, kind = name.partition(".")
         if stem == "place":
             path.mkdir(exist_ok=True)
+        elif stem == "recipe":
+            path = with_recipe(self.folder / "recipe.wav", self._changed_recipe(kind))
         elif stem in BYTES:
             path.write_bytes(BYTES[stem])
         elif kind == "npy":
@@ -214,20 +224,28 @@ class Made:
         elif kind == "wav":
             seconds = np.arange(48_000) / 48_000
             soundfile.write(path, 0.5 * np.sin(2400 * seconds) * np.exp(-5.3 * seconds), 48_000)
-        elif stem == "tiny":
-            path.write_text(CONFIGURATION, encoding="utf-8")
-        elif stem == "plan":
-            path.write_text(PLAN, encoding="utf-8")
-        elif kind == "toml":  # a string of another value: FIELD=VALUE.toml, or without it
+        elif kind == "toml":
             self._write_string(path, *stem.split("="))
         elif kind == "safetensors":
             path.write_bytes(self.preset.read_bytes()[:-50])
         return str(path)
 
     def _write_string(self, path: Path, field: str, value: str) -> None:
-        lines = find_string("steel_e4").read_text(encoding="utf-8").splitlines()
+        """A string of another value, FIELD=VALUE.toml, or without it."""
+        lines = STEEL_G3.read_text(encoding="utf-8").splitlines()
         others = [line for line in lines if not line.startswith(field)]
         path.write_text("\n".join([*others, f"{field} = {value}" if value else ""]), encoding="utf-8")
+
+    def _changed_recipe(self, changes: str) -> dict[str, Any]:
+        """The recipe of a model of many strings with other values: FIELD=VALUE, or PLACE.FIELD=VALUE, …"""
+        many = StringOf(SHIPPED / "studio_any_string.safetensors", read_string(STEEL_G3), 44_100, 30)
+        sound = NoteSound(many, Pluck(), 0.1, Ear((0.37,)))
+        recipe = json.loads(SoundRecipe.of(sound, sound.load(), "model", WavSettings()).model_dump_json())
+        for change in changes.split(","):
+            field, _, value = change.partition("=")
+            *place, field = field.split(".")
+            (recipe[place[0]] if place else recipe)[field] = json.loads(value)
+        return recipe
 
 
 @pytest.fixture
