@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 from app.commands import cli, render
 from app.export.sound import SOURCES
@@ -30,15 +31,6 @@ def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, env={**environment, **variables}, capture_output=True, text=True)
 
 
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> list[list[Path]]:
-    """Files with which the app was opened; it ends with status 3."""
-    found: list[list[Path]] = []
-    main = types.SimpleNamespace(run=lambda files=(): found.append(list(files)) or 3)
-    monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
-    return found
-
-
 def test_help_needs_none_of_the_heavy_imports() -> None:
     done = python(
         "import sys; from app.commands.cli import main; status = main(['--help'])\n"
@@ -46,8 +38,6 @@ def test_help_needs_none_of_the_heavy_imports() -> None:
         "sys.exit(status)"
     )
     assert (done.returncode, done.stderr) == (0, "")
-    for name in ("presets", "models", "simulate", "predict", "render", "info", "sampled", "compare", "train"):
-        assert f"\n  {name} " in done.stdout
 
 
 def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wait() -> None:
@@ -65,19 +55,29 @@ def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wa
     )
     assert done.returncode == 1
     assert '"parameters": 134885' in done.stdout
-    reported = [line for line in done.stderr.splitlines() if line.startswith("learned-strings")]
-    assert len(reported) == 1
-    assert reported[0].startswith("learned-strings: this needs soundfile, which cannot be imported")
+    (reported,) = [line for line in done.stderr.splitlines() if line.startswith("learned-strings")]
+    assert reported.startswith("learned-strings: this needs soundfile, which cannot be imported")
     assert sys.platform != "linux" or "GOMP_SPINCOUNT = '0'" in done.stderr
 
 
-@pytest.mark.parametrize("group", [[], ["family"], ["drums"], ["render"]])
-def test_help_cuts_no_summary(run: Run, group: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_cuts_no_summary(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    done = run(*group, "--help")
-    assert done.status == 0 and "Usage: learned-strings" in done.out
-    listed = done.out.partition("Commands:")[2].strip().splitlines() if group in (["family"], ["drums"]) else []
-    assert all(line.endswith(".") and not line.endswith("...") for line in listed)
+    listed = {name: run(*name.split(), "--help").out for name in ("", "render", "family", "drums")}
+    assert all("Usage: learned-strings" in text for text in listed.values())
+    for command in typer.main.get_command(cli.cli).commands:  # type: ignore[attr-defined]
+        assert f"\n  {command} " in listed[""]
+    for name in ("family", "drums"):
+        lines = listed[name].partition("Commands:")[2].strip().splitlines()
+        assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[list[Path]]:
+    """Files with which the app was opened; it ends with status 3."""
+    found: list[list[Path]] = []
+    main = types.SimpleNamespace(run=lambda files=(): found.append(list(files)) or 3)
+    monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
+    return found
 
 
 def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
@@ -131,25 +131,20 @@ def test_choices_that_are_known_without_soundfile_are_its_own() -> None:
     assert (render.Bits.__args__, render.Source.__args__, render.Pickup.__args__) == (BITS, SOURCES, PICKUPS)
 
 
-def test_progress_off_a_terminal_is_a_line_now_and_then(
+def test_progress_is_a_line_now_and_then_and_in_a_terminal_a_bar_that_shows_names_as_they_are(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    now = [0.0]
-    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
-    with console.progress("work") as report:
-        for second in range(31):
-            now[0] = float(second)
-            report(second / 60, f"step {second}")
+    now_s = 0.0
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr(console.time, "monotonic", lambda: now_s)
+        with console.progress("work") as report:
+            for now_s in range(31):
+                report(now_s / 60, f"step {now_s}")
     assert capsys.readouterr().err.splitlines() == [
         "learned-strings: work: 17%, 50 s left step 10",
         "learned-strings: work: 33%, 40 s left step 20",
         "learned-strings: work: 50%, 30 s left step 30",
     ]
-
-
-def test_progress_on_a_terminal_is_a_bar_and_names_are_shown_as_they_are(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with console.progress("[/b].mid by [red]") as report:
         report(0.5, "[/i]", left_s=90)
@@ -174,28 +169,18 @@ PROJECT = ("app", "engine", "training", "presets", "run")
 USED = ("ziglang", "numba", "llvmlite", "numpy", "scipy", "torch", "mido", "soundfile", "typer", "click", "psutil")
 LIBRARY = ("json", "pickle", "socket", "struct", "tempfile", "subprocess", "runpy", "signal", "random", "threading")
 SHADOW = "import pathlib\npathlib.Path(__file__).with_suffix('.ran').touch()\nraise SystemExit('shadowed')\n"
-COMMANDS = (
-    ("presets",),
-    ("models",),
-    ("instruments",),
-    ("info", "no such file.safetensors"),
-    ("plugin", "concert_harp", "--dry-run"),
-    ("play", "no such file.mid", "--out", "x.wav"),
-    ("render", "no such preset", "x.wav"),
-    ("learn", "no such file.wav"),
-    ("sampled", "concert_harp", "x.sfz", "--size-only"),
-    ("train", "no such configuration"),
-    ("sweep", "no such plan"),
-    *((name, "--help") for name in ("simulate", "predict", "compare", "evaluate", "table", "family", "drums")),
-)
+COMMANDS = """presets | models | instruments | info none.safetensors | plugin concert_harp --dry-run
+play none.mid --out x.wav | render none x.wav | learn none.wav | sampled concert_harp x.sfz --size-only | train none
+sweep none | simulate --help | predict --help | compare --help | evaluate --help | table --help | family --help
+drums --help""".replace("\n", " | ")
 CHILDREN = f"""
 import subprocess, sys
 from app.commands.cli import main
 from engine.python_process import python_command, python_environment
 from training.sweeping.processes import Layout, process_workers
 if __name__ == "__main__":
-    for words in {COMMANDS!r}:
-        main(words)
+    for words in {COMMANDS!r}.split(" | "):
+        main(words.split())
     for module in (["ziglang", "version"], ["app.export.plugin.texts"]):
         subprocess.run(python_command("-m", *module), env=python_environment(), stdin=subprocess.DEVNULL)
     with process_workers(Layout("cpu", 1, ({{}},))) as workers:
@@ -205,8 +190,7 @@ if __name__ == "__main__":
 
 def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path: Path) -> None:
     """As the installed command starts: the current folder is not on its path."""
-    folder = tmp_path / "current"
-    folder.mkdir()
+    (folder := tmp_path / "current").mkdir()
     for name in (*PROJECT, *USED, *LIBRARY):
         (folder / f"{name}.py").write_text(SHADOW, encoding="utf-8")
     script = tmp_path / "script.py"  # a worker of `multiprocessing` reads it again
@@ -218,15 +202,14 @@ def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path
     assert done.stdout.splitlines()[-1].startswith("{'rows': [], 'error': "), done.stderr
 
 
-def test_every_process_is_started_by_the_one_way_that_leaves_the_current_folder_out() -> None:
+def test_every_process_is_started_by_the_one_way_that_leaves_the_current_folder_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Also after `python -m`, which puts the current folder on the path, and for a folder of the user's own."""
     product = [path for name in ("app", "engine", "training") for path in (ROOT / name).rglob("*.py")]
     starting = re.compile(r"[(\[]\s*sys\.executable")
     starters = {path.name for path in product if starting.search(path.read_text(encoding="utf-8"))}
     assert starters == {"python_process.py"}
-
-
-def test_a_process_finds_code_where_this_one_does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Also after `python -m`, which puts the current folder on the path, and for a folder of the user's own."""
     own, current = tmp_path / "own", tmp_path / "current"
     for each in (own, current):
         each.mkdir()
