@@ -11,11 +11,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
-OFFLINE = """
-import sys
+SCRIPT = """
+import sys, threading
+from PySide6.QtCore import QTimer
 from app.player.events import (NoteOn, TimedEvent)
 from app.player.offline import render_events
 from app.instruments.library import SHIPPED, read_instrument
+from app.window import main
 from engine.presets import find_preset, load_preset
 
 instrument = read_instrument(SHIPPED / "classical_guitar.json")
@@ -24,13 +26,6 @@ for source in ("model", "truth", "difference"):
     blocks = list(render_events(instrument, preset, [TimedEvent(0.0, NoteOn(52, 100))], 48_000, source, seconds=0.2))
     assert source == "difference" or max(abs(block).max() for block in blocks) > 0.01
 assert "torch" not in sys.modules
-"""
-
-WINDOW = """
-import sys, threading
-from PySide6.QtCore import QTimer
-from app.player.events import (NoteOn)
-from app.window import main
 
 keys, drawn, loaded, timer = [45, 64], [], [], QTimer(interval=20)
 
@@ -64,17 +59,11 @@ assert loaded == [False] and "torch" in sys.modules  # the Lab has it before a m
 """
 
 
-def run(code: str, folder: Path) -> None:
-    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(folder / "s.json")}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-
-
-def test_a_factory_instrument_is_rendered(tmp_path: Path) -> None:
-    run(OFFLINE, tmp_path)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="there torch must come before Qt")
-def test_the_window_plays_keys_and_draws_their_strings(tmp_path: Path) -> None:
-    run(WINDOW, tmp_path)
+def test_an_instrument_is_rendered_and_the_window_plays_keys_and_draws_their_strings(tmp_path: Path) -> None:
+    settings = {"QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(tmp_path / "s.json")}
+    command = [sys.executable, "-c", SCRIPT]
+    done = subprocess.run(
+        command, cwd=ROOT, env={**os.environ, **settings}, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr

@@ -103,7 +103,7 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf"), float("-inf"), -1795774879.331, 1e12])
-def test_times_of_a_device_that_cannot_be_are_not_shown(portaudio: Mock, mixer: Mixer, value: float) -> None:
+def test_times_that_cannot_be_are_not_shown(portaudio: Mock, mixer: Mixer, value: float) -> None:
     portaudio.stream.configure_mock(latency=value, time=value, cpu_load=value)
     output = DeviceOutput(found(), 0.05, mixer)
     assert output.latency_s == 0.05, "as it was asked for"
@@ -173,9 +173,7 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
 @pytest.mark.parametrize(
     ("error", "kind"), [(OSError, ProblemKind.PORTAUDIO_MISSING), (PortAudioError, ProblemKind.NOT_STARTED)]
 )
-def test_a_missing_portaudio_is_said_with_its_remedy(
-    monkeypatch: pytest.MonkeyPatch, error: type[Exception], kind: ProblemKind
-) -> None:
+def test_no_portaudio_is_said(monkeypatch: pytest.MonkeyPatch, error: type[Exception], kind: ProblemKind) -> None:
     original = builtins.__import__
 
     def refuse(name: str, *arguments: Any, **options: Any) -> Any:

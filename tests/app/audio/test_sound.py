@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ import pytest
 from app.audio import sound as sound_module
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice
-from app.audio.output import Output
 from app.audio.problems import AudioProblem, ProblemKind, problem, refused
 from app.audio.sound import Sound
 from engine.effects import Effects
@@ -26,27 +26,6 @@ HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
 SPEAKERS = AudioDevice("Speakers", "Test API", 44_100)  # of another rate
 
 
-class FakeOutput(Output):
-    """An output that plays only when a test says so."""
-
-    closed = broken = False
-
-    def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
-        self.device, self.rate_hz, self.latency_s = device, device.default_rate_hz, buffer_s
-        self.mixer, self.now_s = mixer, lambda: 7.0  # type: ignore[method-assign]
-
-    def load(self) -> float:
-        return broken() if self.broken else 0.25
-
-    def close(self) -> None:
-        self.closed = True
-        if self.broken:
-            broken()
-
-    def lose(self) -> None:
-        self.lost = lambda: True  # type: ignore[method-assign]
-
-
 @dataclass
 class Desk:
     """The computer's devices, and all that was asked of them."""
@@ -54,26 +33,34 @@ class Desk:
     devices: list[AudioDevice] = field(default_factory=lambda: [HEADPHONES, SPEAKERS])
     refuses: Callable[[AudioDevice], AudioProblem | None] = lambda device: None
     while_opening: Callable[[], object] = lambda: None
-    outputs: list[FakeOutput] = field(default_factory=list)
+    outputs: list[Mock] = field(default_factory=list)
     rescans: int = 0
     problems: list[AudioProblem] = field(default_factory=list)
 
     def look_up(self, device: DeviceChoice | None, rescan: bool) -> AudioDevice:
         if rescan:
             self.rescans += 1
-            assert all(output.closed for output in self.outputs), "PortAudio must not start under an open stream"
+            assert all(output.close.called for output in self.outputs), (
+                "PortAudio must not start under an open stream"
+            )
         for each in self.devices:
             if device in (None, each.choice):
                 return each
         raise problem(ProblemKind.VANISHED if device else ProblemKind.NO_DEVICE, device.name if device else "")
 
-    def open_output(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> FakeOutput:
-        assert all(output.closed for output in self.outputs), "one at a time: it might refuse to be opened twice"
+    def open_output(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> Mock:
+        """An output that plays only when a test says so."""
+        assert all(output.close.called for output in self.outputs), (
+            "one at a time: it might refuse to be opened twice"
+        )
         self.while_opening()
         if (refusal := self.refuses(device)) is not None:
             raise refusal
-        self.outputs.append(FakeOutput(device, buffer_s, mixer))
-        return self.outputs[-1]
+        output = Mock(device=device, rate_hz=device.default_rate_hz, latency_s=buffer_s, mixer=mixer)
+        for name, value in {"now_s": 7.0, "load": 0.25, "lost": False, "stalled": False}.items():
+            getattr(output, name).return_value = value
+        self.outputs.append(output)
+        return output
 
     @property
     def kinds(self) -> list[ProblemKind]:
@@ -138,7 +125,7 @@ def plays_on(sound: Sound, desk: Desk) -> None:
     """What is asked of it is done, and the mixer is still the device's."""
     opened(sound, buffer="high")
     wait_for(lambda: sound.status().latency_s == 0.04)
-    assert sound.mixer is desk.outputs[-1].mixer and not desk.outputs[-1].closed
+    assert sound.mixer is desk.outputs[-1].mixer and not desk.outputs[-1].close.called
     voice = lasting(sound)
     assert np.abs(sound.mixer.render(4800)).max() > 0.1 and not voice.over
 
@@ -146,7 +133,7 @@ def plays_on(sound: Sound, desk: Desk) -> None:
 # Devices and their mixers
 
 
-def test_without_a_device_time_goes_on_and_the_systems_default_is_opened_at_its_own_rate(
+def test_time_goes_on_and_a_default_is_opened(
     sound: Sound, desk: Desk, threads_begun: Callable[[], list[str]]
 ) -> None:
     before, voice = sound.mixer, lasting(sound)
@@ -161,7 +148,7 @@ def test_without_a_device_time_goes_on_and_the_systems_default_is_opened_at_its_
     assert len(desk.outputs) == 1, "asking for what there is changes nothing"
     for _ in range(2):
         sound.close()
-        assert desk.outputs[0].closed and threads_begun() == []
+        assert desk.outputs[0].close.called and threads_begun() == []
     sound.open()  # nobody obeys, and nothing is wrong
     assert len(desk.outputs) == 1
 
@@ -171,7 +158,7 @@ def test_what_rings_goes_on_where_the_rate_stays_and_choices_are_obeyed(sound: S
     opened(sound)
     voice = lasting(sound)
     opened(sound, desk.devices[-1], buffer="high")
-    assert sound.mixer.voices == [voice] and desk.outputs[0].closed
+    assert sound.mixer.voices == [voice] and desk.outputs[0].close.called
     assert desk.outputs[1].mixer is desk.outputs[0].mixer and desk.outputs[1].latency_s == 0.04
     opened(sound, HEADPHONES, rate_hz=96_000, buffer=512)
     assert (sound.rate_hz, desk.outputs[-1].latency_s) == (96_000, 512 / 96_000)
@@ -182,12 +169,10 @@ def test_what_rings_goes_on_where_the_rate_stays_and_choices_are_obeyed(sound: S
     for number in (1, 2):  # a look for devices interrupts, and takes the same again
         opened(sound, rescan=True)
         wait_for(lambda: sound.status().device is not None)
-        assert [output.closed for output in desk.outputs[3:]] == [True] * number + [False]
+        assert [output.close.called for output in desk.outputs[3:]] == [True] * number + [False]
 
 
-def test_another_rate_has_another_mixer_with_all_that_is_set_also_while_it_is_opened(
-    sound: Sound, desk: Desk
-) -> None:
+def test_another_rate_has_another_mixer_with_all_that_is_set(sound: Sound, desk: Desk) -> None:
     """A device may take a second to open, in which the window sets volume, body and room."""
     opened(sound)
     before, effects = sound.mixer, Effects(room=Room(0.3, 1.0))
@@ -221,15 +206,13 @@ GONE = replace(HEADPHONES, name="Gone")
 @pytest.mark.parametrize(
     ("device", "rate_hz", "kind"), [(SPEAKERS, 0, "busy"), (HEADPHONES, 96_000, "busy"), (GONE, 0, "vanished")]
 )
-def test_where_a_change_is_refused_the_former_device_plays_on(
-    sound: Sound, desk: Desk, device: AudioDevice, rate_hz: int, kind: str
-) -> None:
+def test_a_refused_change_is_undone(sound: Sound, desk: Desk, device: AudioDevice, rate_hz: int, kind: str) -> None:
     opened(sound, HEADPHONES)
     voice, desk.refuses = lasting(sound), busy
     opened(sound, device, rate_hz=rate_hz)
     assert desk.kinds == [kind] and f"“{device.name}”" in str(sound.status().problem)
     assert (sound.status().device, sound.rate_hz) == (HEADPHONES, 48_000)
-    assert sound.mixer.voices == [voice] and not desk.outputs[-1].closed
+    assert sound.mixer.voices == [voice] and not desk.outputs[-1].close.called
 
 
 def test_no_device_at_all_is_reported_and_who_hears_of_it_may_close_the_sound(desk: Desk) -> None:
@@ -249,13 +232,13 @@ def test_no_device_at_all_is_reported_and_who_hears_of_it_may_close_the_sound(de
     other.close()
 
 
-def test_a_lost_device_is_reported_once_and_found_again_unless_another_is_chosen(sound: Sound, desk: Desk) -> None:
+def test_a_lost_device_is_reported_once_and_found_again(sound: Sound, desk: Desk) -> None:
     opened(sound)  # the default, whichever it is
     voice = lasting(sound)
     desk.devices.remove(HEADPHONES)
-    desk.outputs[0].lose()
+    desk.outputs[0].lost.return_value = True
     wait_for(lambda: desk.problems)
-    assert desk.outputs[0].closed
+    assert desk.outputs[0].close.called
     time_goes_on(voice)  # the clock takes over
     tries = desk.rescans
     wait_for(lambda: desk.rescans > tries + 2)
@@ -265,7 +248,7 @@ def test_a_lost_device_is_reported_once_and_found_again_unless_another_is_chosen
     wait_for(lambda: sound.status().device == HEADPHONES)
     assert sound.mixer.voices == [voice] and sound.status().problem is None and len(desk.problems) == 1
     desk.devices.remove(HEADPHONES)
-    desk.outputs[1].lose()
+    desk.outputs[1].lost.return_value = True
     wait_for(lambda: len(desk.problems) == 2)
     opened(sound, SPEAKERS)
     desk.devices.insert(0, HEADPHONES)
@@ -277,29 +260,27 @@ def test_a_lost_device_is_reported_once_and_found_again_unless_another_is_chosen
 def test_a_stall_is_reported_and_withdrawn(sound: Sound, desk: Desk) -> None:
     opened(sound)
     for number in (1, 2):
-        desk.outputs[0].stalled = lambda: True  # type: ignore[method-assign]
+        desk.outputs[0].stalled.return_value = True
         wait_for(lambda number=number: len(desk.problems) == number)  # type: ignore[misc]
         assert "“Headphones” stopped" in str(sound.status().problem)
         looked_at(sound)
-        desk.outputs[0].stalled = lambda: False  # type: ignore[method-assign]
+        desk.outputs[0].stalled.return_value = False
         wait_for(lambda: sound.status().problem is None)
-    assert desk.kinds == [ProblemKind.STALLED] * 2 and not desk.outputs[0].closed
+    assert desk.kinds == [ProblemKind.STALLED] * 2 and not desk.outputs[0].close.called
 
 
-def test_a_device_that_stops_under_load_is_opened_again_at_once(
-    sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_device_that_stops_is_opened_at_once(sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits for it as for one that was unplugged, and what rings continues."""
     monkeypatch.setattr(sound_module, "TRY_AGAIN_S", 1e6)
     opened(sound)
     voice = lasting(sound)
     sound.mixer.record["calls"] += 1
-    desk.outputs[0].lose()
+    desk.outputs[0].lost.return_value = True
     wait_for(lambda: len(desk.outputs) == 2 and sound.status().gaps)
-    assert desk.outputs[0].closed and desk.problems == [] and sound.mixer.voices == [voice]
+    assert desk.outputs[0].close.called and desk.problems == [] and sound.mixer.voices == [voice]
     (gap,) = sound.status().gaps
     assert gap.cause == "device" and gap.milliseconds >= 0
-    desk.outputs[1].lose()  # this one has never played
+    desk.outputs[1].lost.return_value = True  # this one has never played
     wait_for(lambda: desk.problems)
     assert desk.kinds == [ProblemKind.VANISHED]
 
@@ -325,7 +306,7 @@ def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(
     if stage == "watch":
         sound.watch(broken)
     elif stage == "output":
-        desk.outputs[0].broken = True
+        desk.outputs[0].load.side_effect = desk.outputs[0].close.side_effect = broken
         wait_for(lambda: len(desk.outputs) == 2)
     else:
         monkeypatch.setattr(Mixer, stage, broken)

@@ -141,9 +141,7 @@ def test_odd_files_cost_no_samples(path: Path) -> None:
 
 @pytest.mark.parametrize("name", [b"DISP", b"_PMX", b"LIST"])
 @pytest.mark.parametrize(("length", "filled"), [(1, 33), (17, 0), (603, 100)])
-def test_odd_chunks_without_padding_before_chunks_of_any_name(
-    name: bytes, length: int, filled: int, path: Path
-) -> None:
+def test_odd_chunks_may_lack_their_padding(name: bytes, length: int, filled: int, path: Path) -> None:
     """A name less its first letter, and a size of 100, look like a name too."""
     odd = chunk(b"strc", bytes([filled]) * length, padded=False)
     text = chunk(name, (b"INFO" if name == b"LIST" else b"") + bytes([filled]) * 100)
@@ -309,9 +307,7 @@ UNUSABLE = [  # as a note, as a body
 @pytest.mark.parametrize(
     ("make", "as_note", "as_body"), [*((make, words, words) for make, words in UNREADABLE), *UNUSABLE]
 )
-def test_what_is_no_sound_or_cannot_be_used_is_named_in_one_line(
-    path: Path, make: Callable[[Path], object], as_note: str, as_body: str
-) -> None:
+def test_what_cannot_be_used_is_named(path: Path, make: Callable[[Path], object], as_note: str, as_body: str) -> None:
     make(path)
     for read, error, reported in ((read_note, NoteFileError, as_note), (read_impulse, ImpulseError, as_body)):
         if reported:
@@ -321,9 +317,7 @@ def test_what_is_no_sound_or_cannot_be_used_is_named_in_one_line(
             assert len(str(caught.value)) < 400
 
 
-def test_many_channels_at_a_high_rate_are_refused_before_they_fill_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_many_channels_are_refused_before_they_fill_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A minute of silence of eight channels at 384 kHz is a small FLAC, and 1.5 GB of samples."""
     with soundfile.SoundFile(tmp_path / "a.flac", "w", 384_000, 8, "PCM_16") as file:
         for _ in range(6):

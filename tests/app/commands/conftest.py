@@ -71,6 +71,8 @@ ARRAYS = {
     "objects": np.full((1, 101), None),
     "nan": np.full((1, 101), np.nan),
     "infinite": np.full((1, 101), np.inf),
+    "millimetres": 1e3 * displacement("gaussian", 0.3, 0.05, 2e-3, 101)[None],
+    "endless": 1e6 * displacement("gaussian", 0.3, 0.05, 2e-3, 101)[None],
 }
 BYTES = {
     "nothing": b"",
@@ -115,14 +117,21 @@ FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run a command line in this process; lines of progress come only after an hour."""
+def run(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run a command line in this process, and more words; a name in its braces is a fixture's.
+
+    Lines of progress come only after an hour.
+    """
     monkeypatch.setattr(console, "bars", partial(console.bars, 3600.0))
 
-    def run(*words: object) -> Outcome:
+    class Fixtures(dict[str, Any]):
+        def __missing__(self, name: str) -> Any:
+            return request.getfixturevalue(name)
+
+    def run(line: str, *more: object) -> Outcome:
+        words = [word.format_map(Fixtures()) for word in line.split()]
         capsys.readouterr()
-        status = main([str(word) for word in words])
-        return Outcome(status, *capsys.readouterr())
+        return Outcome(main([*words, *map(str, more)]), *capsys.readouterr())
 
     return run
 
@@ -149,6 +158,11 @@ def folder(tmp_path: Path) -> Path:
     """An empty folder for results."""
     (path := tmp_path / "results").mkdir()
     return path
+
+
+@pytest.fixture
+def out(folder: Path) -> Path:
+    return folder / "out"
 
 
 @pytest.fixture
@@ -209,8 +223,10 @@ class Made:
     def __format__(self, name: str) -> str:
         path = self.folder / name
         stem, _, kind = name.partition(".")
-        if stem == "place":
-            path.mkdir(exist_ok=True)
+        if path.exists():
+            pass
+        elif stem == "place":
+            path.mkdir()
         elif stem == "recipe":
             path = with_recipe(self.folder / "recipe.wav", self._changed_recipe(kind))
         elif stem in BYTES:
@@ -222,8 +238,9 @@ class Made:
         elif kind == "mid":
             path.write_bytes(midi_bytes(EVENTS))
         elif kind == "wav":
-            seconds = np.arange(48_000) / 48_000
-            soundfile.write(path, 0.5 * np.sin(2400 * seconds) * np.exp(-5.3 * seconds), 48_000)
+            seconds, noise = np.arange(48_000) / 48_000, np.random.default_rng(0).uniform(-0.2, 0.2, 48_000)
+            note = 0.5 * np.sin(2400 * seconds) * np.exp(-5.3 * seconds)
+            soundfile.write(path, noise if stem == "noise" else note, 48_000)
         elif kind == "toml":
             self._write_string(path, *stem.split("="))
         elif kind == "safetensors":
@@ -249,7 +266,5 @@ class Made:
 
 
 @pytest.fixture
-def places(small_preset: Path, u0: Path, tiny: Path, folder: Path, tmp_path: Path) -> dict[str, Any]:
-    """What a line's braces stand for."""
-    made = Made(tmp_path, small_preset)
-    return {"preset": small_preset, "u0": u0, "tiny": tiny, "out": folder / "out", "folder": folder, "made": made}
+def made(small_preset: Path, tmp_path: Path) -> Made:
+    return Made(tmp_path, small_preset)

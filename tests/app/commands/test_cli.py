@@ -62,7 +62,7 @@ def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wa
 
 def test_help_cuts_no_summary(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    listed = {name: run(*name.split(), "--help").out for name in ("", "render", "family", "drums")}
+    listed = {name: run(f"{name} --help").out for name in ("", "render", "family", "drums")}
     assert all("Usage: learned-strings" in text for text in listed.values())
     for command in typer.main.get_command(cli.cli).commands:  # type: ignore[attr-defined]
         assert f"\n  {command} " in listed[""]
@@ -86,28 +86,26 @@ def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
     monkeypatch.chdir(tmp_path)
     for name in ("song.mid", "models"):
         Path(name).touch()
-    assert [run(*words).status for words in ([], ["song.mid", "./models"], ["models"])] == [3, 3, 0]
+    assert [run(line).status for line in ("", "song.mid ./models", "models")] == [3, 3, 0]
     assert opened == [[], [tmp_path / "song.mid", tmp_path / "models"]]
-    absent = run("song.mid", "gone.wav")
+    absent = run("song.mid gone.wav")
     assert (absent.status, absent.err) == (2, "learned-strings: gone.wav: no such file; check the name\n")
     assert len(opened) == 2
     assert run("--version").out.strip()
 
 
-def test_a_failure_is_one_line_its_traceback_on_demand_and_an_interruption_status_130(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failure_is_one_line_and_an_interruption_status_130(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     errors: list[BaseException] = [ValueError("first\nsecond"), ValueError("again"), KeyboardInterrupt()]
 
     def fail() -> int:
         raise errors.pop(0)
 
     monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=fail))  # type: ignore[arg-type]
-    assert run().failure == "learned-strings: first second"
+    assert run("").failure == "learned-strings: first second"
     monkeypatch.setenv(cli.DEBUG_VARIABLE, "1")
-    shown = run()
+    shown = run("")
     assert shown.status == 1 and "Traceback" in shown.err
-    assert run().status == 130
+    assert run("").status == 130
 
 
 @pytest.mark.parametrize(
@@ -131,9 +129,7 @@ def test_choices_that_are_known_without_soundfile_are_its_own() -> None:
     assert (render.Bits.__args__, render.Source.__args__, render.Pickup.__args__) == (BITS, SOURCES, PICKUPS)
 
 
-def test_progress_is_a_line_now_and_then_and_in_a_terminal_a_bar_that_shows_names_as_they_are(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_is_lines_or_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     now_s = 0.0
     with monkeypatch.context() as instrumented:
         instrumented.setattr(console.time, "monotonic", lambda: now_s)
@@ -152,7 +148,7 @@ def test_progress_is_a_line_now_and_then_and_in_a_terminal_a_bar_that_shows_name
     assert found.out == "" and "[/b].mid by [red]" in found.err
 
 
-def test_json_is_valid_for_any_number_and_a_table_keeps_a_long_cell_on_its_line(
+def test_json_is_valid_and_a_table_keeps_a_long_cell_on_its_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     console.print_json({"a": [float("inf"), float("nan"), 1.5], "b": (1, None)})
@@ -202,9 +198,7 @@ def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path
     assert done.stdout.splitlines()[-1].startswith("{'rows': [], 'error': "), done.stderr
 
 
-def test_every_process_is_started_by_the_one_way_that_leaves_the_current_folder_out(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_every_process_leaves_the_current_folder_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Also after `python -m`, which puts the current folder on the path, and for a folder of the user's own."""
     product = [path for name in ("app", "engine", "training") for path in (ROOT / name).rglob("*.py")]
     starting = re.compile(r"[(\[]\s*sys\.executable")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,9 +28,7 @@ def plain(text: str, *places: Path) -> str:
 
 
 @pytest.mark.parametrize("file", sorted(Path(__file__).with_name("golden").glob("*.txt")), ids=lambda file: file.stem)
-def test_a_command_prints_its_golden_text(
-    run: Run, file: Path, places: dict[str, Any], request: pytest.FixtureRequest
-) -> None:
+def test_a_command_prints_its_golden_text(run: Run, file: Path, folder: Path, request: pytest.FixtureRequest) -> None:
     wanted = file.read_text(encoding="utf-8")
     if "good" in wanted:
         installed = request.getfixturevalue("installed")
@@ -40,9 +37,9 @@ def test_a_command_prints_its_golden_text(
         add_heard(installed, [Heard("good", digest, 4.0, 9.0, 5.2, 3.0, 13.0)])
     printed = []
     for line in re.findall(r"(?m)^\$ (.*) → \d+$", wanted):
-        done = run(*(word.format_map(places) for word in line.split()))
+        done = run(line)
         printed += [f"$ {line} → {done.status}\n", done.out, done.err]
-    found = plain("".join(printed), places["folder"], places["folder"].parent, SHIPPED)
+    found = plain("".join(printed), folder, folder.parent, SHIPPED)
     if os.environ.get("LEARNED_STRINGS_GOLDEN") == "write":
         file.write_text(found, encoding="utf-8")
         wanted = found

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import subprocess
 import sys
 import time
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.commands.cli import main
 from app.instruments.library import find_instrument
 from app.player import learned
 from app.player.offline import render_note
@@ -28,6 +25,10 @@ from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
 
+LEARN = "learn --name My_string --scale-length 0.65"
+PRESET = "my_string.safetensors"
+KNOWN: dict[Path, Any] = {}
+
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -38,19 +39,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-WORDS = ("--name", "My string", "--scale-length", "0.65", "--json")
-
-
-@pytest.fixture(scope="module")
-def whole(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """A folder with the instrument that was learned, and what the command printed."""
-    folder = tmp_path_factory.mktemp("whole")
-    with pytest.MonkeyPatch.context() as instrumented, redirect_stdout(io.StringIO()) as printed:
-        instrumented.setenv("LEARNED_STRINGS_PRESETS", str(folder))
-        assert main(["learn", str(recording), *WORDS]) == 0
-    return folder, json.loads(printed.getvalue().encode())
-
-
 @pytest.fixture
 def own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of the user's instruments."""
@@ -58,21 +46,44 @@ def own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+@pytest.fixture
+def learned_once(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Of all tests the first learns a recording; whether each of this one was asked to continue all the same."""
+    learn_files, anyway = learned.learn_files, list[bool]()
+
+    def learn(notes: list[Path], **options: Any) -> Any:
+        anyway.append(options["anyway"])
+        if notes[0] not in KNOWN:
+            KNOWN[notes[0]] = learn_files(notes, **options)
+        return KNOWN[notes[0]]
+
+    monkeypatch.setattr(learned, "learn_files", learn)
+    return anyway
+
+
 def files(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if path.is_file()]
 
 
-def test_a_note_becomes_an_instrument(
-    run: Run, recording: Path, whole: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.usefixtures("learned_once")
+def test_a_note_becomes_an_instrument_of_whose_files_all_or_none_are_written(
+    run: Run, recording: Path, own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own, data = whole
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    def full(*_: object) -> None:
+        raise WriteError("instruments: cannot be written (No space left on device)")
+
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr(learned, "save_instrument", full)
+        assert "No space left" in run(LEARN, recording).failure
+    assert files(own) == []
+    done = run(f"{LEARN} --json", recording)
+    data = json.loads(done.out)
     assert data["recordings"][0]["errors"]["esr"] < 0.01
-    assert Path(data["preset"]) == own / "my_string.safetensors"
+    assert Path(data["preset"]) == own / PRESET
     assert (own / "bodies" / "my_string.wav").is_file() and (own / "instruments" / "my_string.json").is_file()
 
     out = tmp_path / "again.wav"  # which is without the attack
-    assert run("render", "my_string", out, "--as-recorded").status == 0
+    assert run("render my_string --as-recorded", out).status == 0
     with recording.open("rb") as file:
         truth, rate_hz = soundfile.read(file)
     sound, rendered_hz = soundfile.read(out)
@@ -82,7 +93,7 @@ def test_a_note_becomes_an_instrument(
 
     instrument = find_instrument("my_string").instrument
     low, high = instrument.range
-    preset, middle = load_preset(own / "my_string.safetensors"), (low + high) // 2
+    preset, middle = load_preset(own / PRESET), (low + high) // 2
     for key in (low, middle, high):
         assert np.abs(render_note(instrument, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
 
@@ -96,7 +107,7 @@ def test_a_note_becomes_an_instrument(
         energies.append(float(only @ only) / rate)
         assert np.abs(only[round(0.36 * rate) :]).max() < 1e-2 * np.abs(only).max()
     assert energies[0] > 1e-6 and energies[0] == pytest.approx(energies[1], rel=0.25)
-    assert "exists already" in run("learn", recording, "--name", "My string").failure
+    assert "exists already" in run(LEARN, recording).failure
 
 
 def steps_of(folder: Path) -> int:
@@ -106,16 +117,14 @@ def steps_of(folder: Path) -> int:
 
 
 def test_a_killed_command_continues_with_the_same_result(
-    run: Run, recording: Path, whole: tuple[Path, dict[str, Any]], own: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, recording: Path, own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["learn", str(recording), *WORDS]
-    command = [sys.executable, "-m", "app.commands.cli", *words]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ)) as process:
+    words = [*LEARN.split(), str(recording)]
+    with subprocess.Popen([sys.executable, "-m", "app.commands.cli", *words], stderr=subprocess.DEVNULL) as process:
         while process.poll() is None and steps_of(own) <= 8:
             time.sleep(0.01)
         process.kill()
-    preset = "my_string.safetensors"
-    assert steps_of(own) > 8 and not (own / preset).exists()
+    assert steps_of(own) > 8 and not (own / PRESET).exists()
 
     restored = []
 
@@ -123,12 +132,16 @@ def test_a_killed_command_continues_with_the_same_result(
         restored.append(restore(*given))
         return restored[-1]
 
-    monkeypatch.setattr("training.recording.fit.restore", restore_and_note)
-    done = run(*words[:-1])  # in words
-    assert done.status == 0 and str(own / "my_string.safetensors") in done.out
+    with monkeypatch.context() as instrumented:
+        instrumented.setattr("training.recording.fit.restore", restore_and_note)
+        done = run(LEARN, recording)
+    assert done.status == 0 and str(own / PRESET) in done.out
     assert restored[0] > 8
     assert not any((own / "unfinished").iterdir())
-    assert (own / preset).read_bytes() == (whole[0] / preset).read_bytes()
+    whole = KNOWN.get(recording) or learned.learn_files([recording], kind="guitar", length_m=0.65)
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
+    learned.keep("My_string", whole, "guitar")
+    assert (own / PRESET).read_bytes() == (tmp_path / PRESET).read_bytes()
 
 
 def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
@@ -140,37 +153,24 @@ def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
 
     with monkeypatch.context() as instrumented:
         instrumented.setattr("training.recording.fit.save", save_and_stop)
-        stopped = run("learn", recording, "--name", "Mine")
+        stopped = run(LEARN, recording)
     assert stopped.status == 130 and "the same command continues there" in stopped.err
     (checkpoint,) = (own / "unfinished").iterdir()
     checkpoint.write_text("{}")
-    damaged = run("learn", recording, "--name", "Mine").failure
+    damaged = run(LEARN, recording).failure
     assert "damaged checkpoint" in damaged and "delete it to start again" in damaged
 
 
-def test_a_sound_without_a_string_is_reported_and_only_an_option_keeps_it(
-    run: Run, own: Path, tmp_path: Path
+def test_only_an_option_keeps_what_is_no_string(
+    run: Run, own: Path, tmp_path: Path, learned_once: list[bool]
 ) -> None:
-    soundfile.write(tmp_path / "noise.wav", 0.1 * np.random.default_rng(0).standard_normal(88_200), 44_100)
     samples, rate_hz = membrane(np.random.default_rng(30))
     drum = tmp_path / "drum.wav"
     soundfile.write(drum, samples[:rate_hz], rate_hz, subtype="FLOAT")
-    assert "give one plucked note" in run("learn", tmp_path / "noise.wav", "--name", "Noise").err
-    assert "drum.wav: no string found" in run("learn", drum, "--name", "Drum").failure
+    assert "drum.wav: no string found" in run("learn --name Drum", drum).failure
     assert files(own) == []
-    kept = run("learn", drum, "--name", "Drum", "--anyway", "--json")
-    assert kept.status == 0, kept.err
+    kept = run("learn --name Drum --anyway --json", drum)
+    assert (kept.status, learned_once) == (0, [False, True]), kept.err
     (found,) = json.loads(kept.out)["recordings"]
     assert found["found"] is False and found["linear_esr"] > 0
     assert (own / "drum.safetensors").is_file()
-
-
-def test_where_an_instrument_cannot_be_written_none_of_its_files_stays(
-    run: Run, recording: Path, own: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object) -> None:
-        raise WriteError("instruments: cannot be written (No space left on device)")
-
-    monkeypatch.setattr(learned, "save_instrument", full)
-    assert "No space left" in run("learn", recording, "--name", "My string").failure
-    assert files(own) == []

@@ -19,7 +19,7 @@ import torch
 from engine.compare.relative import RelativeError
 from engine.presets import load_preset, preset_digest
 from engine.schema import read, write
-from tests.app.commands.conftest import CONFIGURATION, FullDisk, Run
+from tests.app.commands.conftest import CONFIGURATION, Run
 from training.cell import Cell, configuration_of
 from training.cli import console
 from training.cli.sweep import Shown
@@ -34,12 +34,9 @@ from training.sweeping.task import Task, Workers
 NAMES = ["nylon_linear_noise_4k_koopman_var_60", "nylon_linear_noise_4k_koopman_60"]
 
 
-def test_runs_are_trained_together_alone_or_shortened_and_never_twice(
-    run: Run, places: dict[str, Any], tmp_path: Path, folder: Path
-) -> None:
-    file = f"{places['made']:tiny.toml}"
-    words = ["train", file, "--runs", folder, "--cache", tmp_path / "cache"]
-    together = run(*words, "--seeds", 2)
+def test_runs_are_trained_together_alone_or_shortened_and_never_twice(run: Run, tmp_path: Path, folder: Path) -> None:
+    train = f"train {{made:tiny.toml}} --runs {{folder}} --cache {tmp_path / 'cache'}"
+    together = run(f"{train} --seeds 2")
     assert (together.status, together.err) == (0, "")
     paths = [folder / name / f"{name}.safetensors" for name in ("tiny", "tiny_seed1")]
     one, other = (load_preset(path) for path in paths)
@@ -49,7 +46,7 @@ def test_runs_are_trained_together_alone_or_shortened_and_never_twice(
     assert other.info.title == f"{one.info.title}, seed 1"
     assert any((a != b).any() for a, b in zip(one.model.parameters(), other.model.parameters(), strict=True))
 
-    lines = run(*words, "--seed", 0).out.splitlines()  # its own seed: the same run
+    lines = run(f"{train} --seed 0").out.splitlines()  # its own seed: the same run
     info = one.info
     assert lines[0] == str(paths[0])
     assert f"rel. MSE {info.rel_mse:.4g}, rel. MAE {info.rel_mae:.4g}" in lines[1]
@@ -60,17 +57,16 @@ def test_runs_are_trained_together_alone_or_shortened_and_never_twice(
     assert lines[6] == f"heard       {heard_sentence(heard[preset_digest(paths[0])], 'tiny')}" and problems == []
     assert info.trained_range.position == (0.3, 0.7)
 
-    preset = tmp_path / "mine.safetensors"
-    assert run(*words, "--seed", 1, "--epochs", 2, "--output", preset).status == 0
-    info = load_preset(preset).info
+    assert run(f"{train} --seed 1 --epochs 2 --output {{out}}.safetensors").status == 0
+    info = load_preset(folder / "out.safetensors").info
     assert (info.title, info.training["recipe"]["epochs"]) == ("Tiny, seed 1, 2 epochs", 2)
     for name, epochs in (("tiny", 3), ("tiny_seed1_epochs2", 2)):
         rates = [epoch.learning_rate for epoch in read_log(folder / name / "log.csv")]
         assert len(rates) == epochs and rates[-1] == 0  # the cycle ends with the run
-    Path(file).write_text(CONFIGURATION.replace("epochs = 3", "epochs = 4"), encoding="utf-8")
-    assert "was trained with other settings; delete it" in run(*words).failure
+    (tmp_path / "tiny.toml").write_text(CONFIGURATION.replace("epochs = 3", "epochs = 4"), encoding="utf-8")
+    assert "was trained with other settings; delete it" in run(train).failure
     if not torch.cuda.is_available():
-        assert "no CUDA device can be used here" in run(*words, "--seed", 5, "--device", "cuda").failure
+        assert "no CUDA device can be used here" in run(f"{train} --seed 5 --device cuda").failure
 
 
 def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,8 +79,8 @@ def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.
     monkeypatch.setattr("training.cli.training.load_data", lambda *_: None)
     monkeypatch.setattr("training.run.run_rows", begin)
     cell = "nylon_linear_noise_4k_lru_400_paper"
-    for words in ([cell], [cell, "--epochs", 9, "--seeds", 2], [f"{cell}_seed1_epochs9"]):  # and by its own name
-        run("train", *words)
+    for words in (cell, f"{cell} --epochs 9 --seeds 2", f"{cell}_seed1_epochs9"):  # and by its own name
+        run(f"train {words}")
     assert chosen == [(cell, "paper"), (f"{cell}_epochs9", ""), *[(f"{cell}_seed1_epochs9", "")] * 2]
 
 
@@ -97,11 +93,7 @@ def row_of(name: str, digest: str = "", **changes: Any) -> Row:
     return Row(digest or name, name, **({**fields, "finished": "2026-01-01T00:00:00Z"} | changes))
 
 
-@pytest.fixture
-def words(places: dict[str, Any], folder: Path) -> list[Any]:
-    return ["sweep", f"{places['made']:plan.toml}", "--runs", folder, "--device", "cpu"]
-
-
+SWEEP = "sweep {made:plan.toml} --runs {folder} --device cpu"
 Script = Callable[[Callable[[str], Row | str]], list[Layout]]
 
 
@@ -131,9 +123,9 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Script:
     return make
 
 
-def test_a_sweep_ends_with_its_rows(run: Run, words: list[Any], folder: Path, script: Script) -> None:
+def test_a_sweep_ends_with_its_rows(run: Run, folder: Path, script: Script) -> None:
     layouts = script(row_of)
-    found = run(*words, "--workers", "3", "--threads", "2")
+    found = run(f"{SWEEP} --workers 3 --threads 2")
     assert found.status == 0
     assert (len(layouts[0].environments), layouts[0].threads) == (2, 2)  # not more than runs
     file = folder / "plan" / "results.csv"  # a trial's own
@@ -143,71 +135,59 @@ def test_a_sweep_ends_with_its_rows(run: Run, words: list[Any], folder: Path, sc
     assert lines[1] == "learned-strings: on a script"
     assert f"{NAMES[0]}: done, rel. MAE 0.5, 8 s (1 done, 0 running, 1 waiting; about 8 s left)" in lines[2]
     assert [name in found.out for name in NAMES] == [True, True]
-    again = run(*words, "--json")
+    again = run(f"{SWEEP} --json")
     assert [row["name"] for row in json.loads(again.out)] == sorted(NAMES)
     assert again.err == f"learned-strings: plan: 0 of 2 runs to do; rows go to {file}\n"
 
 
-def test_failed_runs_are_the_commands_failure_after_all_else_is_done(
-    run: Run, words: list[Any], script: Script
-) -> None:
-    script(lambda name: "OSError: no space" if name == NAMES[0] else row_of(name))
-    found = run(*words, "--retries", "0")
-    assert found.status == 1
-    assert found.err.splitlines()[-1] == (
-        f"learned-strings: 1 of 2 runs failed: {NAMES[0]}; their rows say why, and the same command tries them again"
-    )
-    assert f"{NAMES[0]}: failed, OSError: no space" in found.err and "done" in found.out
-
-
-def test_an_interrupted_sweep_continues_with_what_is_left(
-    run: Run, words: list[Any], script: Script, tmp_path: Path
+def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(
+    run: Run, script: Script, tmp_path: Path
 ) -> None:
     begun: list[str] = []
 
-    def interrupted(name: str) -> Row:
+    def outcome(name: str) -> Row | str:
         begun.append(name)
-        if begun == NAMES:
+        if len(begun) == 2:
             raise KeyboardInterrupt
-        return row_of(name)
+        return row_of(name) if len(begun) != 3 else "OSError: no space"
 
-    script(interrupted)
-    found = run(*words)
+    script(outcome)
+    found = run(SWEEP)
     assert found.status == 130 and "stopped; the same command continues" in found.err
     before = sorted(tmp_path.rglob("*"))
-    facts = json.loads(run(*words, "--dry-run", "--json").out)
+    facts = json.loads(run(f"{SWEEP} --dry-run --json").out)
     left = [(NAMES[0], "done", 0.5), (NAMES[1], "", None)]
     assert [(each["name"], each["status"], each["rel_mae"]) for each in facts] == left
     assert sorted(tmp_path.rglob("*")) == before
-    assert run(*words).status == 0
-    assert begun == [*NAMES, NAMES[1]]
+    found = run(f"{SWEEP} --retries 0")
+    assert found.status == 1
+    assert found.err.splitlines()[-1] == (
+        f"learned-strings: 1 of 2 runs failed: {NAMES[1]}; their rows say why, and the same command tries them again"
+    )
+    assert f"{NAMES[1]}: failed, OSError: no space" in found.err and "done" in found.out
+    assert run(SWEEP).status == 0
+    assert begun == [*NAMES, NAMES[1], NAMES[1]]
 
 
 @pytest.mark.parametrize(("scheme", "warned"), [("tcp", True), ("tls", False)])
-def test_an_open_scheduler_is_warned_of(
-    run: Run, words: list[Any], monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool
-) -> None:
+def test_an_open_scheduler_is_warned_of(run: Run, monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    found = run(*words, "--scheduler", f"{scheme}://127.0.0.1:9")
+    found = run(f"{SWEEP} --scheduler {scheme}://127.0.0.1:9")
     assert found.status == 1 and ("can run code on its workers" in found.err) == warned
     assert found.err.splitlines()[-1].startswith(f"learned-strings: {scheme}://127.0.0.1:9: a cluster needs Dask")
 
 
-def test_files_of_other_machines_are_merged(run: Run, tmp_path: Path, full_disk: FullDisk) -> None:
+def test_files_of_other_machines_are_merged(run: Run, tmp_path: Path) -> None:
     here, there, elsewhere = (tmp_path / f"{name}.csv" for name in ("here", "there", "elsewhere"))
     add_rows(here, [row_of("a")])
     add_rows(there, [row_of("a", rel_mae=0.25, finished="2026-01-02T00:00:00Z"), row_of("b")])
     add_rows(elsewhere, [row_of("a", status="failed", rel_mae=None, finished="2026-01-03T00:00:00Z"), row_of("c")])
-    before = here.read_bytes()
-    with full_disk(700):
-        assert "here.csv: cannot be written" in run("results", "merge", there, "--results", here).failure
-    assert here.read_bytes() == before and not list(tmp_path.glob("*.unfinished"))
-    found = run("results", "merge", there, elsewhere, "--results", here)
+    found = run("results merge --results", here, there, elsewhere)
     assert (found.status, found.out) == (0, f"{here}: 3 rows, 2 of them new\n")
     assert [(row.name, row.rel_mae) for row in read_results(here)] == [("a", 0.25), ("b", 0.5), ("c", 0.5)]
     before = here.read_bytes()
     there.write_text("something else\n", encoding="utf-8")
-    assert f"{there}: not a results file" in run("results", "merge", elsewhere, there, "--results", here).failure
+    assert f"{there}: not a results file" in run("results merge --results", here, elsewhere, there).failure
     assert here.read_bytes() == before
 
 
@@ -259,24 +239,23 @@ def test_tables_are_printed_written_or_made_again_in_a_document(run: Run, folder
         figures = {"rel_mse": 0.001, "rel_mae": 0.01 * seed, "initialisation": "paper"}
         digest = configuration_of(cell).digest
         add_rows(results, [Row(digest, cell.name, "done", **facts, recipe="paper", seed=seed, **figures)])
-    words = ["table", "--results", results, "--metric", "mae"]
-    printed = run(*words)
+    table = "table --metric mae --results {folder}/results.csv"
+    printed = run(table)
     assert (printed.status, printed.err) == (0, "")
     assert "**0.015 (0.1023) ×0.15**" in printed.out and "not run (0.0113)" not in printed.out.partition("S5")[0]
-    assert run(*words, "--output", path).out == f"{path}\n"
+    assert run(table, "--output", path).out == f"{path}\n"
     assert path.read_text(encoding="utf-8") == printed.out
     document.write_text("# Results\n\nWords.\n\n<!-- tables -->\nan older table\n", encoding="utf-8")
     for _ in range(2):
-        assert run(*words, "--into", document).out == f"{document}\n"
+        assert run(table, "--into", document).out == f"{document}\n"
         made = document.read_text(encoding="utf-8")
         assert made == f"# Results\n\nWords.\n\n<!-- tables -->\n\n{printed.out}"
     document.write_text("# Results\n", encoding="utf-8")
-    refused = run(*words, "--into", document).failure
+    refused = run(table, "--into", document).failure
     assert "has no line <!-- tables -->; put it where the tables are to begin" in refused
     assert document.read_text(encoding="utf-8") == "# Results\n"
-    lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
+    lines = list(csv.DictReader(io.StringIO(run(f"{table} --format csv").out)))
     assert {entry["runs"].count("nylon_linear_noise_4k_s5_paper_seed") for entry in lines} == {0, 2}
-    chosen = run("table", "--results", results, "--recipe", "ours").out
-    assert "2 of 2 rows of the results file are not shown" in chosen
-    none = run("table", "--results", folder / "none.csv")
+    assert "2 of 2 rows of the results file are not shown" in run(f"{table} --recipe ours").out
+    none = run("table --results {folder}/none.csv")
     assert "none.csv has no rows" in none.err and "not run (0.0113)" in none.out
