@@ -183,7 +183,7 @@ def remainder(data: bytes, polynomial: int, bits: int) -> int:
 
 @pytest.mark.parametrize("code", [0, 4])
 def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code: int, path: Path) -> None:
-    """Blocks may state 16 bits, or refer to the file's first block for them. A stream's last one was left out."""
+    """Blocks may state 16 bits, or refer to the file's first block for them."""
     samples = np.arange(-90, 90, dtype=">i2")
     blocks = flac_block(samples[:100], 0, 4 - code) + flac_block(samples[100:], 1, code)
     assert samples_of(path, b"fLaC\x80\0\0\x22" + about() + blocks) == list(samples)

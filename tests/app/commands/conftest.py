@@ -94,11 +94,6 @@ class Outcome(NamedTuple):
     err: str
 
     @property
-    def message(self) -> str:
-        """All of standard error in one line, without a frame and quotation marks."""
-        return " ".join(self.err.replace("│", " ").replace("'", "").split())
-
-    @property
     def failure(self) -> str:
         """The one line of a failure."""
         (line,) = self.err.splitlines()
@@ -107,9 +102,9 @@ class Outcome(NamedTuple):
 
     @property
     def usage(self) -> str:
-        """The message of bad usage, in one line."""
+        """The message of bad usage in one line, without a frame and quotation marks."""
         assert (self.status, self.out) == (2, "")
-        return self.message
+        return " ".join(self.err.replace("│", " ").replace("'", "").split())
 
 
 Run = Callable[..., Outcome]

@@ -71,23 +71,17 @@ def test_help_cuts_no_summary(run: Run, monkeypatch: pytest.MonkeyPatch) -> None
         assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> list[list[Path]]:
-    """Files with which the app was opened; it ends with status 3."""
-    found: list[list[Path]] = []
-    main = types.SimpleNamespace(run=lambda files=(): found.append(list(files)) or 3)
-    monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
-    return found
-
-
 def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
-    run: Run, opened: list[list[Path]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
-    monkeypatch.chdir(tmp_path)
+    opened: list[list[Path]] = []
+    main = types.SimpleNamespace(run=lambda files=(): opened.append(list(files)) or 3)  # it ends with status 3
+    monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
+    monkeypatch.chdir(folder)
     for name in ("song.mid", "models"):
         Path(name).touch()
     assert [run(line).status for line in ("", "song.mid ./models", "models")] == [3, 3, 0]
-    assert opened == [[], [tmp_path / "song.mid", tmp_path / "models"]]
+    assert opened == [[], [folder / "song.mid", folder / "models"]]
     absent = run("song.mid gone.wav")
     assert (absent.status, absent.err) == (2, "learned-strings: gone.wav: no such file; check the name\n")
     assert len(opened) == 2
