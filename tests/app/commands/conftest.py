@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -108,7 +107,6 @@ class Outcome(NamedTuple):
 
 
 Run = Callable[..., Outcome]
-FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 @pytest.fixture
@@ -129,23 +127,6 @@ def run(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str], monk
         return Outcome(main([*words, *map(str, more)]), *capsys.readouterr())
 
     return run
-
-
-@pytest.fixture
-def full_disk() -> FullDisk:
-    """Within its block no file can be larger than some bytes: the system fails the write that would make it so."""
-    resource = pytest.importorskip("resource", reason="needs POSIX limits")
-
-    @contextmanager
-    def full(bytes_left: int) -> Iterator[None]:
-        before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-    return full
 
 
 @pytest.fixture
