@@ -6,15 +6,12 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from engine.plain_text import one_line
 from training.cli.console import Failure, say
-
-if TYPE_CHECKING:
-    pass
 
 ALL = "all"
 BANK = "Learned Strings"
