@@ -124,7 +124,8 @@ def test_no_name_in_a_recipe_is_a_path(
     inside.mkdir(parents=True)
     monkeypatch.chdir(inside)
     for name in ("../escaped", "/tmp/escaped", "..", "a/../../b", "C:\\x", "\x1b[2J"):
-        bad = with_recipe(tmp_path / "bad.wav", recipe_of(first) | {"preset": name})
+        facts = {field: value for field, value in recipe_of(first).items() if field not in ("string", "modes")}
+        bad = with_recipe(tmp_path / "bad.wav", facts | {"preset": name})  # without fields, as an earlier one
         before = set(tmp_path.rglob("*.wav"))
         assert run("render --recipe", bad).status == 0  # its digest is known
         (made,) = set(tmp_path.rglob("*.wav")) - before
