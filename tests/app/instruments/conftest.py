@@ -1,13 +1,10 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
-
-import pytest
 
 from app.instruments.instrument import Instrument
 
-STRING = {
+STRING = {  # nylon B3
     "length_m": 0.65,
     "area_m2": 4.5614e-07,
     "second_moment_m4": 2.963e-14,
@@ -19,23 +16,12 @@ STRING = {
 }
 
 
-@pytest.fixture(scope="session")
-def string() -> dict[str, float]:
-    """Nylon B3."""
-    return STRING
-
-
-@pytest.fixture(scope="session")
-def make_instrument() -> Callable[..., Instrument]:
+def make_instrument(**changes: Any) -> Instrument:
     """An instrument of one fretted string, with changes."""
-
-    def make(**changes: Any) -> Instrument:
-        facts = {
-            "name": "An instrument",
-            "category": "guitar",
-            "strings": {"kind": "fretted", "string": STRING},
-            **changes,
-        }
-        return Instrument.model_validate(facts)
-
-    return make
+    facts = {
+        "name": "An instrument",
+        "category": "guitar",
+        "strings": {"kind": "fretted", "string": STRING},
+        **changes,
+    }
+    return Instrument.model_validate(facts)

@@ -4,92 +4,77 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
-from app.instruments.instrument import (
-    ASSIGNABLE,
-    Instrument,
-    Macro,
-    MacroTarget,
-    OpenString,
-    Pickup,
-    PluckChoices,
-    StringSet,
-    Technique,
-)
+from app.instruments.instrument import ASSIGNABLE, Instrument, OpenString, Pickup, PluckChoices, StringSet, Technique
 from app.instruments.library import SHIPPED, find_instrument, list_instruments
 from app.shared.parameters import OF_INSTRUMENTS
+from engine.kernels.constants import PLAYED
 from engine.schema import explained
-from tests.app.instruments.conftest import STRING
-
-Make = Callable[..., Instrument]
+from tests.app.instruments.conftest import STRING, make_instrument
 
 
-@pytest.mark.parametrize(
-    ("field", "changes"),
-    [
-        ("name", {"name": ""}),
-        ("name", {"name": "../other"}),
-        ("name", {"name": "two\nlines"}),
-        ("name", {"name": "x" * 61}),
-        ("preset", {"preset": "/etc/passwd"}),
-        ("version", {"version": 2}),
-        ("category", {"category": "strings"}),
-        ("colour", {"colour": 1}),
-        ("range", {"range": [60, 40]}),
-        ("range", {"range": [0, 128]}),
-        ("bend_semitones", {"bend_semitones": math.nan}),
-        ("bend_semitones", {"bend_semitones": "2"}),
-        ("pluck.softest_mm", {"pluck": {"softest_mm": math.inf}}),
-        ("softest_mm", {"pluck": {"softest_mm": 4, "hardest_mm": 3}}),
-        ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
-        ("damping.let_ring", {"damping": {"let_ring": 1}}),
-        ("pluck.stops", {"pluck": {"stops": "no"}}),
-        ("flux_mm", {"pickup": {"flux_mm": 0.5}}),
-        ("octaves", {"course": {"strings": 2, "octaves": 7}}),
-        ("pluck.variation", {"pluck": {"variation": 1.5}}),
-        ("polarisations\n.*angle_deg", {"polarisations": {"angle_deg": 90}}),
-        ("polarisations\n.*conductance_s_kg", {"polarisations": {"conductance_s_kg": -1}}),
-        ("losses\n.*friction", {"losses": {"friction": 1}}),
-        ("sympathy_s_kg", {"sympathy_s_kg": -0.1}),
-        ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
-        ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
-        ("mod_wheel", {"mod_wheel": "name"}),
-        ("mod_wheel", {"mod_wheel": "pickup.points.1"}),
-        ("macros.0", {"macros": [{"name": "m", "targets": [{"field": "tuning.scale", "low": 0, "high": 1}]}]}),
-        ("knobs.decay", {"macros": [{"name": "m", "targets": [{"field": "knobs.decay", "low": 0, "high": 1}]}]}),
-        ("level_db", {"macros": [{"name": "m", "targets": [{"field": "level_db", "low": 0, "high": 99}]}]}),
-        ("strings.fretted.string\n.*length_m", {"strings": {"kind": "fretted", "string": {**STRING, "length_m": 0}}}),
-        ("strings", {"strings": {"kind": "set", "strings": [{"note": n, "string": STRING} for n in (50, 50)]}}),
-        ("strings", {"strings": {"kind": "bow"}}),
-    ],
-)
-def test_impossible_values_are_refused_by_name(make_instrument: Make, field: str, changes: dict[str, Any]) -> None:
-    with pytest.raises(ValidationError, match=field):
-        make_instrument(**changes)
+def macro_of(field: str, low: float, high: float) -> list[dict[str, Any]]:
+    return [{"name": "m", "targets": [{"field": field, "low": low, "high": high}]}]
 
 
-def test_a_instrument_survives_json(make_instrument: Make) -> None:
-    strings = StringSet(strings=tuple(OpenString(note=n, string=make_instrument().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
-    whole = make_instrument(
-        strings=strings, macros=[Macro(name="m", targets=(MacroTarget(field="level_db", low=-3, high=3),))]
-    )
-    assert Instrument.model_validate_json(whole.model_dump_json()) == whole
+REFUSED: list[tuple[str, dict[str, Any]]] = [
+    ("name", {"name": ""}),
+    ("name", {"name": "../other"}),
+    ("name", {"name": "two\nlines"}),
+    ("name", {"name": "x" * 61}),
+    ("preset", {"preset": "/etc/passwd"}),
+    ("version", {"version": 2}),
+    ("category", {"category": "strings"}),
+    ("colour", {"colour": 1}),
+    ("range", {"range": [60, 40]}),
+    ("range", {"range": [0, 128]}),
+    ("bend_semitones", {"bend_semitones": math.nan}),
+    ("bend_semitones", {"bend_semitones": "2"}),
+    ("pluck.softest_mm", {"pluck": {"softest_mm": math.inf}}),
+    ("softest_mm", {"pluck": {"softest_mm": 4, "hardest_mm": 3}}),
+    ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
+    ("damping.let_ring", {"damping": {"let_ring": 1}}),
+    ("pluck.stops", {"pluck": {"stops": "no"}}),
+    ("flux_mm", {"pickup": {"flux_mm": 0.5}}),
+    ("octaves", {"course": {"strings": 2, "octaves": 7}}),
+    ("javari", {"javari": {"distance_mm": 10}, "course": {"strings": 2, "bridge": 1.0}}),  # one bridge has no edge
+    ("javari", {"javari": {"distance_mm": 10}, "course": {"bridge": 0.5}}),
+    ("pluck.variation", {"pluck": {"variation": 1.5}}),
+    ("polarisations\n.*angle_deg", {"polarisations": {"angle_deg": 90}}),
+    ("polarisations\n.*conductance_s_kg", {"polarisations": {"conductance_s_kg": -1}}),
+    ("losses\n.*friction", {"losses": {"friction": 1}}),
+    ("sympathy_s_kg", {"sympathy_s_kg": -0.1}),
+    ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
+    ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
+    ("mod_wheel", {"mod_wheel": "name"}),
+    ("mod_wheel", {"mod_wheel": "pickup.points.1"}),
+    ("macros.0", {"macros": macro_of("tuning.scale", 0, 1)}),
+    ("knobs.decay", {"macros": macro_of("knobs.decay", 0, 1)}),
+    ("level_db", {"macros": macro_of("level_db", 0, 99)}),
+    ("strings.fretted.string\n.*length_m", {"strings": {"kind": "fretted", "string": {**STRING, "length_m": 0}}}),
+    ("strings", {"strings": {"kind": "set", "strings": [{"note": n, "string": STRING} for n in (50, 50)]}}),
+    ("strings", {"strings": {"kind": "bow"}}),
+]
 
 
-def test_what_plucks_a_instrument_stops_its_string_unless_the_instrument_says_otherwise(
-    make_instrument: Make,
-) -> None:
+def test_impossible_values_are_refused_by_name() -> None:
+    for field, changes in REFUSED:
+        with pytest.raises(ValidationError, match=field):
+            make_instrument(**changes)
+
+
+def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise() -> None:
     """Instruments of the time before that field, too; a hammer does not."""
+    strings = StringSet(strings=tuple(OpenString(note=n, string=make_instrument().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
+    whole = make_instrument(strings=strings, macros=macro_of("level_db", -3, 3), pluck={"stops": False})
+    assert Instrument.model_validate_json(whole.model_dump_json()) == whole
     older = make_instrument().model_dump()
     del older["pluck"]["stops"]
     assert Instrument.model_validate(older).pluck.stops
-    hammered = make_instrument(pluck={"stops": False})
-    assert not Instrument.model_validate_json(hammered.model_dump_json()).pluck.stops
     instruments = list_instruments(SHIPPED)[0]
     struck = {
         each.name for each in instruments if not each.instrument.pluck.stops and each.instrument.category != "drums"
@@ -97,25 +82,23 @@ def test_what_plucks_a_instrument_stops_its_string_unless_the_instrument_says_ot
     assert struck == {"cimbalom", "felt_on_wires", "santur_in_shur"}
 
 
-def test_equal_steps_of_velocity_are_equal_steps_in_db() -> None:
-    choices = PluckChoices(shape="gaussian", softest_mm=0.1, hardest_mm=2, width=0.12, width_hard=0.04)
+def test_equal_steps_of_velocity_are_equal_steps_in_db_and_a_curve_bends_the_middle() -> None:
+    facts = {"shape": "gaussian", "softest_mm": 0.1, "hardest_mm": 2, "width": 0.12, "width_hard": 0.04}
+    choices = PluckChoices.model_validate(facts)
     plucks = [choices.pluck(1 + 126 * share) for share in (0, 0.25, 0.5, 0.75, 1)]
     ratios = [hard.amplitude_mm / soft.amplitude_mm for soft, hard in itertools.pairwise(plucks)]
     assert ratios == pytest.approx([20**0.25] * 4)
-    assert plucks[0].amplitude_mm == pytest.approx(0.1) and plucks[-1].amplitude_mm == pytest.approx(2)
-    assert plucks[0].width == pytest.approx(0.12) and plucks[-1].width == pytest.approx(0.04)
+    assert (plucks[0].amplitude_mm, plucks[-1].amplitude_mm) == pytest.approx((0.1, 2))
+    assert (plucks[0].width, plucks[-1].width) == pytest.approx((0.12, 0.04))
     assert choices.pluck(500) == plucks[-1] and choices.pluck(-3) == plucks[0]
+    for curve in (-1.0, -0.3, 0.4, 1.0):
+        bent = PluckChoices.model_validate({**facts, "curve": curve})
+        ends = [bent.pluck(velocity).amplitude_mm for velocity in (1, 127)]
+        assert ends == pytest.approx([0.1, 2])
+        assert (bent.pluck(64).amplitude_mm > plucks[2].amplitude_mm) == (curve > 0)
 
 
-@pytest.mark.parametrize("curve", [-1, -0.3, 0.4, 1])
-def test_the_curve_keeps_the_ends_and_bends_the_middle(curve: float) -> None:
-    even, bent = PluckChoices(), PluckChoices(curve=curve)
-    for velocity in (1, 127):
-        assert bent.pluck(velocity).amplitude_mm == pytest.approx(even.pluck(velocity).amplitude_mm)
-    assert (bent.pluck(64).amplitude_mm > even.pluck(64).amplitude_mm) == (curve > 0)
-
-
-def test_each_assignable_field_can_be_read_and_changed(make_instrument: Make) -> None:
+def test_each_assignable_field_can_be_read_and_changed() -> None:
     first = make_instrument(pickup=Pickup(points=(0.2, 0.3)), level_db=1, technique=Technique(harmonic=2))
     for field in ASSIGNABLE:
         value = first.value(field)
@@ -126,8 +109,9 @@ def test_each_assignable_field_can_be_read_and_changed(make_instrument: Make) ->
             first.with_value(field, 1e5)
 
 
-def test_fields_have_the_defaults_and_limits_of_the_table(make_instrument: Make) -> None:
+def test_fields_have_the_defaults_and_limits_of_the_table() -> None:
     """Those of the engine's values too, which know no table."""
+    assert all(id in OF_INSTRUMENTS for id in PLAYED) and len(set(PLAYED)) == len(PLAYED)
     instrument = make_instrument()
     for field, declared in OF_INSTRUMENTS.items():
         if not field.startswith("pickup."):  # which a test's instrument may lack
@@ -146,23 +130,21 @@ def test_fields_have_the_defaults_and_limits_of_the_table(make_instrument: Make)
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"tension_n": "60"}, "strings.fretted.string.tension_n: must be a valid number, found '60'"),
-        ({"tension_n": True}, "strings.fretted.string.tension_n: must be a valid number, found True"),
-        ({"tension_n": math.nan}, "strings.fretted.string.tension_n: must be a finite number"),
-        ({"tension_n": 0}, "strings.fretted.string: string parameter tension_n must lie in 0.001 … 1000000, not 0"),
-        ({"tension_n": None}, "strings.fretted.string.tension_n: must be a valid number"),
-        ({"colour": 1}, "strings.fretted.string: unknown field 'colour'"),
+        ({"tension_n": "60"}, "string.tension_n: must be a valid number, found '60'"),
+        ({"tension_n": True}, "string.tension_n: must be a valid number, found True"),
+        ({"tension_n": math.nan}, "string.tension_n: must be a finite number"),
+        ({"tension_n": 0}, "string: string parameter tension_n must lie in 0.001 … 1000000, not 0"),
+        ({"tension_n": None}, "string.tension_n: must be a valid number"),
+        ({"colour": 1}, "string: unknown field 'colour'"),
     ],
 )
-def test_the_engines_values_are_checked_where_they_stand(
-    make_instrument: Make, changes: dict[str, Any], words: str
-) -> None:
+def test_the_engines_values_are_checked_where_they_stand(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError) as caught:
         make_instrument(strings={"kind": "fretted", "string": {**STRING, **changes}})
-    assert explained(caught.value).startswith(words)
+    assert explained(caught.value).startswith(f"strings.fretted.{words}")
 
 
-def test_a_string_or_drum_is_given_whole(make_instrument: Make) -> None:
+def test_a_string_or_drum_is_given_whole() -> None:
     """The engine's own defaults are those of another string."""
     for name in STRING:
         less = {each: value for each, value in STRING.items() if each != name}
@@ -173,30 +155,27 @@ def test_a_string_or_drum_is_given_whole(make_instrument: Make) -> None:
         make_instrument(strings=drums)
 
 
-def test_a_macro_writes_its_targets(make_instrument: Make) -> None:
-    targets = (
-        MacroTarget(field="knobs.decay", low=0.5, high=2.5),
-        MacroTarget(field="pluck.position", low=0.4, high=0.1),
-    )
-    first = make_instrument(macros=(Macro(name="age", targets=targets),))
+def macro_of_two(one: str, other: str, *ends: float) -> list[dict[str, Any]]:
+    return [
+        {"name": "m", "targets": [*macro_of(one, *ends[:2])[0]["targets"], *macro_of(other, *ends[2:])[0]["targets"]]}
+    ]
+
+
+def test_a_macro_writes_its_targets() -> None:
+    first = make_instrument(macros=macro_of_two("knobs.decay", "pluck.position", 0.5, 2.5, 0.4, 0.1))
     turned = first.turned(0, 0.25)
     assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)
     assert turned.macros[0].value == 0.25
     assert first.turned(0, 7).knobs.decay == pytest.approx(2.5)
 
 
-def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can(make_instrument: Make) -> None:
+def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can() -> None:
     """Each end is possible with the other value as it stands, but not both together."""
-    targets = [
-        {"field": "pluck.softest_mm", "low": 0.1, "high": 2.5},
-        {"field": "pluck.hardest_mm", "low": 3.0, "high": 1.0},
-    ]
-    pluck = {"softest_mm": 0.1, "hardest_mm": 3.0}
-    instrument = make_instrument(pluck=pluck, macros=[{"name": "Even", "targets": targets}])
+    macros = macro_of_two("pluck.softest_mm", "pluck.hardest_mm", 0.1, 2.5, 3.0, 1.0)
+    instrument = make_instrument(pluck={"softest_mm": 0.1, "hardest_mm": 3.0}, macros=macros)
     for value in (0.0, 0.4, 0.7, 1.0, 0.2):
         instrument = instrument.turned(0, value)
-        assert instrument.macros[0].value == value
-        assert instrument.pluck.softest_mm <= instrument.pluck.hardest_mm
+        assert instrument.macros[0].value == value and instrument.pluck.softest_mm <= instrument.pluck.hardest_mm
 
 
 def test_a_macro_follows_a_knob_that_it_turns() -> None:

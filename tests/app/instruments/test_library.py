@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from app.instruments import library
-from app.instruments.instrument import Instrument
 from app.instruments.library import (
     SHIPPED,
     InstrumentError,
     file_stem,
     find_instrument,
     list_instruments,
-    own_instruments,
     read_instrument,
     rename_instrument,
     save_instrument,
 )
-
-Make = Callable[..., Instrument]
+from tests.app.instruments.conftest import make_instrument
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +35,7 @@ def write(path: Path, facts: object) -> Path:
     return path
 
 
-def test_what_is_saved_is_listed_and_read_again(make_instrument: Make, own: Path) -> None:
+def test_what_is_saved_is_listed_and_read_again(own: Path) -> None:
     entry = save_instrument(make_instrument(name="Čembalo, 8′", category="keys"))
     assert entry.path == own / "čembalo_8.json" and entry.own
     listed, problems = list_instruments()
@@ -47,24 +43,18 @@ def test_what_is_saved_is_listed_and_read_again(make_instrument: Make, own: Path
     assert find_instrument("Čembalo, 8′") == find_instrument("ČEMBALO_8") == find_instrument(str(entry.path)) == entry
 
 
-def test_a_instrument_is_replaced_only_where_that_is_meant(make_instrument: Make) -> None:
-    save_instrument(make_instrument(name="Mine"))
-    with pytest.raises(InstrumentError, match=r"mine: .* exists already; choose another"):
-        save_instrument(make_instrument(name="mine", level_db=3))
-    file = own_instruments() / "mine.json"
-    assert read_instrument(save_instrument(make_instrument(name="mine", level_db=3), file).path).level_db == 3
-
-
-def test_a_instrument_replaces_its_own_file_and_no_other(make_instrument: Make, own: Path) -> None:
+def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own: Path) -> None:
     """A file that was put there may have any name, whatever the instrument in it is called."""
     save_instrument(make_instrument(name="My-Bass"))
+    with pytest.raises(InstrumentError, match=r"my bass: .* exists already; choose another"):
+        save_instrument(make_instrument(name="my bass", level_db=3))
     friends = write(own / "friend.json", make_instrument(name="My bass").model_dump(mode="json"))
     saved = save_instrument(make_instrument(name="My bass", level_db=3), friends)
     assert (saved.path, read_instrument(friends).level_db) == (friends, 3)
     assert read_instrument(own / "my_bass.json").name == "My-Bass"
 
 
-def test_two_instruments_of_one_name_are_reported_apart(make_instrument: Make, own: Path) -> None:
+def test_two_instruments_of_one_name_are_reported_apart(own: Path) -> None:
     save_instrument(make_instrument(name="Mine"))
     long = "M" * 60
     for name, file in (("Mine", "mine (copy)"), ("mine", "mine_3"), (long, "long"), (long, "longer")):
@@ -77,7 +67,7 @@ def test_two_instruments_of_one_name_are_reported_apart(make_instrument: Make, o
     assert names["longer"] == f"{'M' * 58} 2"
 
 
-def test_a_shipped_instrument_is_neither_overwritten_nor_renamed(make_instrument: Make, own: Path) -> None:
+def test_a_shipped_instrument_is_neither_overwritten_nor_renamed_and_counts_before_ones_own(own: Path) -> None:
     shipped = list_instruments(SHIPPED)[0][0]
     for replace in (None, shipped.path):
         with pytest.raises(InstrumentError, match="factory"):
@@ -85,9 +75,13 @@ def test_a_shipped_instrument_is_neither_overwritten_nor_renamed(make_instrument
     with pytest.raises(InstrumentError, match="shipped with"):
         rename_instrument(shipped, "Other")
     assert not own.exists()
+    write(own / shipped.path.name, json.loads(shipped.path.read_text(encoding="utf-8")))
+    entries, (problem,) = list_instruments()
+    assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
+    assert "exists already; rename the file" in problem
 
 
-def test_renaming(make_instrument: Make, own: Path) -> None:
+def test_renaming(own: Path) -> None:
     first = save_instrument(make_instrument(name="First"))
     save_instrument(make_instrument(name="Taken"))
     for name, reported in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
@@ -99,44 +93,43 @@ def test_renaming(make_instrument: Make, own: Path) -> None:
     assert spelt.path == second.path and read_instrument(spelt.path).name == "SECOND"
 
 
-@pytest.mark.parametrize("name", ["..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"])
-def test_a_file_name_is_never_a_path(name: str) -> None:
-    stem = file_stem(name)
-    assert stem and Path(stem).name == stem and stem.casefold() not in library.DEVICES
-    assert all(c.isalnum() or c == "_" for c in stem)
+def test_a_file_name_is_never_a_path() -> None:
+    for name in ("..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"):
+        stem = file_stem(name)
+        assert stem and Path(stem).name == stem and stem.casefold() not in library.DEVICES
+        assert all(c.isalnum() or c == "_" for c in stem)
 
 
-def test_one_bad_file_hides_no_other(make_instrument: Make, own: Path) -> None:
+def test_one_bad_file_hides_no_other(own: Path) -> None:
     good = save_instrument(make_instrument(name="Good"))
-    facts = json.loads(good.path.read_text())
+    text, facts = good.path.read_text(), json.loads(good.path.read_text())
     (own / "folder.json").mkdir()
     (own / ".hidden.json").write_text("{")
-    write(own / "newer.json", {**facts, "version": 2})
-    write(own / "colour.json", {**facts, "colour": 1})
-    write(own / "high.json", {**facts, "pluck": {"position": 3}})
-    write(own / "long.json", {**facts, "author": "x" * 5000})
-    (own / "big.json").write_bytes(b" " * (2**20 + 1))
-    (own / "deep.json").write_text("[" * 100_000)
-    (own / "number.json").write_text(good.path.read_text().replace("440.0", "9" * 5000))
-    (own / "nan.json").write_text(good.path.read_text().replace("440.0", "NaN"))
-    (own / "bytes.json").write_bytes(b"\xff\xfe{}")
+    too_high = "pluck.position: must be less than or equal to 0.98, found 3"
+    bad: dict[str, tuple[object, str]] = {  # file -> facts, text or bytes, and words of the report
+        "newer": ({**facts, "version": 2}, "version: made by a newer version"),
+        "colour": ({**facts, "colour": 1}, "colour"),
+        "high": ({**facts, "pluck": {"position": 3}}, too_high),
+        "long": ({**facts, "author": "x" * 5000}, "author"),
+        "big": (b" " * (2**20 + 1), "larger than"),
+        "deep": ("[" * 100_000, ""),
+        "number": (text.replace("440.0", "9" * 5000), ""),
+        "nan": (text.replace("440.0", "NaN"), "tuning.a4_hz"),
+        "bytes": (b"\xff\xfe{}", ""),
+        "folder": (None, ""),
+    }
+    for name, (content, _) in bad.items():
+        if isinstance(content, str | bytes):
+            (own / f"{name}.json").write_bytes(content.encode() if isinstance(content, str) else content)
+        elif content:
+            write(own / f"{name}.json", content)
     if hasattr(os, "mkfifo"):
         os.mkfifo(own / "pipe.json")
-    expected = {path.name for path in own.iterdir()} - {"good.json", ".hidden.json"}
+        bad["pipe"] = (None, "")
     entries, problems = list_instruments(own)
-    assert entries == [good]
-    assert all(problem.isprintable() and len(problem) <= 500 for problem in problems)
-    reported = {Path(problem.split(".json: ")[0] + ".json").name: problem for problem in problems}
-    assert set(reported) == expected
-    for name, words in (
-        ("newer", "version: made by a newer version"),
-        ("colour", "colour"),
-        ("high", "pluck.position: must be less than or equal to 0.98, found 3"),
-        ("long", "author"),
-        ("nan", "tuning.a4_hz"),
-        ("big", "larger than"),
-    ):
-        assert words in reported[f"{name}.json"], reported[f"{name}.json"]
+    assert entries == [good] and all(each.isprintable() and len(each) <= 500 for each in problems)
+    reported = {Path(each.split(".json: ")[0]).name: each for each in problems}
+    assert set(reported) == set(bad) and all(words in reported[name] for name, (_, words) in bad.items())
 
 
 @pytest.mark.parametrize(
@@ -151,18 +144,7 @@ def test_one_bad_file_hides_no_other(make_instrument: Make, own: Path) -> None:
         ("macros", [5], r"macros\[0\]: must be a table of fields, found 5"),
     ],
 )
-def test_faults_are_named_in_plain_words(
-    make_instrument: Make, own: Path, field: str, value: object, words: str
-) -> None:
-    data = json.loads(save_instrument(make_instrument(name="One")).path.read_text())
-    (own / "a.json").write_text(json.dumps(data | {field: value}))
+def test_faults_are_named_in_plain_words(own: Path, field: str, value: object, words: str) -> None:
+    write(own / "a.json", make_instrument(name="One").model_dump(mode="json") | {field: value})
     with pytest.raises(InstrumentError, match=f"a.json: {words}; mend this field"):
         read_instrument(own / "a.json")
-
-
-def test_of_two_instruments_of_one_name_the_shipped_one_counts(own: Path) -> None:
-    shipped = list_instruments(SHIPPED)[0][0]
-    write(own / shipped.path.name, json.loads(shipped.path.read_text(encoding="utf-8")))
-    entries, problems = list_instruments()
-    assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
-    assert len(problems) == 1 and "exists already; rename the file" in problems[0]

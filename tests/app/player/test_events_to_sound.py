@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instruments.instrument import Course, Instrument
+from app.instruments.instrument import Instrument
 from app.instruments.library import SHIPPED, read_instrument
 from app.player.events import (
     Bend,
@@ -26,38 +26,12 @@ from app.player.events import (
     release_all,
 )
 from engine.kernels import constants as of
-from engine.kernels.midi import (
-    COARSE_TUNING,
-    DECREMENT,
-    EXPRESSION,
-    FINE_OTHER,
-    FINE_REGISTERED,
-    FINE_TUNING,
-    FINE_VALUE,
-    HARMONICS,
-    INCREMENT,
-    LEGATO,
-    MOD_WHEEL,
-    NOTES_OFF,
-    OTHER,
-    PORTAMENTO,
-    REGISTERED,
-    RESET,
-    SLIDE_TIME,
-    SOFT,
-    SOUND_OFF,
-    STRUM,
-    SUSTAIN,
-    TREMOLO,
-    VALUE,
-    VOLUME,
-)
+from engine.kernels import midi
 from engine.kernels.playing.channels import SLIDE_S, WIDEST_SEMITONES
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ
 from engine.kernels.playing.keys import USUAL_HARMONIC
 from engine.presets import Preset
-from tests.app.player.seen import seen
 from tests.app.player.stage import (
     RATE_HZ,
     SOURCES,
@@ -74,11 +48,11 @@ from tests.app.player.stage import (
 )
 
 CONTROLS = {
-    **{"pedal": SUSTAIN, "wheel": MOD_WHEEL, "reset": RESET, "legato": LEGATO, "value": VALUE, "fine": FINE_VALUE},
-    **{"more": INCREMENT, "less": DECREMENT, "coarse-rpn": REGISTERED, "rpn": FINE_REGISTERED, "mute": SOFT},
-    **{"coarse-nrpn": OTHER, "nrpn": FINE_OTHER, "sound-off": SOUND_OFF, "slide-time": SLIDE_TIME, "volume": VOLUME},
-    **{"expression": EXPRESSION, "portamento": PORTAMENTO, "strum": STRUM, "tremolo": TREMOLO},
-    **{"harmonics": HARMONICS, **{f"mode{number}": number for number in range(NOTES_OFF, 128)}},
+    **{name.lower().replace("_", "-"): number for name, number in vars(midi).items() if isinstance(number, int)},
+    **{"pedal": midi.SUSTAIN, "wheel": midi.MOD_WHEEL, "mute": midi.SOFT, "fine": midi.FINE_VALUE},
+    **{"coarse-rpn": midi.REGISTERED, "rpn": midi.FINE_REGISTERED, "more": midi.INCREMENT, "less": midi.DECREMENT},
+    **{"coarse-nrpn": midi.OTHER, "nrpn": midi.FINE_OTHER},
+    **{f"mode{number}": number for number in range(midi.NOTES_OFF, 128)},
 }
 BUNDLES = {  # of fields
     "hammer": "pluck.shape=raised_cosine pluck.width=0.1 pluck.width_hard=0.1 pluck.strikes=yes pluck.stops=no",
@@ -128,7 +102,7 @@ def events_of(text: str, instrument: Instrument) -> list[Timed]:
         case "range":
             found = parameter_set(0, first, second, channel)
         case "fine-tuning" | "coarse-tuning":
-            found = parameter_set(FINE_TUNING if word[0] == "f" else COARSE_TUNING, first, 0, channel)
+            found = parameter_set(midi.FINE_TUNING if word[0] == "f" else midi.COARSE_TUNING, first, 0, channel)
         case "turn":
             found = [InstrumentTurned(changed(instrument, **parts_of(rest[0])))]
         case "another":
@@ -181,6 +155,7 @@ test mod_wheel=technique.vibrato_cents bend_by=length: wheel 127, on 45 | test t
 test mod_wheel=technique.vibrato_cents: on 45 | test: on 45                                 | 0.3 0
 test mod_wheel=technique.strum_ms: wheel 127, on 40, on 45 | test technique.strum_ms=40: on 40, on 45 | 0.3 0
 test mod_wheel=technique.tremolo_hz: wheel 127, on 45 | test technique.tremolo_hz=12: on 45 | 0.3 0
+test technique.strum_ms=40: on 40, on 45, .012 off 40, .012 off 45 | test: on 40, .04 on 45, .012 off 40, .052 off 45 | 0.2 0
 test damping.let_ring=yes: on 45, .3 off 45 | test: on 45                                   | 0.6 0
 test: on 45, on 45, .3 off 45, .3 off 45 | test: on 45, .3 off 45                           | 0.6 0
 test flexible pluck.shape=triangular: on 45 v1 | test flexible pluck.shape=triangular: on 45 v127 | 0.2 0
@@ -192,6 +167,7 @@ test: volume 50 @1, expression 64 @1, on 45 | test: on 45                       
 test course.strings=2: {PULLED_ON}       | test: {PULLED_ON}                                | 0.9 1e-6
 test moving course.bridge=1: {AGAIN}     | test moving: {AGAIN}                             | 0.8 0
 test course.strings=2 course.cents=2 course.bridge=1: {AGAIN} | test course.strings=2 course.cents=2: {AGAIN} | 0.8 0
+test edge javari.distance_mm=10 javari.gap_um=200: on 45 v20 | test: on 45 v20 | 0.3 1e-4
 test edge javari.distance_mm=0: {AGAIN}  | test: {AGAIN}                                    | 0.8 0
 """  # noqa: E501
 
@@ -380,7 +356,7 @@ test mod_wheel=knobs.decay: message of modes {number} releases all keys
 on 57, on 57, mode{number} 0 => 1 damped
 on 57, off 57 => 2 damped
 '''
-        for number in range(NOTES_OFF, 128)
+        for number in range(midi.NOTES_OFF, 128)
     )
 }
 test mod_wheel=knobs.decay: the range of bends is its channel's
@@ -449,6 +425,19 @@ off 64 s0 => 0 held, 1 damped, 2 held
 six mode=poly: a slide stays on its string while another is held
 legato 127, on 52 s5, on 57 s2, on 64 s5, off 52 s5 => rings 64 57, 0 on 5
 
+guitar course.strings=2: one key on two strings is two courses, of which legato moves one and a release ends one
+legato 127, on 59 s1, on 59 s2 => rings 59 59 59 59
+on 61 s1 => rings 61 61 59 59
+off 59 s2 => 2 damped, 4 held
+
+test technique.harmonic=2: a harmonic is plucked short of its first node
+on 45 => 0 at 0.2
+turn technique.harmonic=5, on 47 => 1 at 0.08
+
+test mode=mpe pluck.position=0.2: slide moves the pluck until all is released, for it is a sound controller (RP-015)
+slide 127 @1, on 57 @1, reset 0 @1, on 57 @1 => 0 at 0.5, 1 at 0.5
+rest @1, on 57 @1 => 2 at 0.2
+
 six: with its input at rest a guitar is forgotten
 on 64 @0, on 59 @1, on 65 @0, on 67 @0 => rings 64 59 67
 rest @0, rest @1, on 72, on 76 => rings 64 59 67 72 76
@@ -463,6 +452,8 @@ def check(text: str, stage: Stage) -> None:
     note = stage.struck[int(number)]
     if said == "bent":
         assert note.semitones == pytest.approx(float(value[0]), abs=1e-6)
+    elif said == "at":
+        assert stage.begun[int(number)].position == pytest.approx(float(value[0]))
     elif said == "on":
         assert note.now.now.area_m2 == pytest.approx(5e-7 * 1.1 ** (5 - int(value[0])))
         assert note.now.now.pitch_hz == pytest.approx(hz_of(note.now.key + note.semitones), rel=1e-6)
@@ -495,6 +486,7 @@ test technique.strum_ms=10: {SIX.format(0)}                          | 8192 | 40
 test technique.strum_ms=10 technique.strokes=1: {SIX.format(1000)}   | 8192 | 64@1000 59@1480 55@1960 50@2440 45@2920 40@3400
 test technique.strum_ms=5 technique.strokes=2: {TURNS}               | 48000 | 40@1 45@241 50@481 50@9601 45@9841 40@10081 40@19201 45@19441 50@19681 60@28800 50@38401 45@38641 40@38881
 test technique.strum_ms=20: 100 on 50, 300 on 59, 420 on 45, {100 + LATE} on 70 | 6000 | 50@100 45@1060 70@{100 + LATE} 59@2020
+guitar technique.strum_ms=10: on 64 @1 v1, 2000 on 50 @3, 2000 on 57 @4, 2000 on 45 @5 | 4096 | 64@0 45@2000 57@2480 50@2960
 test technique.strum_ms=40: {THREE.format(64)}, 640 mode123 0        | 9600 | 40@64
 test technique.strum_ms=40: {THREE.format(64)}, 640 sound-off 0      | 9600 | 40@64
 test: strum 64 @16, on 40 @16, on 45 @16                             | 4096 | 40@0 45@{SPREAD}
@@ -520,33 +512,3 @@ def test_strokes_begin_at_their_frames(
     refused = [each.key for each in stage.reports if each.kind == of.REFUSED]
     struck = sum(isinstance(event, NoteOn) for _, event in events)
     assert len({each.id for each in stage.begun}) + len(refused) == struck
-
-
-# Chords of six strings
-
-
-def test_the_strings_of_a_chord_are_strummed_by_string(guitar: Instrument, preset: Preset) -> None:
-    """On the fifth string a key may be higher than that on the fourth."""
-    stage = Stage(changed(guitar, technique={"strum_ms": 10}), preset)
-    chord = [(1_000, NoteOn(key, 60, channel)) for channel, key in ((3, 50), (4, 57), (5, 45))]
-    stage.run([(0, NoteOn(64, 1, 1)), *chord], 4_096)
-    assert [each.channel for each in stage.begun[1:]] == [5, 4, 3]
-
-
-def test_a_short_key_of_a_chord_is_as_short_when_its_turn_comes(instrument: Instrument, preset: Preset) -> None:
-    stage = Stage(changed(instrument, technique={"strum_ms": 40}), preset)
-    chord = [(64, NoteOn(key, 60)) for key in (40, 45)] + [(640, NoteOff(key)) for key in (40, 45)]
-    for frames, held in ((64 + 1_920 + 512, {40: False, 45: True}), (128, {40: False, 45: False})):
-        stage.run(chord, frames)
-        assert {note.key: note.held for note in seen(stage.player)} == held
-        chord = []
-
-
-def test_one_key_on_two_strings_is_two_courses(guitar: Instrument, preset: Preset) -> None:
-    """Legato moves the course of the string that is given, and a release ends that alone."""
-    stage = Stage(changed(guitar, course=Course(strings=2)), preset)
-    events = [(0, ControlChange(LEGATO, 127)), *((64 * n, NoteOn(59, 60, string=n)) for n in (1, 2))]
-    stage.run([*events, (960, NoteOn(61, 60, string=1))], 1_920)
-    assert sorted(note.key for note in seen(stage.player)) == [59, 59, 61, 61]
-    stage.run([(0, NoteOff(59, string=2))], 640)
-    assert sorted(note.key for note in seen(stage.player) if note.held) == [61, 61]

@@ -1,12 +1,9 @@
 """Frozen sounds: random events on many instruments sound as they did.
 
-`frozen/sounds.json` has what an independent player in Python made of the same events, before it was removed: the norm
-of the sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
-They were frozen again when fades lost their corners; with straight fades all agreed until then, to 3e-5, which silent
-modes make that rest from the start. Eight were frozen again when nothing touched a string for longer than a period;
-without that bound all agreed until then. Four were frozen again when both sides of a body came to bound the level of
-keys; with the left side alone all agreed until then.
-Its instruments are there as they were then, so that those of the factory may be voiced otherwise.
+`frozen/sounds.json` has the norm of each sound, then its projections on eight random directions, in norms. An
+independent player in Python, since removed, made most of them; the compiled one agreed with it to 1e-9. Those of
+WITH_TECHNIQUES are of the compiled player. The instruments are there as they were, so that the factory's may be
+voiced otherwise.
 """
 
 from __future__ import annotations
@@ -16,11 +13,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from app.instruments.instrument import Instrument, Pickup
+from app.instruments.drums import Drums
+from app.instruments.instrument import Course, Instrument, Noise, Pickup
 from app.instruments.library import read_instrument
 from app.player import events
 from app.player.events import KEYS, Bend, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn
@@ -33,6 +32,8 @@ from tests.engine.resonators.test_recorded import recorded
 
 GAINS = {"model": 1.0, "truth": -0.5}
 CLOSE = 1e-7
+Played = Sequence[tuple[int, Event]]
+Gains = dict[str, float]
 FROZEN_INSTRUMENTS = Path(__file__).parent / "frozen"
 FROZEN = json.loads((FROZEN_INSTRUMENTS / "sounds.json").read_text())
 
@@ -50,11 +51,12 @@ def compared(
     name: str,
     instrument: Instrument,
     preset: Preset,
-    played: Sequence[tuple[int, Event]],
+    played: Played,
     quanta: int,
     most: int = 40,
+    gains: Gains = GAINS,
 ) -> float:
-    return off(name, Stage(instrument, preset, gains=GAINS, most=most).run(played, quanta * QUANTUM))
+    return off(name, Stage(instrument, preset, gains=gains, most=most).run(played, quanta * QUANTUM))
 
 
 @pytest.fixture(scope="module")
@@ -68,20 +70,25 @@ CONTROLLERS = (
     *(midi.SUSTAIN, midi.MOD_WHEEL, midi.SLIDE, midi.RESET, midi.NOTES_OFF),
     *(midi.REGISTERED, midi.FINE_REGISTERED, midi.VALUE, midi.FINE_VALUE, midi.OTHER),
 )
+HANDS = (  # which instruments with techniques have beside them
+    *(midi.LEGATO, midi.PORTAMENTO, midi.SLIDE_TIME, midi.SOFT, midi.VOLUME, midi.EXPRESSION),
+    *(midi.HARMONICS, midi.TREMOLO, midi.STRUM, midi.INCREMENT),
+)
 KNOBS = ("knobs.tension", "knobs.gauge", "knobs.decay", "knobs.stiffness", "damping.release_t60_s", "pluck.position")
 
 
 def drawn(
-    instrument: Instrument, other: Instrument, seed: int, seconds: float, count: int = 60
+    instrument: Instrument, other: Instrument, seed: int, seconds: float, controllers: Sequence[int] = CONTROLLERS
 ) -> list[tuple[int, Event]]:
     """Random events, in their order; keys are often struck again, and two events often share a frame."""
+    knobs = ("noise.onset_db",) if isinstance(instrument.strings, Drums) else KNOBS
     draw = np.random.default_rng(seed)
     low, high = instrument.range
     keys = draw.integers(low, high + 1, 5).tolist()
     channels = {"poly": (0, 0, 1, KEYS), "guitar": (0, 1, 2, 3, 4, 9, KEYS), "mpe": (0, 1, 2, 3, KEYS)}[
         instrument.mode
     ]
-    frames = np.sort(draw.integers(1, round(seconds * RATE_HZ), count))
+    frames = np.sort(draw.integers(1, round(seconds * RATE_HZ), 60))
     frames[::7] = frames[::7] // QUANTUM * QUANTUM
     frames = np.sort(frames)
     present, found = instrument, list[tuple[int, Event]]()
@@ -95,13 +102,13 @@ def drawn(
         elif kind < 0.75:
             found.append((frame, Bend(float(draw.uniform(-1.2, 1.2)), channel)))
         elif kind < 0.97:
-            number = int(draw.choice(CONTROLLERS))
+            number = int(draw.choice(controllers))
             chooses = number in (midi.REGISTERED, midi.FINE_REGISTERED)
             found.append((frame, ControlChange(number, 0 if chooses else value, channel)))
         elif kind < 0.98:
             found.append((frame, ControlChange(midi.SOUND_OFF, 0, channel)))
         else:
-            name = str(draw.choice(KNOBS))
+            name = str(draw.choice(knobs))
             turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
             present = turned if draw.random() < 0.8 else other
             found.append((frame, InstrumentTurned(present)))
@@ -138,6 +145,16 @@ INSTRUMENTS = [
     ("flamenco_guitar", {"polarisations": TWO, "losses": Losses(), "mod_wheel": "knobs.decay"}),
     ("cimbalom", {"polarisations": TWO, "pluck": {"release_ms": 3.0, "release_hard_ms": 0.7}}),
 ]
+NOISE = Noise(kind="finger", onset_db=-10.0, release_db=-10.0)
+EDGE = {"distance_mm": 10.0, "gap_um": 3.0, "stiffness_n_m": 2e4, "loss_s_m": 0.5}
+COURSE = Course(strings=3, cents=2, apart_ms=3, bridge=1)
+WITH_TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
+    ("oud", {"polarisations": TWO, "course": COURSE, "technique": {"strum_ms": 7.0, "tremolo_hz": 16.0}}),
+    ("sitar", {"javari": EDGE, "noise": NOISE, "damping": {"mute": 0.1}, "mod_wheel": "technique.vibrato_cents"}),
+    ("classical_guitar", {"mode": "poly", "technique": {"harmonic": 3}, "noise": NOISE, "course": Course(strings=2)}),
+    ("concert_toms", {"noise": NOISE}),
+    ("timpani", {"noise": NOISE}),
+]
 
 
 @pytest.mark.parametrize("number", range(len(INSTRUMENTS)), ids=[name for name, _ in INSTRUMENTS])
@@ -151,6 +168,18 @@ def test_random_events_sound_as_they_did(
         compared(f"{number} {name} {seed}", instrument, preset, drawn(instrument, shipped["kora"], seed, 0.4), 400)
         < CLOSE
     )
+
+
+@pytest.mark.parametrize(("name", "parts"), WITH_TECHNIQUES, ids=[name for name, _ in WITH_TECHNIQUES])
+@pytest.mark.parametrize(("seed", "gains"), [(1, GAINS), (2, {"model": 1.0}), (3, {"truth": 1.0})])
+def test_techniques_sound_as_they_did(
+    shipped: dict[str, Instrument], preset: Preset, name: str, parts: dict[str, Any], seed: int, gains: Gains
+) -> None:
+    """One source alone has noise."""
+    instrument = changed(shipped[name], **parts)
+    other = instrument if isinstance(instrument.strings, Drums) else shipped["kora"]
+    played = drawn(instrument, other, seed, 0.4, (*CONTROLLERS, *HANDS))
+    assert compared(f"techniques of {name} {seed}", instrument, preset, played, 400, gains=gains) < CLOSE
 
 
 @pytest.mark.parametrize(("name", "kind"), [("classical_guitar", "displacement"), ("fretless_bass", "velocity")])

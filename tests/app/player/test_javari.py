@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 from numpy.typing import NDArray
 
-from app.instruments.instrument import Course, Instrument, Javari, Pickup
+from app.instruments.instrument import Instrument, Javari, Pickup
 from app.instruments.library import SHIPPED, read_instrument
 from app.player.events import NoteOn
 from engine.kernels.constants import QUANTUM
@@ -56,25 +56,28 @@ def watched(
     return note, Equation(*note.voices()[0])
 
 
-@pytest.mark.parametrize("loss", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("velocity", "loss", "rises", "left"),
+    [(90, 0.0, 1e-9, (1 - 1e-7, 1 + 1e-7)), (90, 0.5, 1e-9, (0, 0.999)), (127, 0.5, 1e-5, (0, 0.9))],
+)
 @SOURCES
 def test_energy_of_string_and_edge_never_rises(
-    instrument: Instrument, preset: Preset, source: str, loss: float
+    instrument: Instrument,
+    preset: Preset,
+    velocity: int,
+    loss: float,
+    rises: float,
+    left: tuple[float, float],
+    source: str,
 ) -> None:
-    """Without losses of the string: where the edge has none either, it stays."""
+    """Of a soft string without losses, and of a loud one with them."""
     lossless = linear(instrument, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
-    note, equation = watched(buzzing(lossless, loss_s_m=loss), preset, source)
-    found = equation.energy(note.states(1_500))
-    assert np.diff(found).max() < 1e-9 * found[0]
-    assert (found[-1] < 0.999 * found[0]) if loss else (found[-1] == pytest.approx(found[0], rel=1e-7))
-
-
-@SOURCES
-def test_energy_of_a_loud_string_and_edge_never_rises(instrument: Instrument, preset: Preset, source: str) -> None:
-    note, equation = watched(buzzing(instrument), preset, source, velocity=127)
+    note, equation = watched(
+        buzzing(instrument if velocity == 127 else lossless, loss_s_m=loss), preset, source, velocity
+    )
     found = equation.energy(note.states(750))
-    assert np.diff(found).max() < 1e-5 * found[0]
-    assert found[-1] < 0.9 * found[0]
+    assert np.diff(found).max() < rises * found[0]
+    assert left[0] <= found[-1] / found[0] <= left[1]
 
 
 def test_truth_is_the_solution_of_its_equation(instrument: Instrument, preset: Preset) -> None:
@@ -96,25 +99,14 @@ def test_truth_is_the_solution_of_its_equation(instrument: Instrument, preset: P
 @SOURCES
 def test_high_partials_come_later(preset: Preset, source: str) -> None:
     """On a tanpura the share of what lies above 2 kHz rises in the first second; without the edge it falls."""
-    shipped = read_instrument(SHIPPED / "tanpura_drone.json")
-
-    def share_db(instrument: Instrument, at_s: float) -> float:
-        sound = play(instrument, preset, at_s + 0.2, (0.0, NoteOn(36, 100)), source=source)[round(at_s * RATE_HZ) :]
-        power = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))) ** 2
-        return float(10 * np.log10(power[round(2_000 * len(sound) / RATE_HZ) :].sum() / power.sum()))
-
-    plain = changed(shipped, javari=Javari())
-    assert share_db(shipped, 1.2) > share_db(shipped, 0.01) + 3
-    assert share_db(plain, 1.2) < share_db(plain, 0.01) - 3
-
-
-@SOURCES
-def test_an_edge_that_is_never_met_changes_nothing(instrument: Instrument, preset: Preset, source: str) -> None:
-    far, same = (
-        play(each, preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source)
-        for each in (buzzing(instrument, gap_um=200), instrument)
-    )
-    assert relative(far, same) < 1e-9
+    shipped, rises_db = read_instrument(SHIPPED / "tanpura_drone.json"), []
+    for instrument in (shipped, changed(shipped, javari=Javari())):
+        sound, shares_db = play(instrument, preset, 1.4, (0.0, NoteOn(36, 100)), source=source), []
+        for at_s in (0.01, 1.2):
+            power = np.abs(np.fft.rfft(sound[round(at_s * RATE_HZ) :][:9_600] * np.hanning(9_600))) ** 2
+            shares_db.append(10 * np.log10(power[400:].sum() / power.sum()))
+        rises_db.append(shares_db[1] - shares_db[0])
+    assert rises_db[0] > 3 and rises_db[1] < -3
 
 
 @SOURCES
@@ -132,9 +124,3 @@ def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(
     assert abs(np.mean(heard)) < 0.2 * pushed
     point, _ = watched(buzzing(instrument), preset, source)
     assert point.voices()[0][0]["javari"]["heard"] == 0
-
-
-@pytest.mark.parametrize("course", [Course(strings=2, bridge=1.0), Course(bridge=0.5)])
-def test_strings_that_share_a_bridge_have_no_edge(instrument: Instrument, course: Course) -> None:
-    with pytest.raises(ValueError, match="javari"):
-        changed(buzzing(instrument), course=course)

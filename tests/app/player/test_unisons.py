@@ -160,44 +160,20 @@ def test_a_string_whose_others_have_not_begun_rings_as_alone(
     assert np.abs(both - one).max() < 1e-4 * np.abs(one).max()
 
 
-@SOURCES
-def test_strings_in_step_have_the_phases_of_their_strokes(
-    instrument: Instrument, preset: Preset, source: str
-) -> None:
-    loose = Polarisations(conductance_s_kg=1e-6, second_conductance_s_kg=0.0)
-    step, apart = (
-        play(
-            changed(instrument, polarisations=loose, course=Course(strings=3, apart_ms=3.1, bridge=bridge)),
-            preset,
-            0.3,
-            (0.0, NoteOn(KEY, 20)),
-            source=source,
-        )[960:]
-        for bridge in (1.0, 0.0)
-    )
-    assert np.abs(step - apart).max() < 2e-3 * np.abs(apart).max()
-
-
 def t60_s(sound: NDArray[np.float64], begin_s: float, end_s: float) -> float:
     """From the slope of the level in windows of 50 ms."""
     times = np.arange(begin_s, end_s, 0.05)
     windows = [sound[round(each * RATE_HZ) :][: RATE_HZ // 20] for each in times]
-    return -60 / float(np.polyfit(times, [10 * math.log10((each**2).mean()) for each in windows], 1)[0])
+    return -60 / float(np.polyfit(times, [10 * math.log10((each**2).mean() + 1e-30) for each in windows], 1)[0])
 
 
 @SOURCES
 def test_unisons_decay_in_two_stages(instrument: Instrument, preset: Preset, source: str) -> None:
-    one_direction = changed(instrument, polarisations=Polarisations(angle_deg=0, conductance_s_kg=0.03))
-    shared, apart = (
-        play(
-            changed(one_direction, course=Course(strings=2, cents=1.0, bridge=bridge)),
-            preset,
-            4.0,
-            (0.0, NoteOn(KEY, 40)),
-            source=source,
-        )
-        for bridge in (1.0, 0.0)
-    )
-    early, late = t60_s(shared, 0.1, 0.5), t60_s(shared, 2, 4)
-    assert late > 2 * early
-    assert early < 0.7 * t60_s(apart, 0.1, 0.5)
+    found = []
+    for bridge in (1.0, 0.0):
+        one_direction = Polarisations(angle_deg=0, conductance_s_kg=0.03)
+        course = changed(instrument, polarisations=one_direction, course=Course(strings=2, cents=1.0, bridge=bridge))
+        sound = play(course, preset, 4.0, (0.0, NoteOn(KEY, 40)), source=source)
+        found.append((t60_s(sound, 0.1, 0.5), t60_s(sound, 2, 4)))
+    (early, late), (apart, _) = found
+    assert late > 2 * early and early < 0.7 * apart
