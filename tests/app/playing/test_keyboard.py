@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from app.playing import keyboard
 from app.playing.keyboard import (
     HIGHEST_OCTAVE,
     HIGHEST_PLACE,
@@ -14,29 +15,25 @@ from app.playing.keyboard import (
     LOWEST_PLACE,
     KeyPress,
     PluckRange,
-    letters_of,
-    octave_near,
-    octaves_of,
     place_of,
     semitone_of,
-    turn,
 )
 from engine.pluck import Pluck
 from engine.presets import find_preset, read_info
 
 REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
+EVERY_OCTAVE = range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
 
 
 def test_rows_of_keys_are_places_and_a_piano() -> None:
     assert [place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
     assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
     assert [semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
-    assert letters_of(1)[LOWEST_C + 12] == "A"
+    assert keyboard.letters_of(1)[LOWEST_C + 12] == "A"
 
 
-@pytest.mark.parametrize(
-    ("platform", "press", "place", "semitone"),
-    [
+def test_keys_are_known_by_their_place() -> None:
+    for platform, press, place, semitone in (
         ("linux", KeyPress("Q", 38), 0, 0),  # AZERTY: Q is where A is elsewhere
         ("linux", KeyPress("A", 24), None, None),
         ("linux", KeyPress("z", 25), None, 1),
@@ -47,12 +44,8 @@ def test_rows_of_keys_are_places_and_a_piano() -> None:
         ("darwin", KeyPress("Q"), None, None),
         ("linux", KeyPress("q"), None, None),
         ("linux", KeyPress(""), None, None),
-    ],
-)
-def test_keys_are_known_by_their_place(
-    platform: str, press: KeyPress, place: int | None, semitone: int | None
-) -> None:
-    assert (place_of(press, platform), semitone_of(press, platform)) == (place, semitone)
+    ):
+        assert (place_of(press, platform), semitone_of(press, platform)) == (place, semitone), press
 
 
 def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
@@ -86,47 +79,25 @@ def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
     assert low_mm == 0.5 and harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    ("letter", "octave", "velocity", "expected"),
-    [
-        ("z", 0, 90, (-1, 90)),
-        ("X", HIGHEST_OCTAVE, 90, (HIGHEST_OCTAVE, 90)),
-        ("Z", LOWEST_OCTAVE, 90, (LOWEST_OCTAVE, 90)),
-        ("9", 0, 90, (0, 127)),
-        ("1", 0, 90, (0, 1)),
-        ("v", 0, 120, (0, 127)),
-        ("c", 0, 5, (0, 1)),
-        ("m", 0, 5, None),
-    ],
-)
-def test_octave_and_velocity_keys_stay_within_bounds(
-    letter: str, octave: int, velocity: int, expected: tuple[int, int] | None
-) -> None:
-    assert turn(KeyPress(letter), octave, velocity) == expected
+def test_octave_and_velocity_keys_stay_within_bounds() -> None:
+    highest, lowest = HIGHEST_OCTAVE, LOWEST_OCTAVE
+    assert keyboard.turn(KeyPress("z"), 0, 90) == (-1, 90)
+    assert keyboard.turn(KeyPress("X"), highest, 90) == (highest, 90)
+    assert keyboard.turn(KeyPress("Z"), lowest, 90) == (lowest, 90)
+    velocities = [keyboard.turn(KeyPress(key), 0, v) for key, v in (("9", 90), ("1", 90), ("v", 120), ("c", 5))]
+    assert velocities == [(0, 127), (0, 1), (0, 127), (0, 1)] and keyboard.turn(KeyPress("m"), 0, 5) is None
 
 
-def test_octaves_are_those_in_which_a_key_sounds() -> None:
+def test_octaves_are_those_in_which_a_key_sounds_and_the_nearest_has_most_keys() -> None:
     """Compared with every octave tried; a range that no key reaches has the nearest."""
-    every = range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
     for low in range(0, 108, 7):
         for high in (min(low + keys, 107) for keys in (0, 1, 11, 40)):
-            sounding = [
-                each
-                for each in every
-                if set(range(12)) & {key - LOWEST_C - 12 * each for key in range(low, high + 1)}
-            ]
-            assert octaves_of(low, high) == (sounding[0], sounding[-1]), (low, high)
-    assert octaves_of(120, 127) == (HIGHEST_OCTAVE, HIGHEST_OCTAVE)
-
-
-@pytest.mark.parametrize(
-    ("keys", "octaves", "nearest"),
-    [
-        (range(40, 87), (-4, -1, 0, 2, 4), [0, 0, 0, 2, 2]),  # a guitar, E2 to D6
-        (range(36, 52), (-4, 0, 4), [-1, -1, -1]),  # toms
-        ((50, 51, 52), (0,), [0]),  # three pads
-        (range(120, 128), (3,), [3]),  # no octave has any of them
-    ],
-)
-def test_the_octave_is_the_nearest_with_most_keys(keys: range, octaves: tuple[int, ...], nearest: list[int]) -> None:
-    assert [octave_near(octave, keys) for octave in octaves] == nearest
+            played = {octave: range(LOWEST_C + 12 * octave, LOWEST_C + 12 * octave + 12) for octave in EVERY_OCTAVE}
+            sounding = [octave for octave, keys in played.items() if set(keys) & set(range(low, high + 1))]
+            assert keyboard.octaves_of(low, high) == (sounding[0], sounding[-1]), (low, high)
+    assert keyboard.octaves_of(120, 127) == (HIGHEST_OCTAVE, HIGHEST_OCTAVE)
+    guitar = [keyboard.octave_near(octave, range(40, 87)) for octave in (-4, -1, 0, 2, 4)]
+    assert guitar == [0, 0, 0, 2, 2]  # E2 to D6
+    assert [keyboard.octave_near(octave, range(36, 52)) for octave in (-4, 0, 4)] == [-1, -1, -1]  # toms
+    assert keyboard.octave_near(0, (50, 51, 52)) == 0
+    assert keyboard.octave_near(3, range(120, 128)) == 3  # no octave has any of them

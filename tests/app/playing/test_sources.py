@@ -42,7 +42,7 @@ def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset: Path,
     assert loaded == [small_preset]
 
 
-def test_the_presets_that_were_used_last_are_kept(
+def test_the_presets_that_were_used_last_are_kept_and_a_damaged_one_is_named(
     small_preset: Path, tmp_path: Path, loaded: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "KEPT_PRESETS", 2)
@@ -55,15 +55,12 @@ def test_the_presets_that_were_used_last_are_kept(
     assert [made.has(path, RATE_HZ) for path in (first, second, third)] == [True, False, True]
     made.prepare(second, RATE_HZ)
     assert loaded == [first, second, third, second]
-
-
-def test_a_damaged_preset_is_named(tmp_path: Path) -> None:
-    path, made = tmp_path / "broken.safetensors", Sources()
-    path.write_bytes(b"damaged")
+    broken = tmp_path / "broken.safetensors"
+    broken.write_bytes(b"damaged")
     for ask in (made.load, lambda path: made.prepare(path, RATE_HZ)):
         with pytest.raises(PresetError, match=r"broken\.safetensors"):
-            ask(path)
-    assert not made.has(path, RATE_HZ)
+            ask(broken)
+    assert not made.has(broken, RATE_HZ)
 
 
 def test_what_is_there_waits_for_nothing_that_is_loaded(

@@ -82,7 +82,7 @@ def measured(backend: RtMidi) -> dict[str, Any]:
     streaming = threading.Thread(target=stream)
     streaming.start()
     try:
-        for found["closed"] in range(1, 21):
+        for found["closed"] in range(1, 11):
             midi.close()
             came.clear()
             tried(lambda: midi.open(name))
@@ -116,19 +116,8 @@ def main(folder: str) -> None:
     faulthandler.dump_traceback_later(120, exit=True)
     server = f"play{os.getpid()}"
     os.environ |= {"JACK_DEFAULT_SERVER": server, "JACK_NO_START_SERVER": "1", VARIABLE: "jack"}
-    command = [
-        "jackd",
-        "--no-realtime",
-        "--sync",
-        "--name",
-        server,
-        "-d",
-        "dummy",
-        "--rate",
-        "48000",
-        "--period",
-        "128",
-    ]
+    options = "--no-realtime --sync --name {} -d dummy --rate 48000 --period 128"
+    command = ["jackd", *options.format(server).split()]
     environment = {**os.environ, "JACK_NO_AUDIO_RESERVATION": "1"}
     with (Path(folder) / "log").open("wb") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
