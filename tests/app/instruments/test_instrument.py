@@ -68,7 +68,6 @@ def test_impossible_values_are_refused_by_name() -> None:
 
 
 def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise() -> None:
-    """Instruments of the time before that field, too; a hammer does not."""
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_instrument().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
     whole = make_instrument(strings=strings, macros=macro_of("level_db", -3, 3), pluck={"stops": False})
     assert Instrument.model_validate_json(whole.model_dump_json()) == whole
@@ -110,7 +109,6 @@ def test_each_assignable_field_can_be_read_and_changed() -> None:
 
 
 def test_fields_have_the_defaults_and_limits_of_the_table() -> None:
-    """Those of the engine's values too, which know no table."""
     assert all(id in OF_INSTRUMENTS for id in PLAYED) and len(set(PLAYED)) == len(PLAYED)
     instrument = make_instrument()
     for field, declared in OF_INSTRUMENTS.items():
@@ -145,7 +143,6 @@ def test_the_engines_values_are_checked_where_they_stand(changes: dict[str, Any]
 
 
 def test_a_string_or_drum_is_given_whole() -> None:
-    """The engine's own defaults are those of another string."""
     for name in STRING:
         less = {each: value for each, value in STRING.items() if each != name}
         with pytest.raises(ValueError, match=f"{name} must be given; add what is missing"):
@@ -170,7 +167,6 @@ def test_a_macro_writes_its_targets() -> None:
 
 
 def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can() -> None:
-    """Each end is possible with the other value as it stands, but not both together."""
     macros = macro_of_two("pluck.softest_mm", "pluck.hardest_mm", 0.1, 2.5, 3.0, 1.0)
     instrument = make_instrument(pluck={"softest_mm": 0.1, "hardest_mm": 3.0}, macros=macros)
     for value in (0.0, 0.4, 0.7, 1.0, 0.2):
@@ -179,7 +175,6 @@ def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can() -> None:
 
 
 def test_a_macro_follows_a_knob_that_it_turns() -> None:
-    """To the position that would give its value; with several targets to their mean."""
     guitar = find_instrument("Steel-string acoustic").instrument
     names = [macro.name for macro in guitar.macros]
     room, tone = names.index("Room"), names.index("Tone")

@@ -9,16 +9,6 @@ from pathlib import Path
 import pytest
 
 from app.instruments import library
-from app.instruments.library import (
-    SHIPPED,
-    InstrumentError,
-    file_stem,
-    find_instrument,
-    list_instruments,
-    read_instrument,
-    rename_instrument,
-    save_instrument,
-)
 from tests.app.instruments.conftest import make_instrument
 
 
@@ -36,30 +26,30 @@ def write(path: Path, facts: object) -> Path:
 
 
 def test_what_is_saved_is_listed_and_read_again(own: Path) -> None:
-    entry = save_instrument(make_instrument(name="Čembalo, 8′", category="keys"))
+    entry = library.save_instrument(make_instrument(name="Čembalo, 8′", category="keys"))
     assert entry.path == own / "čembalo_8.json" and entry.own
-    listed, problems = list_instruments()
+    listed, problems = library.list_instruments()
     assert entry in listed and not problems
-    assert find_instrument("Čembalo, 8′") == find_instrument("ČEMBALO_8") == find_instrument(str(entry.path)) == entry
+    for name in ("Čembalo, 8′", "ČEMBALO_8", str(entry.path)):
+        assert library.find_instrument(name) == entry
 
 
 def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own: Path) -> None:
-    """A file that was put there may have any name, whatever the instrument in it is called."""
-    save_instrument(make_instrument(name="My-Bass"))
-    with pytest.raises(InstrumentError, match=r"my bass: .* exists already; choose another"):
-        save_instrument(make_instrument(name="my bass", level_db=3))
+    library.save_instrument(make_instrument(name="My-Bass"))
+    with pytest.raises(library.InstrumentError, match=r"my bass: .* exists already; choose another"):
+        library.save_instrument(make_instrument(name="my bass", level_db=3))
     friends = write(own / "friend.json", make_instrument(name="My bass").model_dump(mode="json"))
-    saved = save_instrument(make_instrument(name="My bass", level_db=3), friends)
-    assert (saved.path, read_instrument(friends).level_db) == (friends, 3)
-    assert read_instrument(own / "my_bass.json").name == "My-Bass"
+    saved = library.save_instrument(make_instrument(name="My bass", level_db=3), friends)
+    assert (saved.path, library.read_instrument(friends).level_db) == (friends, 3)
+    assert library.read_instrument(own / "my_bass.json").name == "My-Bass"
 
 
 def test_two_instruments_of_one_name_are_reported_apart(own: Path) -> None:
-    save_instrument(make_instrument(name="Mine"))
+    library.save_instrument(make_instrument(name="Mine"))
     long = "M" * 60
     for name, file in (("Mine", "mine (copy)"), ("mine", "mine_3"), (long, "long"), (long, "longer")):
         write(own / f"{file}.json", make_instrument(name=name).model_dump(mode="json"))
-    entries, problems = list_instruments(own)
+    entries, problems = library.list_instruments(own)
     assert not problems
     names = {entry.name: entry.instrument.name for entry in entries}
     assert len({name.casefold() for name in names.values()}) == 5
@@ -68,40 +58,40 @@ def test_two_instruments_of_one_name_are_reported_apart(own: Path) -> None:
 
 
 def test_a_shipped_instrument_is_neither_overwritten_nor_renamed_and_counts_before_ones_own(own: Path) -> None:
-    shipped = list_instruments(SHIPPED)[0][0]
+    shipped = library.list_instruments(library.SHIPPED)[0][0]
     for replace in (None, shipped.path):
-        with pytest.raises(InstrumentError, match="factory"):
-            save_instrument(make_instrument(name=shipped.instrument.name), replace)
-    with pytest.raises(InstrumentError, match="shipped with"):
-        rename_instrument(shipped, "Other")
+        with pytest.raises(library.InstrumentError, match="factory"):
+            library.save_instrument(make_instrument(name=shipped.instrument.name), replace)
+    with pytest.raises(library.InstrumentError, match="shipped with"):
+        library.rename_instrument(shipped, "Other")
     assert not own.exists()
     write(own / shipped.path.name, json.loads(shipped.path.read_text(encoding="utf-8")))
-    entries, (problem,) = list_instruments()
+    entries, (problem,) = library.list_instruments()
     assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
     assert "exists already; rename the file" in problem
 
 
 def test_renaming(own: Path) -> None:
-    first = save_instrument(make_instrument(name="First"))
-    save_instrument(make_instrument(name="Taken"))
+    first = library.save_instrument(make_instrument(name="First"))
+    library.save_instrument(make_instrument(name="Taken"))
     for name, reported in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
-        with pytest.raises(InstrumentError, match=reported):
-            rename_instrument(first, name)
-    second = rename_instrument(first, "Second")
+        with pytest.raises(library.InstrumentError, match=reported):
+            library.rename_instrument(first, name)
+    second = library.rename_instrument(first, "Second")
     assert sorted(path.name for path in own.iterdir()) == ["second.json", "taken.json"]
-    spelt = rename_instrument(second, "SECOND")
-    assert spelt.path == second.path and read_instrument(spelt.path).name == "SECOND"
+    spelt = library.rename_instrument(second, "SECOND")
+    assert spelt.path == second.path and library.read_instrument(spelt.path).name == "SECOND"
 
 
 def test_a_file_name_is_never_a_path() -> None:
     for name in ("..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"):
-        stem = file_stem(name)
+        stem = library.file_stem(name)
         assert stem and Path(stem).name == stem and stem.casefold() not in library.DEVICES
         assert all(c.isalnum() or c == "_" for c in stem)
 
 
 def test_one_bad_file_hides_no_other(own: Path) -> None:
-    good = save_instrument(make_instrument(name="Good"))
+    good = library.save_instrument(make_instrument(name="Good"))
     text, facts = good.path.read_text(), json.loads(good.path.read_text())
     (own / "folder.json").mkdir()
     (own / ".hidden.json").write_text("{")
@@ -126,7 +116,7 @@ def test_one_bad_file_hides_no_other(own: Path) -> None:
     if hasattr(os, "mkfifo"):
         os.mkfifo(own / "pipe.json")
         bad["pipe"] = (None, "")
-    entries, problems = list_instruments(own)
+    entries, problems = library.list_instruments(own)
     assert entries == [good] and all(each.isprintable() and len(each) <= 500 for each in problems)
     reported = {Path(each.split(".json: ")[0]).name: each for each in problems}
     assert set(reported) == set(bad) and all(words in reported[name] for name, (_, words) in bad.items())
@@ -146,5 +136,5 @@ def test_one_bad_file_hides_no_other(own: Path) -> None:
 )
 def test_faults_are_named_in_plain_words(own: Path, field: str, value: object, words: str) -> None:
     write(own / "a.json", make_instrument(name="One").model_dump(mode="json") | {field: value})
-    with pytest.raises(InstrumentError, match=f"a.json: {words}; mend this field"):
-        read_instrument(own / "a.json")
+    with pytest.raises(library.InstrumentError, match=f"a.json: {words}; mend this field"):
+        library.read_instrument(own / "a.json")

@@ -3,16 +3,9 @@ from __future__ import annotations
 import pytest
 
 from app.instruments.instrument import Damping, Fretted, Instrument, OpenString, PluckChoices, StringSet
-from engine.presets import Preset, load_preset
-from engine.presets.finding import SHIPPED
 from engine.values.string import StringParameters
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
-
-
-@pytest.fixture(scope="session")
-def preset() -> Preset:
-    return load_preset(SHIPPED / "studio_any_string.safetensors")
 
 
 @pytest.fixture

@@ -16,13 +16,14 @@ from app.player.offline import render_events
 from app.player.strings import KeyString, Strings
 from engine.kernels import constants as of
 from engine.kernels.constants import QUANTUM
-from engine.presets import Preset
+from engine.presets import SHIPPED, Preset, load_preset
 from engine.voices import Mixer
 from engine.voices.player import NoteReport
 from tests.app.player.conftest import STEEL
 from tests.app.player.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
+PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KEY = 45  # an open string of the guitar
 SOURCES = ("model", "truth")
 OPEN = (40, 45, 50, 55, 59, 64)
@@ -56,10 +57,10 @@ def hz_of(key: float) -> float:
     return float(440 * 2 ** ((key - 69) / 12))
 
 
-def play(instrument: Instrument, preset: Preset, seconds: float, *events: Timed, source: str = "model") -> Sound:
+def play(instrument: Instrument, seconds: float, *events: Timed, source: str = "model") -> Sound:
     """The left side, without limiter and variation."""
     timed = [TimedEvent(*event) for event in events]
-    blocks = list(render_events(instrument, preset, timed, RATE_HZ, source, seconds, limited=False, varied=False))
+    blocks = list(render_events(instrument, PRESET, timed, RATE_HZ, source, seconds, limited=False, varied=False))
     return np.concatenate(blocks)[:, 0].astype(np.float64)
 
 
@@ -92,11 +93,11 @@ class Stage:
     def __init__(
         self,
         instrument: Instrument,
-        preset: Preset,
         sources: Sequence[str] = ("model",),
         varied: bool = True,
         most: int = 40,
         gains: dict[str, float] | None = None,
+        preset: Preset = PRESET,
     ) -> None:
         self.mixer = Mixer(RATE_HZ, limited=False)
         gains = gains or dict.fromkeys(sources, 1.0)

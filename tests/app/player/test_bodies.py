@@ -14,8 +14,7 @@ from app.player.bodies import body_names, body_titles, install_body, own_bodies,
 from app.player.effects import body_curves, body_problem, effects_of
 from app.player.offline import render_note
 from engine.effects import BODIES
-from engine.presets import Preset
-from tests.app.player.stage import RATE_HZ
+from tests.app.player.stage import PRESET, RATE_HZ
 
 LATE_FRAMES = 480
 
@@ -38,22 +37,18 @@ def on(instrument: Instrument, name: str, mix: float = 1.0) -> Instrument:
     return instrument.model_copy(update={"body": BodyChoice(name=name, mix=mix)})
 
 
-def test_a_file_becomes_a_body_whole_and_by_a_safe_name(tmp_path: Path) -> None:
+def test_a_file_becomes_a_body_whole_once_and_by_a_safe_name(tmp_path: Path) -> None:
     assert body_names() == list(BODIES)
     file = late(tmp_path / "My Cello: body (near).WAV")
     name = install_body(file)
     (copy,) = own_bodies().iterdir()
     assert copy.name == "my_cello_body_near.wav" == f"{name}.wav" and copy.read_bytes() == file.read_bytes()
-    assert body_names() == [*BODIES, name]
+    one, other = late(tmp_path / "guitar.wav", 77), late(tmp_path / "guitar.flac", 99)
+    assert [install_body(file) for file in (one, one, other, one)] == ["guitar_2", "guitar_2", "guitar_3", "guitar_2"]
+    assert body_names() == [*BODIES, "guitar_2", "guitar_3", name] and len(own_impulse("guitar_3").samples) == 100
     titles = dict(body_titles())
     assert titles["guitar"] == "Guitar" and titles[name] == name
     assert list(titles) == body_names() and len(set(titles.values())) == len(titles)
-
-
-def test_the_same_file_is_copied_once_and_a_taken_name_gets_a_number(tmp_path: Path) -> None:
-    one, other = late(tmp_path / "guitar.wav"), late(tmp_path / "guitar.flac", 99)
-    assert [install_body(file) for file in (one, one, other, one)] == ["guitar_2", "guitar_2", "guitar_3", "guitar_2"]
-    assert body_names() == [*BODIES, "guitar_2", "guitar_3"] and len(own_impulse("guitar_3").samples) == 100
 
 
 def test_names_are_never_paths_and_what_is_no_impulse_response_is_not_taken(tmp_path: Path) -> None:
@@ -71,9 +66,9 @@ def test_names_are_never_paths_and_what_is_no_impulse_response_is_not_taken(tmp_
             own_impulse(name)
 
 
-def test_it_is_heard_in_a_file_on_both_sides(instrument: Instrument, preset: Preset, tmp_path: Path) -> None:
+def test_it_is_heard_in_a_file_on_both_sides(instrument: Instrument, tmp_path: Path) -> None:
     wooden = on(instrument, install_body(late(tmp_path / "late.wav")))
-    dry, wet = (render_note(each, preset, 57, 90, 1.0, 0.2, RATE_HZ) for each in (instrument, wooden))
+    dry, wet = (render_note(each, PRESET, 57, 90, 1.0, 0.2, RATE_HZ) for each in (instrument, wooden))
     peak = np.abs(dry).max()
     assert wet.shape[1] == 2 and np.abs(wet[:LATE_FRAMES]).max() < 0.011 * peak
     for side in (0, 1):
@@ -85,7 +80,7 @@ def test_it_is_heard_in_a_file_on_both_sides(instrument: Instrument, preset: Pre
     [(False, "test is played without its body: the body late is not here"), (True, "late.wav")],
 )
 def test_one_that_is_gone_is_reported_in_a_line_and_left_out(
-    instrument: Instrument, preset: Preset, tmp_path: Path, damaged: bool, reported: str
+    instrument: Instrument, tmp_path: Path, damaged: bool, reported: str
 ) -> None:
     wooden, file = on(instrument, install_body(late(tmp_path / "late.wav"))), own_bodies() / "late.wav"
     assert body_problem(wooden) == "" and effects_of(wooden) is not None
@@ -94,6 +89,6 @@ def test_one_that_is_gone_is_reported_in_a_line_and_left_out(
         file.write_text("no sound any more")
     assert reported in body_problem(wooden) and body_problem(wooden).isprintable()
     assert effects_of(wooden) is None and body_curves(wooden) is None
-    dry, left_out = (render_note(each, preset, 57, 90, 1.0, 0.05, RATE_HZ) for each in (instrument, wooden))
+    dry, left_out = (render_note(each, PRESET, 57, 90, 1.0, 0.05, RATE_HZ) for each in (instrument, wooden))
     np.testing.assert_array_equal(left_out, dry)
     assert body_problem(on(instrument, "late", mix=0.0)) == ""  # it would not be heard

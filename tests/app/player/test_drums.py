@@ -20,13 +20,11 @@ from app.player.drum_keys import DrumKey, DrumKeys
 from app.player.events import NoteOn
 from app.player.glide import glides_cents
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, load_preset
 from engine.values.drum import Mallet
 from engine.values.ear import Ear
 from engine.voices import Mixer
-from tests.app.player.stage import RATE_HZ, Stage, pitch_hz, play, relative
+from tests.app.player.stage import PRESET, RATE_HZ, Stage, pitch_hz, play, relative
 
-PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KIT, TOM, TIMPANI = (
     read_instrument(INSTRUMENTS / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani")
 )
@@ -50,7 +48,7 @@ def blow(
     instrument: Instrument, key: int, velocity: int = 100, source: str = "model", seconds: float = 0.3
 ) -> np.ndarray:
     """The left side of a dry blow."""
-    return play(instrument.with_value("room.mix", 0.0), PRESET, seconds, (0.0, NoteOn(key, velocity)), source=source)
+    return play(instrument.with_value("room.mix", 0.0), seconds, (0.0, NoteOn(key, velocity)), source=source)
 
 
 def drum_of(instrument: Instrument, key: int) -> DrumKey:
@@ -64,7 +62,7 @@ def test_model_and_truth_sound_alike_and_a_pluck_by_hand_strikes_as_its_velocity
     """A file may ask for a pluck, and a preview of drums may hear what was meant for a string."""
     model, truth = (blow(KIT, key, 127, source) for source in ("model", "truth"))
     assert 0.05 < np.abs(truth).max() < 1 and relative(model, truth) < 1e-7
-    by_hand = play(KIT.with_value("room.mix", 0.0), PRESET, 0.3, (0.0, NoteOn(key, 127, pluck=Pluck(0.3, 2.0))))
+    by_hand = play(KIT.with_value("room.mix", 0.0), 0.3, (0.0, NoteOn(key, 127, pluck=Pluck(0.3, 2.0))))
     np.testing.assert_array_equal(by_hand, model)
 
 
@@ -96,10 +94,9 @@ def test_modes_that_rest_are_not_missed(
 
 @pytest.mark.parametrize("key", [36, 47])
 def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, let_all_move: Callable[[], None]) -> None:
-    """From above, where the head's rings alone are heard, to the side: as loud as if all modes had moved."""
 
     def sound() -> np.ndarray:
-        stage = Stage(KIT, PRESET)
+        stage = Stage(KIT)
         stage.player.take(stage.player.keys_of(KIT, Ear((0.5,))))
         stage.player.handle(NoteOn(key, 110))
         before = stage.left(4_800)
@@ -167,7 +164,6 @@ STICK_DB, FELT_DB = (-50, -30), (-200, -56)
 def test_a_stick_is_heard_above_5_khz_and_felt_is_dull(
     instrument: Instrument, key: int, velocity: int, within_db: tuple[int, int]
 ) -> None:
-    """The first 50 ms, re all of it."""
     sound = blow(instrument, key, velocity, seconds=0.05)
     high = sosfilt(butter(8, 5_000, "high", fs=RATE_HZ, output="sos"), sound)
     assert within_db[0] < 10 * np.log10(np.square(high).sum() / np.square(sound).sum()) < within_db[1]

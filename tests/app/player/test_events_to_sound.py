@@ -31,7 +31,6 @@ from engine.kernels.playing.channels import SLIDE_S, WIDEST_SEMITONES
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ
 from engine.kernels.playing.keys import USUAL_HARMONIC
-from engine.presets import Preset
 from tests.app.player.stage import (
     RATE_HZ,
     SOURCES,
@@ -174,11 +173,9 @@ test edge javari.distance_mm=0: {AGAIN}  | test: {AGAIN}                        
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("one", "other", "bounds"), rows(ALIKE))
-def test_two_ways_to_one_sound(read: Read, preset: Preset, one: str, other: str, bounds: str, source: str) -> None:
+def test_two_ways_to_one_sound(read: Read, one: str, other: str, bounds: str, source: str) -> None:
     ((seconds, apart),) = numbers_of(bounds)
-    sounds = [
-        play(instrument, preset, seconds, *events, source=source) for instrument, events in map(read, (one, other))
-    ]
+    sounds = [play(instrument, seconds, *events, source=source) for instrument, events in map(read, (one, other))]
     assert np.abs(sounds[1]).max() > 1e-3
     np.testing.assert_allclose(*sounds, rtol=0, atol=apart * np.abs(sounds[1]).max())
 
@@ -215,10 +212,9 @@ sitar: on 72 v100              | 1e-6
 
 
 @pytest.mark.parametrize(("played", "apart"), rows(AGREE))
-def test_model_and_truth_agree(read: Read, preset: Preset, played: str, apart: str) -> None:
-    """Under the same hands, with strokes that stop the string or add to it, courses, edges and knobs that turn."""
+def test_model_and_truth_agree(read: Read, played: str, apart: str) -> None:
     instrument, events = read(played)
-    model, truth = (play(instrument, preset, events[-1][0] + 0.5, *events, source=source) for source in SOURCES)
+    model, truth = (play(instrument, events[-1][0] + 0.5, *events, source=source) for source in SOURCES)
     assert np.isfinite(model).all() and np.abs(truth).max() > 1e-3
     assert relative(model, truth) < float(apart)
 
@@ -246,10 +242,10 @@ guitar mode=poly: portamento 64, slide-time {HALF_S}, legato 64, on 45, .4 on 50
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("played", "heard"), rows(PITCHES))
-def test_pitches(read: Read, preset: Preset, played: str, heard: str, source: str) -> None:
+def test_pitches(read: Read, played: str, heard: str, source: str) -> None:
     instrument, events = read(played)
     windows = numbers_of(heard)
-    sound = play(instrument, preset, windows[-1][1] + 0.05, *events, source=source)
+    sound = play(instrument, windows[-1][1] + 0.05, *events, source=source)
     for begin_s, end_s, key, apart in windows:
         found = pitch_hz(sound, hz_of(key), begin_s, end_s, max(0.03, apart / 1200))
         assert abs(cents(found, hz_of(key))) < apart, (begin_s, key)
@@ -280,11 +276,11 @@ test: {PULLED_ON}                                       | .9 1 -300 -20
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("played", "heard"), rows(LOUDER))
-def test_levels(read: Read, preset: Preset, played: str, heard: str, source: str) -> None:
+def test_levels(read: Read, played: str, heard: str, source: str) -> None:
     windows = numbers_of(heard)
     instrument, events = read(played)
     sound, alone = (
-        play(instrument, preset, windows[-1][1], *each, source=source) for each in (events, [(0.0, NoteOn(45, 60))])
+        play(instrument, windows[-1][1], *each, source=source) for each in (events, [(0.0, NoteOn(45, 60))])
     )
     for begin_s, end_s, low_db, high_db in windows:
         found = level_db(sound, begin_s, end_s) - level_db(alone, begin_s, end_s)
@@ -462,9 +458,9 @@ def check(text: str, stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("score", SCORES.strip().split("\n\n"), ids=lambda score: score.strip().split("\n")[0])
-def test_hands(read: Read, preset: Preset, score: str) -> None:
+def test_hands(read: Read, score: str) -> None:
     title, *lines = score.strip().split("\n")
-    stage = Stage(read(title.split(":")[0])[0], preset)
+    stage = Stage(read(title.split(":")[0])[0])
     for line in lines:
         played, _, expected = line.partition(" => ")
         for text in played.split(", "):
@@ -501,12 +497,9 @@ test: tremolo 64, on 45, 24000 reset 0                               | 48000 | {
 
 @pytest.mark.parametrize("block", [64, 4_096])
 @pytest.mark.parametrize(("played", "frames", "begun"), rows(STROKES))
-def test_strokes_begin_at_their_frames(
-    read: Read, preset: Preset, played: str, frames: str, begun: str, block: int
-) -> None:
-    """Each note ends once, and what was not begun is refused."""
+def test_strokes_begin_at_their_frames(read: Read, played: str, frames: str, begun: str, block: int) -> None:
     instrument, events = read(played)
-    stage = Stage(instrument, preset)
+    stage = Stage(instrument)
     stage.run([(round(frame), event) for frame, event in events], int(frames), block)
     assert " ".join(f"{each.key}@{each.frame}" for each in stage.begun) == begun
     refused = [each.key for each in stage.reports if each.kind == of.REFUSED]

@@ -25,9 +25,8 @@ from app.player import events
 from app.player.events import KEYS, Bend, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn
 from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
-from engine.presets import Preset
 from engine.values.string import Losses, Polarisations
-from tests.app.player.stage import RATE_HZ, Sound, Stage, changed
+from tests.app.player.stage import PRESET, RATE_HZ, Sound, Stage, changed
 from tests.engine.resonators.test_recorded import recorded
 
 GAINS = {"model": 1.0, "truth": -0.5}
@@ -47,16 +46,8 @@ def off(name: str, sound: Sound) -> float:
     return float(np.abs(np.array([norm / known[0] - 1, *(directions @ flat / norm - known[1:])])).max())
 
 
-def compared(
-    name: str,
-    instrument: Instrument,
-    preset: Preset,
-    played: Played,
-    quanta: int,
-    most: int = 40,
-    gains: Gains = GAINS,
-) -> float:
-    return off(name, Stage(instrument, preset, gains=gains, most=most).run(played, quanta * QUANTUM))
+def compared(name: str, instrument: Instrument, played: Played, quanta: int = 400, **stage: Any) -> float:
+    return off(name, Stage(instrument, **{"gains": GAINS, **stage}).run(played, quanta * QUANTUM))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +69,7 @@ KNOBS = ("knobs.tension", "knobs.gauge", "knobs.decay", "knobs.stiffness", "damp
 
 
 def drawn(
-    instrument: Instrument, other: Instrument, seed: int, seconds: float, controllers: Sequence[int] = CONTROLLERS
+    instrument: Instrument, other: Instrument, seed: int, controllers: Sequence[int] = CONTROLLERS
 ) -> list[tuple[int, Event]]:
     """Random events, in their order; keys are often struck again, and two events often share a frame."""
     knobs = ("noise.onset_db",) if isinstance(instrument.strings, Drums) else KNOBS
@@ -88,7 +79,7 @@ def drawn(
     channels = {"poly": (0, 0, 1, KEYS), "guitar": (0, 1, 2, 3, 4, 9, KEYS), "mpe": (0, 1, 2, 3, KEYS)}[
         instrument.mode
     ]
-    frames = np.sort(draw.integers(1, round(seconds * RATE_HZ), 60))
+    frames = np.sort(draw.integers(1, round(0.4 * RATE_HZ), 60))
     frames[::7] = frames[::7] // QUANTUM * QUANTUM
     frames = np.sort(frames)
     present, found = instrument, list[tuple[int, Event]]()
@@ -159,43 +150,38 @@ WITH_TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
 
 @pytest.mark.parametrize("number", range(len(INSTRUMENTS)), ids=[name for name, _ in INSTRUMENTS])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_random_events_sound_as_they_did(
-    shipped: dict[str, Instrument], preset: Preset, number: int, seed: int
-) -> None:
+def test_random_events_sound_as_they_did(shipped: dict[str, Instrument], number: int, seed: int) -> None:
     name, parts = INSTRUMENTS[number]
     instrument = changed(shipped[name], **parts)
-    assert (
-        compared(f"{number} {name} {seed}", instrument, preset, drawn(instrument, shipped["kora"], seed, 0.4), 400)
-        < CLOSE
-    )
+    assert compared(f"{number} {name} {seed}", instrument, drawn(instrument, shipped["kora"], seed)) < CLOSE
 
 
 @pytest.mark.parametrize(("name", "parts"), WITH_TECHNIQUES, ids=[name for name, _ in WITH_TECHNIQUES])
 @pytest.mark.parametrize(("seed", "gains"), [(1, GAINS), (2, {"model": 1.0}), (3, {"truth": 1.0})])
 def test_techniques_sound_as_they_did(
-    shipped: dict[str, Instrument], preset: Preset, name: str, parts: dict[str, Any], seed: int, gains: Gains
+    shipped: dict[str, Instrument], name: str, parts: dict[str, Any], seed: int, gains: Gains
 ) -> None:
-    """One source alone has noise."""
     instrument = changed(shipped[name], **parts)
     other = instrument if isinstance(instrument.strings, Drums) else shipped["kora"]
-    played = drawn(instrument, other, seed, 0.4, (*CONTROLLERS, *HANDS))
-    assert compared(f"techniques of {name} {seed}", instrument, preset, played, 400, gains=gains) < CLOSE
+    played = drawn(instrument, other, seed, (*CONTROLLERS, *HANDS))
+    assert compared(f"techniques of {name} {seed}", instrument, played, gains=gains) < CLOSE
 
 
 @pytest.mark.parametrize(("name", "kind"), [("classical_guitar", "displacement"), ("fretless_bass", "velocity")])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_string_learned_from_a_recording_has_its_own_modes(
-    shipped: dict[str, Instrument], preset: Preset, name: str, kind: str, seed: int
+    shipped: dict[str, Instrument], name: str, kind: str, seed: int
 ) -> None:
     own = replace(recorded(), smooth_hz=(200.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8), pitch_hz=196.0)
-    learned = replace(preset, info=replace(preset.info, recorded=own))
+    learned = replace(PRESET, info=replace(PRESET.info, recorded=own))
     pickup = Pickup(points=shipped[name].pickup.points, kind=kind)
     instrument, other = (changed(shipped[each], pickup=pickup) for each in (name, "kora"))
-    assert compared(f"recorded {name} {seed}", instrument, learned, drawn(instrument, other, seed, 0.4), 400) < CLOSE
+    played = drawn(instrument, other, seed)
+    assert compared(f"recorded {name} {seed}", instrument, played, preset=learned) < CLOSE
 
 
-def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument], preset: Preset) -> None:
-    stage = Stage(shipped["cimbalom"], preset, gains=GAINS)
+def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument]) -> None:
+    stage = Stage(shipped["cimbalom"], gains=GAINS)
     for frame, key, velocity in ((0, 50, 90), (200, 57, 90), (5000, 50, 120), (5003, 57, 120), (6000, 62, 120)):
         stage.player.handle(NoteOn(key, velocity), frame)
     first = stage.run((), 20 * QUANTUM)
@@ -203,9 +189,7 @@ def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument], preset: Pr
     assert off("cancel", np.concatenate([first, stage.run((), 150 * QUANTUM)])) < CLOSE
 
 
-def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(
-    shipped: dict[str, Instrument], preset: Preset
-) -> None:
+def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[str, Instrument]) -> None:
     instrument = changed(shipped["damped_harp"], mod_wheel="knobs.tension")
     draw, burst = np.random.default_rng(3), list[tuple[int, Event]]()
     for number in range(500):
@@ -218,16 +202,16 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(
             burst.append((frame, Bend(float(draw.uniform(-1, 1)))))
         else:
             burst.append((frame, ControlChange(int(draw.choice([midi.MOD_WHEEL, midi.SUSTAIN])), number % 128)))
-    assert compared("burst", instrument, preset, released_once(burst), 100) < CLOSE
+    assert compared("burst", instrument, released_once(burst), 100) < CLOSE
 
 
-def test_the_oldest_make_room(shipped: dict[str, Instrument], preset: Preset) -> None:
+def test_the_oldest_make_room(shipped: dict[str, Instrument]) -> None:
     played = [(1 + 480 * number, NoteOn(30 + 3 * number, 90)) for number in range(12)]
-    assert compared("oldest", shipped["concert_harp"], preset, played, 200, most=5) < CLOSE
+    assert compared("oldest", shipped["concert_harp"], played, 200, most=5) < CLOSE
 
 
-def test_the_same_events_give_the_same_samples(shipped: dict[str, Instrument], preset: Preset) -> None:
+def test_the_same_events_give_the_same_samples(shipped: dict[str, Instrument]) -> None:
     instrument = changed(shipped["oud"], pluck={"variation": 1.0})
-    played = drawn(instrument, shipped["kora"], 5, 0.2)
-    one, other = (Stage(instrument, preset, gains=GAINS).run(played, 100 * QUANTUM) for _ in range(2))
+    played = drawn(instrument, shipped["kora"], 5)
+    one, other = (Stage(instrument, gains=GAINS).run(played, 100 * QUANTUM) for _ in range(2))
     np.testing.assert_array_equal(one, other)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,72 +10,35 @@ import pytest
 import scipy.signal
 from scipy.ndimage import uniform_filter1d
 
-from app.instruments.instrument import BodyChoice, Course, Fretted, Instrument, Noise, Pickup
-from app.instruments.library import SHIPPED, read_instrument
+from app.instruments.instrument import Course, Instrument, Pickup
 from app.player.events import ControlChange, NoteOff, NoteOn
 from engine.excitation import blow_factor
 from engine.kernels import constants as of
 from engine.kernels.constants import QUANTUM
-from engine.kernels.midi import LEGATO, MOD_WHEEL, PORTAMENTO, SLIDE_TIME, SOFT
-from engine.kernels.playing.channels import SLIDE_S
-from engine.kernels.playing.notes import PLUCK_STOPS_S, TOUCH_PERIODS
+from engine.kernels.midi import MOD_WHEEL, SOFT
+from engine.kernels.playing.notes import PLUCK_STOPS_S
 from engine.kernels.pulses import spectrum
 from engine.kernels.strings import MUTED_M, MUTED_SIGMA
 from engine.levels import FULL_SCALE_M
-from engine.presets import Preset
 from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
-from engine.values.effects import Room
-from engine.values.string import StringParameters
 from engine.voices.ear import weights_of
 from tests.app.player.conftest import STEEL
 from tests.app.player.seen import seen
-from tests.app.player.stage import (
-    KEY,
-    RATE_HZ,
-    Sound,
-    Stage,
-    Timed,
-    cents,
-    changed,
-    hz_of,
-    level_db,
-    partial,
-    pitch_hz,
-    play,
-    string_of,
-)
+from tests.app.player.stage import KEY, PRESET, RATE_HZ, Sound, Stage, changed, hz_of, partial, play, string_of
 
 SOURCES = pytest.mark.parametrize("source", ["model", "truth"])
 HAMMER = {"shape": "raised_cosine", "width": 0.1, "width_hard": 0.1, "strikes": True, "stops": False}
 LENGTH_M = STEEL.length_m * STEEL.pitch_hz / hz_of(KEY)  # of the key's string, about
 
 
-# Strokes
-
-
-@SOURCES
-@pytest.mark.parametrize(("shape", "wide", "narrow"), [("raised_cosine", 0.3, 0.08), ("gaussian", 0.08, 0.04)])
-def test_a_harder_key_is_narrower_and_brighter_however_far_it_pulls(
-    instrument: Instrument, preset: Preset, shape: str, wide: float, narrow: float, source: str
-) -> None:
-    widths = {"width": wide, "width_hard": narrow, "softest_mm": 0.1, "hardest_mm": 0.1}
-    stage, centres_hz = Stage(changed(instrument, pluck={"shape": shape, **widths}), preset, (source,)), []
-    for velocity in (1, 64, 127):
-        stage.play(NoteOn(45, velocity))
-        power = np.abs(np.fft.rfft(stage.left(9_600))) ** 2
-        centres_hz.append(np.average(np.arange(len(power)), weights=power))
-    assert [each.width for each in stage.begun] == pytest.approx([wide, (wide * narrow) ** 0.5, narrow])
-    assert centres_hz[0] < centres_hz[1] < centres_hz[2] and centres_hz[2] > 1.3 * centres_hz[0]
-
-
-def test_a_hammer_starts_the_string_from_rest_with_speeds(instrument: Instrument, preset: Preset) -> None:
+def test_a_hammer_starts_the_string_from_rest_with_speeds(instrument: Instrument) -> None:
     """Against modes in closed form, of a blow so soft that the string is linear."""
     blow = {**HAMMER, "softest_mm": 1e-3, "hardest_mm": 1e-3, "release_ms": 2.0, "release_hard_ms": 2.0}
     heard = changed(instrument, pluck=blow, pickup=Pickup(points=(0.37,)))
-    found, stage = string_of(heard, 57), Stage(heard, preset)
+    found, stage = string_of(heard, 57), Stage(heard)
     stage.play(NoteOn(57, 64))
-    modes = resonator_of(found.parameters, found.modes, grid_points=preset.info.grid_points)
+    modes = resonator_of(found.parameters, found.modes, grid_points=PRESET.info.grid_points)
     shape = heard.pluck.pluck(64).displacement(modes.points)
     amplitudes = modes.to_modes(shape) * found.shortened * blow_factor(modes.omega, shape / 1e-6)
     amplitudes *= spectrum(modes.omega * 1e-3 / np.pi) * (modes.shapes @ weights_of(Ear((0.37,)), modes.points))[:, 0]
@@ -84,24 +46,8 @@ def test_a_hammer_starts_the_string_from_rest_with_speeds(instrument: Instrument
     motion = np.exp(np.outer(t, 1j * np.sqrt(modes.omega**2 - modes.sigma**2) - modes.sigma)).imag
     expected = stage.begun[0].gain / FULL_SCALE_M * motion @ amplitudes
     for source in ("model", "truth"):
-        sound = play(heard, preset, 0.2, (0.0, NoteOn(57, 64)), source=source)
+        sound = play(heard, 0.2, (0.0, NoteOn(57, 64)), source=source)
         np.testing.assert_allclose(sound[200:], expected[200:], atol=1e-3 * np.abs(expected).max())
-
-
-# Struck again
-
-
-@SOURCES
-@pytest.mark.parametrize(("name", "key"), [("test", 45), ("classical_guitar", 40)])
-def test_a_tremolo_keeps_its_level(instrument: Instrument, preset: Preset, name: str, key: int, source: str) -> None:
-    """16 plucks a second of a string that rings on: within ±1 dB; added to the motion they climb and wobble."""
-    own, spreads = instrument if name == "test" else read_instrument(SHIPPED / f"{name}.json"), []
-    for stops in (True, False):
-        plucked = changed(own, body=BodyChoice(), room=Room(), pluck={"stops": stops})
-        sound = play(plucked, preset, 1.0, *((n / 16, NoteOn(key, 90)) for n in range(16)), source=source)
-        levels = [level_db(sound, n / 16, (n + 1) / 16) for n in range(16)]
-        spreads.append(max(levels) - min(levels))
-    assert spreads[0] < 2 and spreads[1] > 3
 
 
 INAUDIBLE_DB = -95.0
@@ -121,12 +67,11 @@ def bursts_db(sound: Sound, begin_s: float) -> Sound:
 @pytest.mark.parametrize("kind", ["displacement", "velocity"])
 @pytest.mark.parametrize("second", [127, 30])
 def test_a_string_that_is_stopped_by_the_next_pluck_makes_no_click(
-    instrument: Instrument, preset: Preset, kind: str, second: int, source: str
+    instrument: Instrument, kind: str, second: int, source: str
 ) -> None:
-    """What is left of the first pluck has no burst above the attack of the second, or above its own ringing."""
     heard = changed(instrument, pickup=Pickup(points=(0.3,), kind=kind))
     one, other = (0.0, NoteOn(45, 127)), (0.4, NoteOn(45, second))
-    alone, fresh, both = (play(heard, preset, 0.5, *each, source=source) for each in ((one,), (other,), (one, other)))
+    alone, fresh, both = (play(heard, 0.5, *each, source=source) for each in ((one,), (other,), (one, other)))
     stopped = both - fresh
     np.testing.assert_array_equal(stopped[:19_200], alone[:19_200])
     end = round((0.4 + PLUCK_STOPS_S) * RATE_HZ) + QUANTUM
@@ -136,46 +81,9 @@ def test_a_string_that_is_stopped_by_the_next_pluck_makes_no_click(
 
 
 @SOURCES
-def test_notes_of_a_file_begin_at_their_frames(instrument: Instrument, preset: Preset, source: str) -> None:
-    """Wherever in a quantum; also of a string that is struck again."""
-    frames, keys = (0, 4_801, 9_640), (57, 57, 45)
-    alone, third = (play(instrument, preset, 0.3, (0.0, NoteOn(key, 90)), source=source) for key in (57, 45))
-    struck = [(frame / RATE_HZ, NoteOn(key, 90)) for frame, key in zip(frames, keys, strict=True)]
-    sound = play(instrument, preset, 0.3, *struck, source=source)
-    settled = round(PLUCK_STOPS_S * RATE_HZ) + QUANTUM  # the one before has faded
-    np.testing.assert_array_equal(sound[: 4_801 - QUANTUM], alone[: 4_801 - QUANTUM])
-    np.testing.assert_allclose(sound[4_801 + settled : 9_640], alone[settled : 9_640 - 4_801], atol=1e-6)
-    expected = alone[9_640 - 4_801 : len(alone) - 4_801] + third[: len(alone) - 9_640]
-    np.testing.assert_allclose(sound[9_640:], expected, atol=1e-6)
-
-
-# Fingers on the string
-
-
-@SOURCES
-@pytest.mark.parametrize("node", [2, 3, 4, 5])
-def test_a_touch_leaves_the_partials_that_have_a_node_there(
-    instrument: Instrument, preset: Preset, node: int, source: str
-) -> None:
-    plucked = changed(instrument, strings=Fretted(string=StringParameters()), pickup=Pickup(kind="bridge"))
-    touched = changed(plucked, technique={"harmonic": node})
-    sound, plain = (play(each, preset, 1.2, (0.0, NoteOn(KEY, 60)), source=source) for each in (touched, plucked))
-    at_s, hz = TOUCH_PERIODS / hz_of(KEY) + 0.3, hz_of(KEY)  # after the finger has left
-    kept = partial(sound, at_s, node * hz)
-    assert kept > 0.3 * partial(plain, at_s, node * hz)
-    for number in range(1, 2 * node + 2):
-        assert number % node == 0 or partial(sound, at_s, number * hz) < 10 ** (-30 / 20) * kept, number
-    assert partial(sound, at_s, hz) < 10 ** (-30 / 20) * partial(plain, at_s, hz)
-    open_hz, node_hz = (pitch_hz(each, n * hz, at_s, at_s + 0.5) for each, n in ((plain, 1), (sound, node)))
-    assert abs(cents(node_hz, node * open_hz)) < 3
-
-
-@SOURCES
-def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(
-    instrument: Instrument, preset: Preset, source: str
-) -> None:
+def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(instrument: Instrument, source: str) -> None:
     soft, pressed = (0.0, NoteOn(KEY, 10)), (0.0, ControlChange(SOFT, 64))
-    plain, muted = (play(instrument, preset, 0.6, *each, source=source) for each in ((soft,), (pressed, soft)))
+    plain, muted = (play(instrument, 0.6, *each, source=source) for each in ((soft,), (pressed, soft)))
     for number in (1, 2, 4):
         turn = 2 * math.pi * number * MUTED_M / LENGTH_M
         sigma = 64 / 127 * MUTED_SIGMA * (1 - math.sin(turn) / turn)
@@ -188,11 +96,9 @@ def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(
 
 @SOURCES
 @pytest.mark.parametrize("bend_by", ["tension", "length"])
-def test_vibrato_is_as_wide_and_as_quick_as_it_says(
-    instrument: Instrument, preset: Preset, bend_by: str, source: str
-) -> None:
+def test_vibrato_is_as_wide_and_as_quick_as_it_says(instrument: Instrument, bend_by: str, source: str) -> None:
     wheeled = changed(instrument, mod_wheel="technique.vibrato_cents", bend_by=bend_by)
-    sound = play(wheeled, preset, 2.0, (0.0, ControlChange(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 20)), source=source)
+    sound = play(wheeled, 2.0, (0.0, ControlChange(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 20)), source=source)
     near = scipy.signal.butter(2, [0.7 * hz_of(KEY), 1.4 * hz_of(KEY)], "bandpass", fs=RATE_HZ, output="sos")
     phase = np.unwrap(np.angle(scipy.signal.hilbert(scipy.signal.sosfiltfilt(near, sound))))
     slow = scipy.signal.butter(2, 30, fs=RATE_HZ, output="sos")
@@ -202,59 +108,19 @@ def test_vibrato_is_as_wide_and_as_quick_as_it_says(
     assert np.count_nonzero(np.diff(np.sign(found - found.mean())) > 0) == pytest.approx(5.5, abs=1)
 
 
-def test_a_slide_squeaks_at_the_windings_that_pass(instrument: Instrument, preset: Preset) -> None:
-    """Noise is what the instrument with noise has more; plain strings have 12 dB less, slow slides a lower band."""
-    found = []
-    for heavier, time in ((1.0, 80), (5.0, 80), (5.0, 100)):
-        slid: list[Timed] = [
-            (0.0, ControlChange(*each)) for each in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, time))
-        ]
-        slid += [(0.0, NoteOn(KEY, 60)), (0.3, NoteOn(KEY + 7, 60))]
-        wound = replace(STEEL, density_kg_m3=heavier * STEEL.density_kg_m3, tension_n=heavier * STEEL.tension_n)
-        plain = changed(instrument, strings=Fretted(string=wound))
-        noisy = changed(plain, noise=Noise(kind="finger", release_db=-12))
-        noise = play(noisy, preset, 1.5, *slid) - play(plain, preset, 1.5, *slid)
-        assert not noise[: round(0.3 * RATE_HZ)].any()
-        power = np.cumsum(np.abs(np.fft.rfft(noise)) ** 2)
-        found.append((10 * math.log10(power[-1]), np.searchsorted(power, power[-1] / 2)))
-    (quiet_db, _), (loud_db, quick), (_, slow) = found
-    assert loud_db - quiet_db == pytest.approx(12, abs=2)
-    assert quick / slow == pytest.approx((SLIDE_S[1] / SLIDE_S[0]) ** (20 / 127), rel=0.3)
-
-
-# Courses
-
-
-@SOURCES
-def test_strings_of_a_course_beat_by_their_cents(instrument: Instrument, preset: Preset, source: str) -> None:
-    course = changed(instrument, course=Course(strings=2, cents=20))
-    stage = Stage(course, preset)
-    stage.play(NoteOn(KEY, 40))
-    first, second = (note.now.pitch_hz for note in seen(stage.player))
-    assert 10 <= cents(second, first) <= 30
-    sound, one = (play(each, preset, 2.0, (0.0, NoteOn(KEY, 10)), source=source) for each in (course, instrument))
-    begin, dip = (
-        partial(sound, t, hz_of(KEY), 4_800) / partial(one, t, hz_of(KEY), 4_800)
-        for t in (0.0, 0.5 / (second - first) - 0.05)
-    )
-    assert dip < 0.3 < 0.85 < begin
-
-
-def test_strings_of_a_course_sound_one_after_the_other_and_are_one_note(
-    instrument: Instrument, preset: Preset
-) -> None:
+def test_strings_of_a_course_sound_one_after_the_other_and_are_one_note(instrument: Instrument) -> None:
     apart = changed(instrument, course=Course(strings=2, apart_ms=25))
-    sound, one = (play(each, preset, 0.3, (0.0, NoteOn(KEY, 90))) for each in (apart, instrument))
+    sound, one = (play(each, 0.3, (0.0, NoteOn(KEY, 90))) for each in (apart, instrument))
     late = round(0.025 * RATE_HZ)
     np.testing.assert_allclose(sound[: late - 1], one[: late - 1] / 2, atol=1e-6)
     np.testing.assert_allclose(sound[late:], (one[late:] + one[:-late]) / 2, atol=2e-3 * np.abs(one).max())
-    stage = Stage(apart, preset)
+    stage = Stage(apart)
     stage.run([(0, NoteOn(KEY, 90)), (9_600, NoteOff(KEY))], 4 * RATE_HZ, 4_096)
     assert [each.kind for each in stage.reports] == [of.BEGAN, of.ENDED] and seen(stage.player) == []
 
 
-def test_low_courses_of_a_set_have_octave_strings(guitar: Instrument, preset: Preset) -> None:
-    stage = Stage(changed(guitar, course=Course(strings=2, octaves=4)), preset)
+def test_low_courses_of_a_set_have_octave_strings(guitar: Instrument) -> None:
+    stage = Stage(changed(guitar, course=Course(strings=2, octaves=4)))
     stage.play(NoteOn(41, 60), NoteOn(66, 60))
     notes = seen(stage.player)
     low, high = ([n.now.undamped_frequency(1) for n in notes if n.key == key] for key in (41, 66))
@@ -263,30 +129,23 @@ def test_low_courses_of_a_set_have_octave_strings(guitar: Instrument, preset: Pr
     assert min(notes, key=lambda note: note.own.area_m2).key == 41
 
 
-# Magnetic pick-ups
-
-
-def picked_up(
-    instrument: Instrument, preset: Preset, point: float, velocity: int, source: str, **pickup: Any
-) -> Sound:
+def picked_up(instrument: Instrument, point: float, velocity: int, source: str, **pickup: Any) -> Sound:
     heard = changed(instrument, pickup=Pickup(points=(point,), kind="velocity", **pickup))
-    return play(heard, preset, 0.8, (0.0, NoteOn(KEY, velocity)), source=source)
+    return play(heard, 0.8, (0.0, NoteOn(KEY, velocity)), source=source)
 
 
 @SOURCES
-def test_an_aperture_averages_over_its_length(instrument: Instrument, preset: Preset, source: str) -> None:
-    narrow, wide = (picked_up(instrument, preset, 0.13, 20, source, aperture_mm=each) for each in (0.0, 60.0))
+def test_an_aperture_averages_over_its_length(instrument: Instrument, source: str) -> None:
+    narrow, wide = (picked_up(instrument, 0.13, 20, source, aperture_mm=each) for each in (0.0, 60.0))
     ratios = [partial(wide, 0.05, n * hz_of(KEY)) / partial(narrow, 0.05, n * hz_of(KEY)) for n in (1, 2, 3, 4)]
     expected = np.sinc(np.arange(1, 5) * 0.03 / string_of(instrument, KEY).parameters.length_m)
     np.testing.assert_allclose(np.array(ratios) / ratios[0], expected / expected[0], rtol=1e-4)
 
 
 @SOURCES
-def test_flux_that_grows_faster_near_the_pick_up_adds_harmonics(
-    instrument: Instrument, preset: Preset, source: str
-) -> None:
+def test_flux_that_grows_faster_near_the_pick_up_adds_harmonics(instrument: Instrument, source: str) -> None:
     """A node of the second partial hears it by the curve alone: half of x/δ, as of exp(x/δ) differentiated."""
-    linear, curved = (picked_up(instrument, preset, 0.5, 60, source, flux_mm=each) for each in (0.0, 8.0))
+    linear, curved = (picked_up(instrument, 0.5, 60, source, flux_mm=each) for each in (0.0, 8.0))
     assert partial(curved, 0.2, 2 * hz_of(KEY)) > 20 * partial(linear, 0.2, 2 * hz_of(KEY))
-    soft, softly = (picked_up(instrument, preset, 0.5, 1, source, flux_mm=each) for each in (0.0, 100.0))
+    soft, softly = (picked_up(instrument, 0.5, 1, source, flux_mm=each) for each in (0.0, 100.0))
     assert np.abs(soft - softly).max() < 0.01 * np.abs(soft).max()

@@ -260,7 +260,6 @@ ANOTHER = WIDE.model_copy(update={"name": "another", "bend_semitones": 5.0})
 
 
 def test_a_recording_has_the_range_of_bends_of_each_channel_and_lets_go_of_them(file: Path) -> None:
-    """A range that messages set stays until another instrument; with MPE it is the master's, and a member's."""
     first, two = TimedEvent(0.0, NoteOn(50, 90, 0)), TimedEvent(0.1, NoteOn(52, 90, 3))
     own_range = [TimedEvent(0.1, event) for event in bend_range(24, 1)]
     turned = [TimedEvent(0.2, InstrumentTurned(WIDE)), TimedEvent(0.3, InstrumentTurned(ANOTHER))]
@@ -323,7 +322,6 @@ def test_a_song_is_its_notes_and_what_is_left_out(
     kept: list[tuple[int, int]],
     left_out: str,
 ) -> None:
-    """Each note has a pedal of its channel beside it, which goes where it goes."""
     timed: list[TimedEvent] = []
     for place, (key, channel) in enumerate(notes):
         timed += [TimedEvent(0.5 * place, each) for each in (NoteOn(key, 90, channel), ControlChange(64, 9, channel))]
@@ -358,7 +356,6 @@ def on(key: int, channel: int = 0, ticks: int = 0) -> bytes:
 
 
 def test_programs_choose_the_factory_instrument_of_each_channel(file: Path) -> None:
-    """A note goes to the instrument of its time; all else of a channel goes to each of its instruments."""
     assert {len(files) for files in FAMILIES.values()} == {8} and len(FAMILIES) == 16
     assert {name for files in FAMILIES.values() for name in files} <= {"", *(path.stem for path in SHIPPED.iterdir())}
     first = (program(25), program(33, 1), on(60), on(48, 1), on(64, 3), on(38, 9), on(80, 9), b"\0\xb0\x5b\x40")

@@ -19,14 +19,7 @@ from app.instruments.tuning import TuningChoice
 from app.player import events
 from app.player.compiled import InstrumentPlayer
 from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, PluckAt, TimedEvent
-from app.player.offline import (
-    BLOCK_FRAMES,
-    SILENT_DB,
-    OfflinePlayer,
-    channels_played,
-    render_events,
-    render_note,
-)
+from app.player.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, channels_played, render_events, render_note
 from app.player.strings import StringKeys, on_string
 from app.shared.parameters import OF_INSTRUMENTS
 from engine import bounds
@@ -34,14 +27,14 @@ from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
-from engine.presets import Preset, load_preset
+from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
 from engine.values.effects import Room
 from engine.values.string import Polarisations
 from engine.voices import Mixer, Voice, plain_program
 from tests.app.player.conftest import STEEL
 from tests.app.player.seen import seen, sounding
-from tests.app.player.stage import KEY, RATE_HZ, SOURCES, Stage, changed, level_db, play, relative, string_of
+from tests.app.player.stage import KEY, PRESET, RATE_HZ, SOURCES, Stage, changed, level_db, relative, string_of
 
 
 def shipped(name: str, **parts: Any) -> Instrument:
@@ -50,16 +43,12 @@ def shipped(name: str, **parts: Any) -> Instrument:
 
 
 @pytest.fixture
-def stage(preset: Preset) -> Stage:
-    return Stage(shipped("concert_harp"), preset)
+def stage() -> Stage:
+    return Stage(shipped("concert_harp"))
 
 
-# More than fits
-
-
-def test_more_notes_than_there_are_places_all_begin(preset: Preset) -> None:
-    """The oldest are cut before they are heard."""
-    stage = Stage(shipped("concert_harp", mode="mpe"), preset)
+def test_more_notes_than_there_are_places_all_begin() -> None:
+    stage = Stage(shipped("concert_harp", mode="mpe"))
     given = [stage.player.handle(NoteOn(30 + 20 * (number % 3), 80, number % 16)) for number in range(300)]
     assert np.isfinite(stage.run((), 40 * QUANTUM)).all()
     begun = [each.id for each in stage.begun]
@@ -67,7 +56,6 @@ def test_more_notes_than_there_are_places_all_begin(preset: Preset) -> None:
 
 
 def test_threads_may_give_more_events_than_the_ring_holds_while_the_mixer_plays(stage: Stage) -> None:
-    """Also of frames to come."""
     count, compiled = of.EVENTS, stage.player.compiled
 
     def give(channel: int) -> None:
@@ -96,9 +84,6 @@ def test_tables_are_freed_when_the_kernel_has_left_them(stage: Stage) -> None:
     assert sum(table() is not None for table in tables) <= 2
 
 
-# Notes that wait, ring, and are ended
-
-
 def test_a_single_note_can_be_released_and_its_events_cancelled(stage: Stage) -> None:
     player = stage.player
     one, other = (player.handle(NoteOn(key, 90)) for key in (50, 57))
@@ -114,9 +99,9 @@ def test_a_single_note_can_be_released_and_its_events_cancelled(stage: Stage) ->
     assert {each.key for each in player.compiled.ringing()} == {57, 60} and later in [each.id for each in stage.begun]
 
 
-def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage: Stage, preset: Preset) -> None:
+def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage: Stage) -> None:
     stage.run([(1, NoteOn(50, 90))], 20 * QUANTUM)
-    others = [InstrumentPlayer(shipped("koto"), preset, RATE_HZ, {"model": 1.0}) for _ in range(2)]
+    others = [InstrumentPlayer(shipped("koto"), PRESET, RATE_HZ, {"model": 1.0}) for _ in range(2)]
     stage.mixer.set_player(others[0].compiled)
     assert np.abs(stage.run((), 100 * QUANTUM)[-1000:]).max() > 1e-3
     stage.player.stop(0.01)
@@ -129,13 +114,13 @@ def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage: Stage, pre
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_players_one_after_the_other_add_up(instrument: Instrument, preset: Preset, source: str) -> None:
+def test_players_one_after_the_other_add_up(instrument: Instrument, source: str) -> None:
     """Of courses, whose strokes have the same numbers in both."""
     moving = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.02, second_conductance_s_kg=0.004)
     course = changed(instrument, polarisations=moving, course={"strings": 2, "bridge": 1.0, "cents": 2})
 
     def rendered(*begins: bool) -> np.ndarray:
-        stage, found = Stage(course, preset, (source,), varied=False), []
+        stage, found = Stage(course, (source,), varied=False), []
         for plays in begins:
             stage.player = stage.player.again(RATE_HZ)
             stage.mixer.set_player(stage.player.compiled)
@@ -149,13 +134,13 @@ def test_players_one_after_the_other_add_up(instrument: Instrument, preset: Pres
 
 
 @pytest.mark.parametrize("name", ["brass_strung_harp", "electric_guitar_bridge_pick_up", "tanpura_drone"])
-def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(preset: Preset, name: str) -> None:
+def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(name: str) -> None:
     """A string of the Lab neither sounds through an instrument that rings nor moves its other strings."""
     instrument = read_instrument(INSTRUMENTS / f"{name}.json")
     strangers = np.random.default_rng(0).uniform(-0.5, 0.5, (RATE_HZ // 4, 2)).astype(np.float32)
 
     def mixed(plays: bool, adds: bool) -> np.ndarray:
-        stage = OfflinePlayer(instrument, preset, RATE_HZ, {"model": 1.0}, limited=False, varied=False, dry=False)
+        stage = OfflinePlayer(instrument, PRESET, RATE_HZ, {"model": 1.0}, limited=False, varied=False, dry=False)
         if plays:
             stage.handle(NoteOn(sum(instrument.range) // 2, 100), 0)
         if adds:
@@ -170,11 +155,11 @@ def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(preset: Preset, na
 
 
 @pytest.mark.parametrize("name", ["koto", "timpani"])
-def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(name: str, preset: Preset) -> None:
+def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(name: str) -> None:
     instrument, sounds = read_instrument(INSTRUMENTS / f"{name}.json"), {}
     event = NoteOn(sum(instrument.range) // 2, 100)
     for compared in (False, True):
-        stage = Stage(instrument, preset, SOURCES)
+        stage = Stage(instrument, SOURCES)
         stage.player.set_gains({"model": 1.0, "truth": 0.0}, compared)
         stage.player.handle(event)
         sounds[compared] = stage.left(4_800)
@@ -187,12 +172,9 @@ def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(nam
     np.testing.assert_array_equal(sounds[False], sounds[True])
 
 
-# Strokes, and what is reported of them
-
-
-def test_reports_say_what_was_plucked(preset: Preset) -> None:
+def test_reports_say_what_was_plucked() -> None:
     instrument = shipped("fretless_bass", mod_wheel="none", pluck={"variation": 0.0})
-    stage = Stage(instrument, preset)
+    stage = Stage(instrument)
     struck = {500 * n + 7: NoteOn(key, 1 + 25 * n, n % 4) for n, key in enumerate((28, 33, 41, 47, 52, 60))}
     stage.run(list(struck.items()), 4_800)
     assert isinstance(stage.player.keys, StringKeys) and len(stage.begun) == 6
@@ -204,14 +186,16 @@ def test_reports_say_what_was_plucked(preset: Preset) -> None:
         assert report.parameters.row == pytest.approx(found.parameters.row)
         assert report.modes == found.modes + (min(of.MOST_PAIRS, found.modes) if instrument.polarisations else 0)
         pluck = on_string(found, instrument.pluck.pluck(event.velocity))
-        assert (report.position, report.amplitude_mm) == pytest.approx((pluck.position, pluck.amplitude_mm))
+        assert (report.position, report.amplitude_mm, report.width) == pytest.approx(
+            (pluck.position, pluck.amplitude_mm, pluck.width)
+        )
 
 
-def test_strokes_vary_where_the_instrument_says_so(preset: Preset) -> None:
+def test_strokes_vary_where_the_instrument_says_so() -> None:
     instrument = shipped("koto", pluck={"variation": 1.0, "release_ms": 2.0, "release_hard_ms": 1.0})
     found = []
     for varied in (True, False):
-        stage = Stage(instrument, preset, varied=varied)
+        stage = Stage(instrument, varied=varied)
         stage.run([(64 * number, NoteOn(60, 90)) for number in range(5)], 512)
         found.append(np.array([(each.position, each.amplitude_mm, each.width) for each in stage.begun]))
     apart = np.abs(found[0] / found[1] - 1)
@@ -219,28 +203,22 @@ def test_strokes_vary_where_the_instrument_says_so(preset: Preset) -> None:
     assert [len(np.unique(each, axis=0)) for each in found] == [5, 1]
 
 
-# Plucks by hand
-
-
 @pytest.mark.parametrize(("name", "key"), [("classical_guitar", 52), ("fretless_bass", 40), ("cimbalom", 60)])
-def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
-    preset: Preset, name: str, key: int
-) -> None:
+def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(name: str, key: int) -> None:
     instrument, heard = shipped(name, pluck={"variation": 0.0}), []
     pluck = on_string(string_of(instrument, key), instrument.pluck.pluck(90))
     for event in (NoteOn(key, 90), NoteOn(key, 1, pluck=pluck)):
-        heard.append(Stage(instrument, preset).run([(0, event)], 6_400))
+        heard.append(Stage(instrument).run([(0, event)], 6_400))
     np.testing.assert_allclose(*heard, rtol=0, atol=1e-9 * np.abs(heard[0]).max())
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_pluck_by_hand_is_exactly_itself(preset: Preset, shape: Shape) -> None:
-    """As in an instrument that plucks so, whose keys have other gains; also where strokes vary."""
+def test_a_pluck_by_hand_is_exactly_itself(shape: Shape) -> None:
     instrument = shipped("classical_guitar", noise=Noise(), pluck={"variation": 0.0})
     pluck, heard = Pluck(0.3, 2.5, shape, 0.2), []
     for variation, own in ((0.0, instrument.pluck.shape), (0.0, shape), (1.0, shape)):
         each = changed(instrument, pluck={"shape": own, "variation": variation})
-        stage = Stage(each, preset)
+        stage = Stage(each)
         sound = stage.run([(0, NoteOn(52, 90, pluck=pluck))], 6_400)
         (begun,) = stage.begun
         assert (begun.position, begun.amplitude_mm, begun.width) == (0.3, 2.5, 0.2)
@@ -251,11 +229,8 @@ def test_a_pluck_by_hand_is_exactly_itself(preset: Preset, shape: Shape) -> None
 @pytest.mark.parametrize(
     ("switch", "moves_to"), [(ControlChange(midi.TREMOLO, 127), 52), (ControlChange(midi.LEGATO, 127), 53)]
 )
-def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(
-    preset: Preset, switch: ControlChange, moves_to: int
-) -> None:
-    """No tremolo plucks it again, and with legato a key moves it."""
-    stage = Stage(shipped("classical_guitar"), preset)
+def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(switch: ControlChange, moves_to: int) -> None:
+    stage = Stage(shipped("classical_guitar"))
     by_hand = NoteOn(52, 90, pluck=Pluck(0.3, 1.0, stage.player.instrument.pluck.shape, 0.03))
     moved = [(6_400, NoteOn(53, 90))] if moves_to == 53 else []
     stage.run([(0, switch), (64, by_hand), *moved], 200 * QUANTUM)
@@ -265,11 +240,7 @@ def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(
     assert [(each.key, each.damped) for each in sounding(stage.player)] == [(moves_to, True)]
 
 
-# Hands
-
-
 def test_another_player_begins_as_the_hands_are(stage: Stage) -> None:
-    """With wheels, pedals, footswitches, ranges and gains; and body and room are turned by the wheel."""
     player, instrument = stage.player, stage.player.instrument  # the wheel turns its room
     assert player.at_hand == [] and player.heard_through == instrument
     player.set_gains({"model": 0.25})
@@ -291,50 +262,41 @@ def test_another_player_begins_as_the_hands_are(stage: Stage) -> None:
     assert player.heard_through == instrument
 
 
-@pytest.mark.parametrize("field", [field for field in WHEEL if field != "damping.mute" and "technique" not in field])
-def test_the_wheel_turns_whatever_it_may(instrument: Instrument, preset: Preset, field: str) -> None:
-    """Something of the next notes, soft and hard, or of what they are heard through, is another."""
+def test_the_wheel_turns_whatever_it_may(instrument: Instrument) -> None:
 
-    def heard(value: int) -> object:
-        wheel = changed(instrument, mod_wheel=field, body=BodyChoice(name="guitar"), room=Room(mix=0.1))
-        stage = Stage(wheel, preset)
+    def heard(field: str, value: int) -> object:
+        stage = Stage(changed(instrument, mod_wheel=field, body=BodyChoice(name="guitar"), room=Room(mix=0.1)))
         stage.play(ControlChange(midi.MOD_WHEEL, value))
         for key, velocity in ((50, 20), (52, 110)):
             stage.play(NoteOn(key, velocity), NoteOff(key))
         plucks = [(each.position, each.amplitude_mm, each.width) for each in stage.begun]
         return plucks, [each.now for each in seen(stage.player)], stage.player.heard_through
 
-    assert heard(0) != heard(127)
+    for field in WHEEL:
+        assert field == "damping.mute" or "technique" in field or heard(field, 0) != heard(field, 127), field
 
 
-def test_the_wheel_brings_the_room(instrument: Instrument, preset: Preset) -> None:
+def test_the_wheel_brings_the_room_whose_echo_has_two_sides(instrument: Instrument) -> None:
     wheel = changed(instrument, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
-
-    def tail(value: int) -> float:
-        played = [(0.0, ControlChange(midi.MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
-        return float(np.abs(play(wheel, preset, 1.6, *played)[round(1.2 * RATE_HZ) :]).max())
-
-    assert tail(0) < 1e-5 and tail(127) > 1e-4
-    turned, still = ([TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
-    assert [channels_played(wheel, each) for each in (turned, still)] == [2, 1], "its echo has two sides"
+    timed = [TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127)), *timed_key(0.2)]
+    for played, channels, loudest in ((timed[1:], 1, (0, 1e-5)), (timed, 2, (1e-4, 1))):
+        assert channels_played(wheel, played) == channels
+        sound = np.concatenate(list(render_events(wheel, PRESET, played, RATE_HZ, seconds=1.4)))
+        assert loudest[0] <= np.abs(sound[RATE_HZ:]).max() < loudest[1] and sound.shape[1] == channels
 
 
-# Knobs
-
-
-@pytest.mark.parametrize("id", [id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE])
-def test_a_parameter_changes_as_by_a_turned_instrument(preset: Preset, id: str) -> None:
-    """What rings, and what is struck later."""
+def test_a_parameter_changes_as_by_a_turned_instrument() -> None:
     slow = {"release_ms": 4.0, "release_hard_ms": 2.0, "variation": 0.0}
     instrument = shipped("koto", noise=Noise(onset_db=-20, release_db=-20), pluck=slow)
-    value = OF_INSTRUMENTS[id].value(0.9 * OF_INSTRUMENTS[id].share(instrument.value(id)) + 0.03)
-    one, other = Stage(instrument, preset), Stage(instrument, preset)
-    for stage in (one, other):
-        stage.run([(1, NoteOn(60, 90))], 640)
-    one.player.handle(InstrumentTurned(instrument.with_value(id, value)), 0)
-    other.player.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
     later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
-    np.testing.assert_array_equal(*(stage.run(later, 100 * QUANTUM) for stage in (one, other)))
+    for id in (id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE):
+        value = OF_INSTRUMENTS[id].value(0.9 * OF_INSTRUMENTS[id].share(instrument.value(id)) + 0.03)
+        one, other = Stage(instrument), Stage(instrument)
+        for stage in (one, other):
+            stage.run([(1, NoteOn(60, 90))], 640)
+        one.player.handle(InstrumentTurned(instrument.with_value(id, value)), 0)
+        other.player.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
+        np.testing.assert_array_equal(*(stage.run(later, 100 * QUANTUM) for stage in (one, other)), err_msg=id)
 
 
 TURNS = {f"knobs.{name}": value for name, value in (("stiffness", 4.0), ("decay", 8.0), ("brightness_decay", 6.0))}
@@ -344,13 +306,13 @@ TURNS |= {"tuning.a4_hz": 466.16}
 
 @pytest.mark.parametrize("field", sorted({*TURNS, *(f"knobs.{name}" for name in Knobs.model_fields)}))
 def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_a_click(
-    instrument: Instrument, preset: Preset, field: str
+    instrument: Instrument, field: str
 ) -> None:
     section, _, name = field.partition(".")
     sounds, at, glide = {}, RATE_HZ // 4, round(0.1 * RATE_HZ)
     for turned in (changed(instrument, **{section: {name: TURNS[field]}}), instrument):
         for source in SOURCES:
-            stage = Stage(instrument, preset, (source,))
+            stage = Stage(instrument, (source,))
             stage.play(NoteOn(57, 100))
             before = stage.left(at)
             stage.take(turned)
@@ -365,9 +327,8 @@ def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_
     assert relative(sounds["model", False][at:], sounds["truth", False][at:]) < 1e-5
 
 
-def test_a_knob_goes_as_far_as_a_string_is_possible(instrument: Instrument, preset: Preset) -> None:
-    """For what rings and for the next key; where it would overdamp what rings, that stays as it is."""
-    stage, densest = Stage(instrument, preset), bounds.STRING["density_kg_m3"][1]
+def test_a_knob_goes_as_far_as_a_string_is_possible(instrument: Instrument) -> None:
+    stage, densest = Stage(instrument), bounds.STRING["density_kg_m3"][1]
     (note,) = stage.play(NoteOn(57, 60))
     before = note.now.now
     stage.take(changed(instrument, strings=Fretted(string=replace(STEEL, damping_d3_kg_m_s=2e-2))))
@@ -384,24 +345,19 @@ def test_a_knob_goes_as_far_as_a_string_is_possible(instrument: Instrument, pres
     assert stage.begun[-1].parameters.density_kg_m3 == densest  # type: ignore[union-attr]
 
 
-# Files of events
-
-
-def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(
-    instrument: Instrument, preset: Preset
-) -> None:
+def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(instrument: Instrument) -> None:
     lively, timed = changed(instrument, room=Room(mix=0.4, t60_s=1.0), sympathy_s_kg=0.01), timed_key(0.2)
     late = [TimedEvent(time_s, ControlChange(11, 90)) for time_s in (30.0, 50.0)]
     sound, followed = (
-        np.concatenate(list(render_events(lively, preset, each, RATE_HZ))) for each in (timed, timed + late)
+        np.concatenate(list(render_events(lively, PRESET, each, RATE_HZ))) for each in (timed, timed + late)
     )
     heard = np.flatnonzero(np.abs(sound).max(axis=1) >= 10 ** (SILENT_DB / 20))[-1]
     assert heard > 0.2 * RATE_HZ and len(followed) == len(sound) <= heard + 2 * BLOCK_FRAMES
 
 
-def test_the_pedal_after_the_last_note_of_a_file_is_followed(instrument: Instrument, preset: Preset) -> None:
+def test_the_pedal_after_the_last_note_of_a_file_is_followed(instrument: Instrument) -> None:
     pedal = [TimedEvent(0.05, ControlChange(midi.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(midi.SUSTAIN, 0))]
-    sound = np.concatenate(list(render_events(instrument, preset, timed_key(0.1) + pedal, RATE_HZ)))
+    sound = np.concatenate(list(render_events(instrument, PRESET, timed_key(0.1) + pedal, RATE_HZ)))
     assert RATE_HZ < len(sound) < 2 * RATE_HZ and level_db(sound[:, 0], 0.8, 0.95) > -60
 
 
@@ -409,7 +365,7 @@ def timed_key(seconds: float) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(60, 100)), TimedEvent(seconds, NoteOff(60))]
 
 
-def test_a_note_can_be_stopped_while_it_is_rendered(instrument: Instrument, preset: Preset) -> None:
+def test_a_note_can_be_stopped_while_it_is_rendered(instrument: Instrument) -> None:
     reached_s: list[float] = []
 
     def advanced(seconds: float) -> None:
@@ -418,11 +374,8 @@ def test_a_note_can_be_stopped_while_it_is_rendered(instrument: Instrument, pres
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        render_note(instrument, preset, 50, 100, 60.0, 60.0, RATE_HZ, "model", advanced)
+        render_note(instrument, PRESET, 50, 100, 60.0, 60.0, RATE_HZ, "model", advanced)
     assert len(reached_s) > 1 and reached_s[-1] < 1.0
-
-
-# What cannot be played
 
 
 HIGH = {"range": (0, 127), "tuning": TuningChoice(a4_hz=880, transpose=48)}
@@ -431,31 +384,26 @@ HIGH = {"range": (0, 127), "tuning": TuningChoice(a4_hz=880, transpose=48)}
 @pytest.mark.parametrize(
     ("ask", "reported"),
     [
+        (lambda instrument: Stage(changed(instrument, **HIGH)).player.handle(NoteOn(127, 90)), "key 127"),
         (
-            lambda instrument, preset: Stage(changed(instrument, **HIGH), preset).player.handle(NoteOn(127, 90)),
-            "key 127",
-        ),
-        (
-            lambda instrument, _: Stage(instrument, load_preset(SHIPPED / "studio_nylon_b3.safetensors")),
+            lambda instrument: Stage(instrument, preset=load_preset(SHIPPED / "studio_nylon_b3.safetensors")),
             "one string only",
         ),
         (
-            lambda instrument, preset: next(render_events(instrument, preset, timed_key(1.0), RATE_HZ, "noise")),
+            lambda instrument: next(render_events(instrument, PRESET, timed_key(1.0), RATE_HZ, "noise")),
             "source must be model, truth or difference, not 'noise'",
         ),
         (
-            lambda instrument, preset: Stage(instrument, preset).player.keys_of(
-                read_instrument(INSTRUMENTS / "concert_toms.json")
-            ),
+            lambda instrument: Stage(instrument).player.keys_of(read_instrument(INSTRUMENTS / "concert_toms.json")),
             "has drums",
         ),
     ],
 )
 def test_what_cannot_be_played_is_an_error(
-    instrument: Instrument, preset: Preset, ask: Callable[[Instrument, Preset], object], reported: str
+    instrument: Instrument, ask: Callable[[Instrument], object], reported: str
 ) -> None:
     with pytest.raises(ValueError, match=reported):
-        ask(instrument, preset)
+        ask(instrument)
 
 
 @pytest.mark.parametrize(
@@ -466,8 +414,8 @@ def test_what_cannot_be_played_is_an_error(
         ("koto", PluckAt(Pluck()), []),
     ],
 )
-def test_what_is_no_key_of_an_instrument_is_silent(preset: Preset, name: str, event: Any, kinds: list[int]) -> None:
-    stage = Stage(read_instrument(INSTRUMENTS / f"{name}.json"), preset)
+def test_what_is_no_key_of_an_instrument_is_silent(name: str, event: Any, kinds: list[int]) -> None:
+    stage = Stage(read_instrument(INSTRUMENTS / f"{name}.json"))
     stage.player.handle(event)
     stage.run((), 128)
     assert [each.kind for each in stage.reports] == kinds and not stage.mixer.active

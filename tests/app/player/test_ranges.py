@@ -23,13 +23,12 @@ from engine.kernels import strings
 from engine.kernels.midi import HARMONICS, MOD_WHEEL, SLIDE
 from engine.kernels.playing.plucks import vary
 from engine.pluck import Pluck
-from engine.presets import Preset
 from engine.strike import Strike
 from engine.values.ear import Ear
 from engine.voices.player import NoteReport
 from tests.app.player.stage import RATE_HZ, Stage, changed
 
-STROKES = 40
+STROKES = 12
 INSTRUMENTS = {entry.instrument.name: entry.instrument for entry in list_instruments(SHIPPED)[0]}
 PLUCKING = [field for field in ASSIGNABLE if field.startswith("pluck.")]
 EVERY = pytest.mark.parametrize("instrument", INSTRUMENTS.values(), ids=INSTRUMENTS)
@@ -59,10 +58,9 @@ def at_ends(instrument: Instrument) -> Iterator[Instrument]:
         yield with_ends(instrument, draw.sample(PLUCKING, 6), draw)
 
 
-@EVERY
-def test_every_stroke_of_every_knob_is_a_pluck(instrument: Instrument) -> None:
-    draw = random.Random(instrument.name)
-    for turned in at_ends(instrument):
+def test_every_stroke_of_every_knob_is_a_pluck() -> None:
+    draw = random.Random(1)
+    for turned in itertools.chain.from_iterable(map(at_ends, INSTRUMENTS.values())):
         for velocity in (*VELOCITIES, draw.randint(2, 126)):
             pluck = turned.pluck.pluck(velocity)
             own = pluck.position, pluck.amplitude_mm, pluck.width
@@ -106,24 +104,15 @@ def scattered(count: int) -> list[Event]:
     return [NoteOn(draw.randrange(40, 76), draw.randint(*VELOCITIES)) for _ in range(count)]
 
 
-@pytest.mark.parametrize("end", WIDTH_RANGE)
-def test_a_tone_at_its_end_plays_on(preset: Preset, end: float) -> None:
-    """Both widths are at an end of their range, from which strokes vary."""
-    instrument = INSTRUMENTS["Classical guitar"].with_values({"pluck.width": end, "pluck.width_hard": end})
-    found = plucks(Stage(instrument, preset), *scattered(60))
-    assert len(found) == 60
-    assert (max if end == WIDTH_RANGE[1] else min)(each.width for each in found) == end
-
-
 @pytest.mark.parametrize("mode", ["poly", "mpe"])
-def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset, mode: str) -> None:
+def test_wheels_slides_hands_and_techniques_stay_within_ranges(mode: str) -> None:
     extreme = INSTRUMENTS["Classical guitar"].with_values(
         {"pluck.position": POSITION_RANGE[0], "pluck.hardest_mm": AMPLITUDE_MM_RANGE[1]}
     )
     fields = [field for field in WHEEL if field.startswith(("pluck.", "technique."))]
     wild = [Pluck(at, mm, "gaussian", w) for at in POSITION_RANGE for mm in (0.0, 20.0) for w in WIDTH_RANGE]
     for field in random.Random(1).sample(fields, 6):
-        stage = Stage(changed(extreme, pluck={"variation": 1.0}, mod_wheel=field, mode=mode), preset)
+        stage = Stage(changed(extreme, pluck={"variation": 1.0}, mod_wheel=field, mode=mode))
         for value in (0, 127, 128):
             switches = [ControlChange(number, value) for number in (MOD_WHEEL, SLIDE, HARMONICS)]
             assert len({each.id for each in plucks(stage, *switches, *scattered(8))}) == 8
@@ -131,10 +120,9 @@ def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset, m
         assert [(each.position, each.width) for each in found.values()] == [(p.position, p.width) for p in wild]
 
 
-def test_a_knob_may_go_to_every_end_while_strings_ring(preset: Preset) -> None:
-    """Of the strings and of the pluck, with notes after each."""
+def test_a_knob_may_go_to_every_end_while_strings_ring() -> None:
     instrument = INSTRUMENTS["Steel-string acoustic"]
-    stage, draw = Stage(instrument, preset), random.Random(2)
+    stage, draw = Stage(instrument), random.Random(2)
     fields = [*PLUCKING, *(f"knobs.{name}" for name in KNOBS)]
     knobs = [InstrumentTurned(with_ends(instrument, draw.sample(fields, 5), draw)) for _ in range(12)]
     assert len(plucks(stage, *(event for knob in knobs for event in (knob, *scattered(3))))) == 36

@@ -57,14 +57,7 @@ class StandingSound:
 
 
 class Lab:
-    """Notes of single strings, whose sound the test takes.
-
-    Attributes:
-        bank: a model that sounds at once.
-        small_preset: one that is rendered before it is heard.
-        sources: with both loaded at 48 kHz; nobody may change it.
-        reports: messages and details.
-    """
+    """Notes of single strings, whose sound the test takes: `bank` sounds at once, `small_preset` is rendered."""
 
     def __init__(self, sound: StandingSound, sources: Sources, bank: Path, small_preset: Path, wait: Wait) -> None:
         self.sound, self.sources, self.bank, self.small_preset, self.wait = sound, sources, bank, small_preset, wait

@@ -111,7 +111,6 @@ def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
 
 @pytest.mark.parametrize(("from_s", "least_s"), [(0.8, 0.8 + LEAST_S), (5.0, 1.0)])
 def test_where_a_seek_begins_in_the_middle_it_waits_for_that(at: Ahead4k, from_s: float, least_s: float) -> None:
-    """Behind its end it is there when all is."""
     at.finished(from_s=from_s)
     assert at.begun_s[0] >= least_s - 1e-3
 
@@ -151,7 +150,6 @@ def test_what_nobody_wants_is_rendered_no_further(at: Ahead4k, monkeypatch: pyte
 
 
 def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A new pluck does not wait for those before it; each begins when the rest will be ready in time."""
     slow_down(monkeypatch, speed=5.0)
     first, second = (at.render(seconds=20.0) for _ in range(2))
     at.wait(lambda: not any(note.pending for note in at.notes))

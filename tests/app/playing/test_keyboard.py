@@ -7,28 +7,18 @@ from pathlib import Path
 import pytest
 
 from app.playing import keyboard
-from app.playing.keyboard import (
-    HIGHEST_OCTAVE,
-    HIGHEST_PLACE,
-    LOWEST_C,
-    LOWEST_OCTAVE,
-    LOWEST_PLACE,
-    KeyPress,
-    PluckRange,
-    place_of,
-    semitone_of,
-)
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange
 from engine.pluck import Pluck
 from engine.presets import find_preset, read_info
 
 REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
-EVERY_OCTAVE = range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
+EVERY_OCTAVE = range(keyboard.LOWEST_OCTAVE, keyboard.HIGHEST_OCTAVE + 1)
 
 
 def test_rows_of_keys_are_places_and_a_piano() -> None:
-    assert [place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
+    assert [keyboard.place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
     assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
-    assert [semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
+    assert [keyboard.semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
     assert keyboard.letters_of(1)[LOWEST_C + 12] == "A"
 
 
@@ -45,7 +35,7 @@ def test_keys_are_known_by_their_place() -> None:
         ("linux", KeyPress("q"), None, None),
         ("linux", KeyPress(""), None, None),
     ):
-        assert (place_of(press, platform), semitone_of(press, platform)) == (place, semitone), press
+        assert (keyboard.place_of(press, platform), keyboard.semitone_of(press, platform)) == (place, semitone), press
 
 
 def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
@@ -56,7 +46,7 @@ def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
     )
     assert softer < 4 < harder and hardest == 10
     for letter in ("X", "0", " ", "", "É"):
-        assert REACH.turned(KeyPress(letter), 4.0) is place_of(KeyPress(letter), "darwin") is None
+        assert REACH.turned(KeyPress(letter), 4.0) is keyboard.place_of(KeyPress(letter), "darwin") is None
 
 
 def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_steps_of_level() -> None:
@@ -70,7 +60,6 @@ def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_s
 
 
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
-    """Of many strings up to the rise of tension; one that bears more than the loudest key is played as any other."""
     assert PluckRange.of(read_info(small_preset)) == REACH
     assert PluckRange.of(None).position == (0.05, 0.95)
     nylon, harp = (read_info(find_preset(name)) for name in ("studio_any_string", "studio_any_harp_c6"))
@@ -80,7 +69,7 @@ def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
 
 
 def test_octave_and_velocity_keys_stay_within_bounds() -> None:
-    highest, lowest = HIGHEST_OCTAVE, LOWEST_OCTAVE
+    highest, lowest = keyboard.HIGHEST_OCTAVE, keyboard.LOWEST_OCTAVE
     assert keyboard.turn(KeyPress("z"), 0, 90) == (-1, 90)
     assert keyboard.turn(KeyPress("X"), highest, 90) == (highest, 90)
     assert keyboard.turn(KeyPress("Z"), lowest, 90) == (lowest, 90)
@@ -95,7 +84,7 @@ def test_octaves_are_those_in_which_a_key_sounds_and_the_nearest_has_most_keys()
             played = {octave: range(LOWEST_C + 12 * octave, LOWEST_C + 12 * octave + 12) for octave in EVERY_OCTAVE}
             sounding = [octave for octave, keys in played.items() if set(keys) & set(range(low, high + 1))]
             assert keyboard.octaves_of(low, high) == (sounding[0], sounding[-1]), (low, high)
-    assert keyboard.octaves_of(120, 127) == (HIGHEST_OCTAVE, HIGHEST_OCTAVE)
+    assert keyboard.octaves_of(120, 127) == (keyboard.HIGHEST_OCTAVE, keyboard.HIGHEST_OCTAVE)
     guitar = [keyboard.octave_near(octave, range(40, 87)) for octave in (-4, -1, 0, 2, 4)]
     assert guitar == [0, 0, 0, 2, 2]  # E2 to D6
     assert [keyboard.octave_near(octave, range(36, 52)) for octave in (-4, 0, 4)] == [-1, -1, -1]  # toms

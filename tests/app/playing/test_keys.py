@@ -25,18 +25,7 @@ from app.playing.playback import Due
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import constants as of
-from engine.kernels.midi import (
-    LEGATO,
-    MOD_WHEEL,
-    NOTES_OFF,
-    PORTAMENTO,
-    RESET,
-    SLIDE_TIME,
-    SOUND_OFF,
-    STRUM,
-    SUSTAIN,
-    TREMOLO,
-)
+from engine.kernels import midi
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 from engine.voices import Mixer
@@ -116,7 +105,7 @@ def played(sound: Any, wait: Wait) -> Iterator[Played]:
 
 
 def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(played: Played) -> None:
-    for number, value in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, 64)):
+    for number, value in ((midi.LEGATO, 127), (midi.PORTAMENTO, 127), (midi.SLIDE_TIME, 64)):
         played.handle(ControlChange(number, value))
     places = []
     for key, string, looks in ((43, -1, 10), (52, 5, 40)):  # of the lowest string, where others have it too
@@ -154,7 +143,6 @@ def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Played) -> None:
 
 
 def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the loudness of the turned instrument takes: here it takes until the key has sounded."""
     begun, held, struck = Event(), Event(), list[object]()
 
     def slow(*args: Any) -> Any:
@@ -177,7 +165,6 @@ def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_last_of_many_turns_counts(played: Played) -> None:
-    """And is recorded as it was played; strings that ring and the next ones have it."""
     struck = played.strike(NoteOn(45, 60))
     before = played.now(struck).now
     played.keys.begin_recording()
@@ -209,7 +196,6 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
 def test_an_instrument_that_cannot_be_played_is_reported_once(
     played: Played, part: str, value: Any, reported: str
 ) -> None:
-    """After an impossible tuning, what was played stays."""
     made = played.strike(NoteOn(45, 60))
     played.notes.set_instrument(INSTRUMENT.model_copy(update={part: value}), EAR)
     played.settle()
@@ -225,7 +211,6 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
 
 
 def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
-    """Nor is one that is kept beside a single string played."""
     held = Event()
     played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)
@@ -265,19 +250,19 @@ def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(
     played: Played, pedal: bool, loaded: bool
 ) -> None:
     held = played.strike(NoteOn(45, 60))
-    for event in (ControlChange(SUSTAIN, 127), NoteOff(45)) if pedal else ():
+    for event in (ControlChange(midi.SUSTAIN, 127), NoteOff(45)) if pedal else ():
         played.handle(event)
     assert not played.now(held).damped
     played.notes.set_instrument(FRAME_DRUM, EAR)
     if loaded:
         played.choose(FRAME_DRUM)
-    played.handle(ControlChange(SUSTAIN, 0) if pedal else NoteOff(45))
+    played.handle(ControlChange(midi.SUSTAIN, 0) if pedal else NoteOff(45))
     assert played.now(held).damped
 
 
 def test_switches_hold_for_another_instruments_player_too(played: Played) -> None:
-    switches = [ControlChange(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
-    for event in (*switches, ControlChange(STRUM, 127), ControlChange(RESET, 0)):
+    switches = [ControlChange(number, 127, KEYS) for number in (midi.LEGATO, midi.TREMOLO)]
+    for event in (*switches, ControlChange(midi.STRUM, 127), ControlChange(midi.RESET, 0)):
         played.handle(event)
     for other in (FRAME_DRUM, INSTRUMENT):
         played.choose(other)
@@ -286,7 +271,6 @@ def test_switches_hold_for_another_instruments_player_too(played: Played) -> Non
 
 
 def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compared(played: Played) -> None:
-    """And without the instrument."""
     del played.effects[:]
     wooden = INSTRUMENT.model_copy(update={"body": BodyChoice(name="guitar", mix=0.4), "mod_wheel": "room.mix"})
     for _ in range(2):
@@ -295,7 +279,7 @@ def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compa
     assert effects is not None and effects.body is not None
     assert (effects.body.name, effects.body.mix) == ("guitar", 0.4)
     for value, mix in ((127, 1.0), (0, INSTRUMENT.room.mix)):
-        played.handle(ControlChange(MOD_WHEEL, value))
+        played.handle(ControlChange(midi.MOD_WHEEL, value))
         played.settle()
         effects = played.effects[-1]
         assert effects is not None and (effects.room.mix if effects.room else 0.0) == pytest.approx(mix)
@@ -312,9 +296,8 @@ def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compa
 def test_keys_go_out_while_the_output_stands_and_with_another_device(
     played: Played, monkeypatch: pytest.MonkeyPatch, rate_hz: int, channels: int
 ) -> None:
-    """New ones sound alone."""
     made = played.strike(NoteOn(45, 127))
-    played.handle(ControlChange(SUSTAIN, 127))
+    played.handle(ControlChange(midi.SUSTAIN, 127))
     played.hear(4_800)
     assert played.keys.sounding()
     with monkeypatch.context() as standing:
@@ -345,8 +328,7 @@ def test_notes_end_though_their_reports_were_missed(played: Played) -> None:
 
 
 def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> None:
-    """As if each had come at its time; the first of them when all have been handed over."""
-    off, begin = ControlChange(SOUND_OFF, 0), 1_024
+    off, begin = ControlChange(midi.SOUND_OFF, 0), 1_024
     events = (NoteOn(45, 90), Bend(0.5), Bend(1.0), NoteOff(45), NoteOn(45, 60), off)
     frames = (0, 4_800, 9_600, 14_400, 17_280, 24_000)
     for frame, event in zip(frames, events, strict=True):
@@ -366,7 +348,6 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> N
 
 
 def test_a_note_that_waits_and_is_released_never_begins_and_others_do(played: Played) -> None:
-    """A key that is struck while its next note waits sounds at once, and again when that is due."""
     soon = played.soon()
     one, other = (played.strike(NoteOn(key, 90), soon) for key in (45, 50))
     at_once = played.strike(NoteOn(50, 90))
@@ -395,10 +376,9 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 
 def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played: Played) -> None:
-    """With the pedal down and a wheel moved; and no key of it is down for ever."""
     played.keys.begin_recording()
     assert played.recorded() == []
-    for event in (ControlChange(SUSTAIN, 127), Bend(0.5), *parameter_set(0, 12, 0, 0)):
+    for event in (ControlChange(midi.SUSTAIN, 127), Bend(0.5), *parameter_set(0, 12, 0, 0)):
         played.handle(event)
     played.strike(NoteOn(50, 60))
     played.keys.begin_recording()
@@ -410,7 +390,7 @@ def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played
         isinstance(events[0], InstrumentTurned) and next(e.time_s for e in timed if isinstance(e.event, NoteOn)) == 0
     )
     assert (events[0].instrument.pickup.points, events[0].instrument.pickup.kind) == (EAR.points, EAR.pickup)
-    assert events[-2:] == [ControlChange(SUSTAIN, 0), NoteOff(52)]
+    assert events[-2:] == [ControlChange(midi.SUSTAIN, 0), NoteOff(52)]
     again = InstrumentPlayer(heard.instrument, heard.preset, 48_000, {"model": 1.0, "truth": 0.0}, heard.ear)
     for event in events[:-2]:
         again.handle(event)
@@ -431,7 +411,6 @@ def test_a_full_recording_is_reported_once(played: Played, monkeypatch: pytest.M
 
 
 def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Played, clock: SimpleNamespace) -> None:
-    """Without the turn of a loop that never came, and what is not due yet."""
     played.keys.begin_recording()
     loop = NoteOn(64, 90, pluck=Pluck(0.3, 2.0))
     for event, after_s in ((NoteOn(45, 90), 0.2), (loop, 0.2), (NoteOn(50, 90), 0.25), (NoteOn(62, 90), 60.0)):
@@ -446,14 +425,13 @@ def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Played
 
 
 def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Played, clock: SimpleNamespace) -> None:
-    """And it is not in the recording; what rings continues until it is released."""
     ringing = played.strike(NoteOn(45, 90))
     played.hear(4_800)
     played.keys.begin_recording()
     soon = replace(played.soon(), time_s=clock.now_s + 0.04)
     later = [played.strike(NoteOn(key, 127), soon) for key in (45, 50)]
     played.notes.cancel()
-    played.handle(ControlChange(NOTES_OFF, 0))
+    played.handle(ControlChange(midi.NOTES_OFF, 0))
     played.hear(2_000)
     assert all(each.over and each.began_frame == 0 for each in later)
     assert played.now(ringing).damped and not ringing.over

@@ -46,7 +46,6 @@ def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at
 
 
 def test_another_device_continues_with_the_beat() -> None:
-    """Those of a second, which the one before was given, are left out."""
     room, first = Room(), 777 + round(AHEAD_S * 48_000)
     room.metronome.begin(Meter(tempo_bpm=240, metronome=True))
     room.heard(1.1)

@@ -90,7 +90,6 @@ def test_plucks_ring_beside_each_other_and_are_heard_where_the_listener_is(lab: 
 
 
 def test_another_preset_sounds_at_its_own_rate_in_step(lab: Lab, tmp_path: Path) -> None:
-    """Once it is prepared, it is not waited for."""
     other = Path(shutil.copy(lab.bank, tmp_path / "other.safetensors"))
     lab.notes.set_monitor(hears("preset:other", "model"))
     lab.notes.choose(lab.pluck_of(others=(other,)))
@@ -104,7 +103,6 @@ def test_another_preset_sounds_at_its_own_rate_in_step(lab: Lab, tmp_path: Path)
 
 @pytest.mark.parametrize("which", ["bank", "small_preset"])
 def test_a_seek_begins_in_the_middle_alone(lab: Lab, which: str, request: Any) -> None:
-    """Also where the model is rendered first: it is in step with the truth."""
     path, whole = request.getfixturevalue(which), {}
     for name in ("model", "truth"):
         lab.notes.set_monitor(hears(name))
@@ -125,18 +123,6 @@ def test_a_seek_begins_in_the_middle_alone(lab: Lab, which: str, request: Any) -
         place, out = round(note.seconds * RATE_HZ), lab.mixer.render(10 * QUANTUM)[:, 0]
         np.testing.assert_allclose(out, whole[name][place : place + len(out)], atol=1e-6)
     assert note.frame_at(1.0) == note.began_frame + round(0.6 * RATE_HZ)
-
-
-def test_strikes_come_from_many_threads(lab: Lab) -> None:
-    struck: list[PluckVoices] = []
-    plucks = [lab.pluck_of(position=0.3 + 0.02 * number) for number in range(12)]
-    threads = [threading.Thread(target=lambda pluck=pluck: struck.append(lab.strike(pluck))) for pluck in plucks]
-    for thread in threads:
-        thread.start()
-    while any(thread.is_alive() for thread in threads):
-        lab.mixer.render(64)
-    lab.hear(0.01)
-    assert len(struck) == lab.notes.ringing == 12 and all(note.began for note in struck)
 
 
 def look(sound: Any, load: float, times: int = 1) -> None:
@@ -176,7 +162,6 @@ def test_the_oldest_notes_end_where_there_are_too_many(lab: Lab, monkeypatch: py
 
 
 def test_stop_ends_all_without_a_click(lab: Lab, tmp_path: Path) -> None:
-    """Closed, nothing more is struck that waits."""
     struck = [lab.strike(amplitude_mm=5.0) for _ in range(2)]
     loud = lab.hear(0.1)
     lab.notes.stop()
@@ -251,7 +236,6 @@ def test_levels_are_matched_once_they_are_known(lab: Lab, tmp_path: Path, loudne
 
 @pytest.mark.parametrize("seconds", [0.5, 1.5])
 def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(lab: Lab, seconds: float) -> None:
-    """All of it, where that is short."""
     lab.notes.set_monitor(hears("model", level_match=True))
     note = lab.strike(lab.small_preset, position=0.43, seconds=seconds)
     lab.wait(lambda: lab.notes.poll() is None and note.match is not None)
@@ -292,7 +276,6 @@ def slow_model(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_model_that_is_rendered_begins_when_enough_is_there(lab: Lab, slow_model: None) -> None:
-    """With the truth beside it, at one frame; until then the note says how long it waits, and a switch counts."""
     note = lab.strike(lab.small_preset, seconds=1.2)  # blocks of a quarter: two are left when it begins
     lab.wait(lambda: note.waits_s > 0)
     lab.notes.set_monitor(hears("truth"))
@@ -334,7 +317,6 @@ def test_another_rate_while_a_model_is_rendered(lab: Lab, slow_model: None) -> N
 
 
 def test_keys_of_a_single_string_are_places_along_it_and_ring(lab: Lab) -> None:
-    """As a pluck by hand at that place, which stays where it is; no release damps it."""
     reach, by_hand = lab.play_string(), Pluck(0.44, 3.0)
     struck = (NoteOn(LOWEST_PLACE, 64), NoteOn(HIGHEST_PLACE, 64), NoteOn(60, 90, pluck=by_hand), PluckAt(by_hand))
     plucks = [note.request.pluck for event in struck if isinstance(note := lab.notes.handle(event), PluckVoices)]

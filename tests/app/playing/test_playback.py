@@ -84,7 +84,6 @@ def test_each_event_is_handed_over_before_its_frame_and_everything_is_let_go_in_
 def test_a_thread_that_was_held_up_or_a_device_that_takes_much_at_once_keeps_the_frames(
     buffer_s: float, held_up_s: float, apart: int
 ) -> None:
-    """Events are given to such a device so much earlier."""
     player = Player(round(buffer_s * RATE_HZ) or 480, buffer_s)
     player.hinder = lambda event: player.standing.render(round(held_up_s * RATE_HZ))
     player.play(*((number * apart / RATE_HZ, NoteOn(60 + number, 90)) for number in range(6)))
