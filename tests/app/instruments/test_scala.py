@@ -24,10 +24,9 @@ REMARKS = [
 
 @dataclass
 class Made:
-    """A scale or a mapping as its text, and what it was made from."""
+    """A mapping as its text, and what it was made from."""
 
     text: str
-    cents: list[float]
     numbers: list[int]
     hz: float
     pattern: list[int | None]
@@ -99,7 +98,7 @@ def made_mapping(draw: random.Random) -> Made:
         draw.choice(("", " ", "\t")) + str(line) + draw.choice(("", "", " ", "\t! a remark", " (more)"))
         for line in (*numbers[:5], hz, numbers[5], *entries)
     ]
-    return Made(noisy(lines, draw, 0), [], numbers, hz, pattern)
+    return Made(noisy(lines, draw, 0), numbers, hz, pattern)
 
 
 def cents_of_degree(degree: int, cents: list[float]) -> float:

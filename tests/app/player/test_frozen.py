@@ -208,10 +208,3 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[s
 def test_the_oldest_make_room(shipped: dict[str, Instrument]) -> None:
     played = [(1 + 480 * number, NoteOn(30 + 3 * number, 90)) for number in range(12)]
     assert compared("oldest", shipped["concert_harp"], played, 200, most=5) < CLOSE
-
-
-def test_the_same_events_give_the_same_samples(shipped: dict[str, Instrument]) -> None:
-    instrument = changed(shipped["oud"], pluck={"variation": 1.0})
-    played = drawn(instrument, shipped["kora"], 5)
-    one, other = (Stage(instrument, gains=GAINS).run(played, 100 * QUANTUM) for _ in range(2))
-    np.testing.assert_array_equal(one, other)
