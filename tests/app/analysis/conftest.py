@@ -34,7 +34,7 @@ def make_take(small_preset: Path) -> MakeTake:
 
 
 class RecordingJob:
-    """Remembers what is reported, and cancels after so many reports."""
+    """A job that remembers what is reported, and cancels after so many reports."""
 
     def __init__(self) -> None:
         self.shares: list[float] = []

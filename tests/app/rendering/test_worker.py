@@ -6,7 +6,6 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,126 +22,101 @@ from engine.pluck import Pluck
 from engine.values.ear import Ear
 
 DEADLINE_S = 30.0
-EAR = Ear((0.37,))
 
 
-class Heard:
-    """Collects what the worker says."""
-
-    def __init__(self) -> None:
-        self.started: list[Take] = []
-        self.finished: list[Take] = []
-        self.failed: list[str] = []
-        self.others_failed: list[str] = []
-
-    def say(self, signal_name: str, value: Take | str, message: str = "") -> None:
-        if isinstance(value, Take):
-            assert value.ready_frames > 1, "there is something to draw"
-            (self.started if signal_name == "started" else self.finished).append(value)
-        elif signal_name == "failed":
-            self.failed.append(value)
-        else:
-            self.others_failed.append(f"{value}: {message}")
-
-
-def wait_until(done: Callable[[], bool]) -> None:
+def wait_until(done: Callable[[], object]) -> None:
     deadline = time.monotonic() + DEADLINE_S
     while not done():
         assert time.monotonic() < deadline, "nothing came"
         time.sleep(0.005)
 
 
-@pytest.fixture
-def heard() -> Heard:
-    return Heard()
+class Heard:
+    """A worker whose reports are kept. Plucks are heard while `hurried`; one would sound while `sounds`."""
+
+    def __init__(self) -> None:
+        self.started: list[Take] = []
+        self.finished: list[Take] = []
+        self.failed: list[str] = []
+        self.hurried, self.sounds = False, True
+        self.gate = threading.Event()
+        self.gate.set()
+        load = Sources().load
+        self.worker = RenderWorker(
+            self.say,
+            lambda subject: self.gate.wait(DEADLINE_S) and load(subject),
+            lambda: self.hurried,
+            lambda: self.sounds,
+        )
+
+    def say(self, signal_name: str, value: Take | str, message: str = "") -> None:
+        if isinstance(value, Take):
+            assert value.ready_frames > 1, "there is something to draw"
+            (self.started if signal_name == "started" else self.finished).append(value)
+        else:
+            self.failed.append(f"{signal_name}: {value}: {message}")
+
+    def submit(self, preset: Path, position: float = 0.4, seconds: float = 1.0, *others: Path) -> None:
+        self.worker.submit(
+            NoteSound(preset, Pluck(position, 3.0), seconds, Ear((0.37,)), 0.004, others=tuple(others))
+        )
 
 
 @pytest.fixture
-def sources() -> Sources:
-    return Sources()
-
-
-@pytest.fixture
-def worker(heard: Heard, sources: Sources) -> Iterator[RenderWorker]:
-    made = RenderWorker(heard.say, sources.load)
+def heard() -> Iterator[Heard]:
+    made = Heard()
     yield made
-    made.close()
+    made.worker.close()
     wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
 
 
-def request_of(preset: Path, **changes: object) -> NoteSound:
-    return replace(NoteSound(preset, Pluck(0.4, 3.0), 1.0, EAR, 0.004), **changes)  # type: ignore[arg-type]
-
-
-def test_the_latest_request_wins(small_preset: Path, heard: Heard, sources: Sources) -> None:
-    submitted = threading.Event()  # or the first could be finished before the last is submitted
-    worker = RenderWorker(heard.say, lambda subject: submitted.wait(20) and sources.load(subject))
-    for position in (0.3, 0.35, 0.4, 0.45, 0.5):
-        worker.submit(request_of(small_preset, pluck=Pluck(position, 3.0), seconds=4.0))
-    submitted.set()
-    wait_until(lambda: bool(heard.finished))
-    worker.close()
-    assert [take.pluck.position for take in heard.finished] == [0.5]
-
-
-def test_a_motion_that_is_asked_for_again_is_announced_again(
-    small_preset: Path, worker: RenderWorker, heard: Heard
+def test_the_latest_request_wins_and_is_announced_again_when_it_is_asked_for_again(
+    small_preset: Path, heard: Heard
 ) -> None:
     """The window may have chosen something else in between, of which the worker had no request."""
-    worker.submit(request_of(small_preset))
-    wait_until(lambda: len(heard.finished) == 1)
-    worker.submit(request_of(small_preset))
+    heard.gate.clear()  # or the first could be finished before the last is submitted
+    for position in (0.3, 0.35, 0.4, 0.45, 0.5):
+        heard.submit(small_preset, position)
+    heard.gate.set()
+    wait_until(lambda: heard.finished)
+    assert [take.pluck.position for take in heard.finished] == [0.5]
+    heard.submit(small_preset, 0.5)
     wait_until(lambda: len(heard.finished) == 2)
-    assert heard.started[0] is heard.started[1]
+    assert heard.started[-2:] == heard.finished == 2 * heard.finished[:1]
 
 
-def test_while_plucks_are_heard_a_motion_keeps_step_with_its_sound(
+def test_the_first_motion_waits_until_a_pluck_would_sound_and_keeps_step_with_its_sound_while_it_is_heard(
     small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And is whole at once when they are not heard any more."""
-    monkeypatch.setattr(worker_module, "IN_STEP_S", 600.0)  # not over before this is looked at
-    hurried = True
-    worker = RenderWorker(heard.say, Sources().load, lambda: hurried)
-    try:
-        worker.submit(request_of(small_preset, seconds=30.0))
-        wait_until(lambda: bool(heard.started))
-        (take,) = heard.started
-        time.sleep(0.1)
-        assert not take.complete
-        hurried = False
-        wait_until(lambda: take.complete)
-    finally:
-        worker.close()
-
-
-def test_the_first_motion_waits_until_a_pluck_would_sound(small_preset: Path, heard: Heard) -> None:
     """It may load torch, which would keep the sound waiting."""
-    sounds = False
-    worker = RenderWorker(heard.say, Sources().load, sounds=lambda: sounds)
-    try:
-        worker.submit(request_of(small_preset))
-        time.sleep(0.1)
-        assert not heard.started
-        sounds = True
-        wait_until(lambda: bool(heard.finished))
-    finally:
-        worker.close()
+    monkeypatch.setattr(worker_module, "IN_STEP_S", 600.0)  # not over before this is looked at
+    heard.sounds, heard.hurried = False, True
+    heard.submit(small_preset, seconds=8.0)
+    time.sleep(0.1)
+    assert not heard.started
+    heard.sounds = True
+    wait_until(lambda: heard.started)
+    (take,) = heard.started
+    time.sleep(0.1)
+    assert not take.complete
+    heard.hurried = False
+    wait_until(lambda: take.complete)
 
 
 def test_a_broken_preset_is_reported_and_the_worker_lives_on(
-    small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
+    small_preset: Path, tmp_path: Path, heard: Heard
 ) -> None:
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(small_preset.read_bytes()[:100])
-    worker.submit(request_of(broken))
-    wait_until(lambda: bool(heard.failed))
+    heard.submit(broken)
+    wait_until(lambda: heard.failed)
     assert str(broken) in heard.failed[0]
-    worker.submit(request_of(small_preset))
-    wait_until(lambda: bool(heard.finished))
+    heard.submit(small_preset)
+    wait_until(lambda: heard.finished)
 
 
 def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
-    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+    small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     advance = KoopmanVar.advance
 
@@ -153,44 +127,35 @@ def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
         return (frames * float("nan") if state.step >= 256 else frames), after
 
     monkeypatch.setattr(KoopmanVar, "advance", faulty)
-    worker.submit(request_of(small_preset))
-    wait_until(lambda: bool(heard.finished))
+    heard.submit(small_preset)
+    wait_until(lambda: heard.finished)
     (take,) = heard.started
     assert take.model_ends_s == pytest.approx(256 / 4_000)
-    assert not take.motion_m("model")[300:].any()
+    for model, silent_from in ((take.motion_m("model"), 300), (take.listened.signals["model"].read(), 3_000)):
+        assert np.isfinite(model).all() and not model[silent_from:].any()
     assert np.abs(take.motion_m("truth")[1_000:]).max() > 1e-4
-    assert np.isfinite(take.motion_m("model")).all()
-    heard_m = take.listened.signals["model"].read()
-    assert np.isfinite(heard_m).all()
-    assert not heard_m[3_000:].any()
 
 
-def test_another_presets_model_moves_beside_it(
-    small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
-) -> None:
+def test_another_presets_model_moves_beside_it(small_preset: Path, tmp_path: Path, heard: Heard) -> None:
     """It may come later: the motion is not rendered again. One that is damaged is reported, and at rest."""
-    other = tmp_path / "other.safetensors"
+    other, broken = (tmp_path / f"{name}.safetensors" for name in ("other", "broken"))
     shutil.copy(small_preset, other)
-    broken = tmp_path / "broken.safetensors"
     broken.write_bytes(b"damaged")
-    worker.submit(request_of(small_preset, others=(other,)))
-    wait_until(lambda: bool(heard.finished))
+    heard.submit(small_preset, 0.4, 1.0, other)
+    wait_until(lambda: heard.finished)
     (take,) = heard.started
-    wait_until(lambda: take.motions["preset:other"].complete)
-    np.testing.assert_array_equal(take.motions["preset:other"].read(), take.motion_m("model"))
-    wait_until(lambda: take.listened.signals["preset:other"].complete)
-    np.testing.assert_array_equal(take.listened.signals["preset:other"].read(), take.listened.signals["model"].read())
-    worker.submit(request_of(small_preset, others=(other, broken)))
+    for series in (take.motions, take.listened.signals):
+        wait_until(lambda series=series: series["preset:other"].complete)
+        np.testing.assert_array_equal(series["preset:other"].read(), series["model"].read())
+    heard.submit(small_preset, 0.4, 1.0, other, broken)
     wait_until(lambda: "preset:broken" in take.motions and take.motions["preset:broken"].complete)
-    assert "broken.safetensors" in heard.others_failed[0]
-    assert not take.motions["preset:broken"].read().any()
-    assert not take.listened.signals["preset:broken"].read().any()
-    assert all(started is take for started in heard.started)
-    assert {id(finished) for finished in heard.finished} == {id(take)}
+    assert heard.failed[0].startswith("other_refused: broken: ") and "broken.safetensors" in heard.failed[0]
+    assert not any(series["preset:broken"].read().any() for series in (take.motions, take.listened.signals))
+    assert {*map(id, heard.started), *map(id, heard.finished)} == {id(take)}
 
 
 def test_another_pluck_does_not_wait_for_the_one_before(
-    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+    small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     advance = SourceLine.advance
 
@@ -199,11 +164,11 @@ def test_another_pluck_does_not_wait_for_the_one_before(
         advance(line, samples)
 
     monkeypatch.setattr(SourceLine, "advance", slow)
-    worker.submit(request_of(small_preset, seconds=30.0))
-    wait_until(lambda: bool(heard.started))
-    worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))
+    heard.submit(small_preset, seconds=30.0)
+    wait_until(lambda: heard.started)
+    heard.submit(small_preset, 0.6)
     wait_until(lambda: len(heard.started) == 2)
     monkeypatch.undo()
-    wait_until(lambda: bool(heard.finished))
+    wait_until(lambda: heard.finished)
     assert heard.finished[0] is heard.started[1]
     assert not heard.started[0].complete
