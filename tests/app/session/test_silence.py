@@ -19,21 +19,7 @@ from engine.presets.of_string import read_string
 from engine.values.ear import Ear
 from tests.app.takes import append_to
 
-
-@pytest.fixture
-def library(small_preset: Path) -> Library:
-    """The preset `small`."""
-    return Library(list_presets(small_preset.parent)[0])
-
-
-def test_modes_are_those_of_the_string_that_is_plucked() -> None:
-    """Not those of the string that a preset of many was measured with."""
-    library = Library(list_presets(SHIPPED)[0])
-    for name, solo, words in (("nylon_e2", 60, ""), ("piano_c4", 55, "this string has 53")):
-        string = read_string(find_string(name))
-        found = why_silent(Choices(single="studio_any_string", string=string, solo=solo, position=0.113), library)
-        assert words in found
-        assert bool(found) == bool(words)
+STRINGS = {name: read_string(find_string(name)) for name in ("nylon_e2", "piano_c4")}
 
 
 @pytest.mark.parametrize(
@@ -53,10 +39,14 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
         ({"solo": 2, "position": 0.5}, "does not excite mode 2"),
         ({"a": "preset:gone"}, "gone was not found"),
         ({"b": "preset:gone"}, ""),
+        # modes are those of the string that is plucked, not of the one that a preset of many was measured with
+        ({"single": "studio_any_string", "string": STRINGS["nylon_e2"], "solo": 60, "position": 0.113}, ""),
+        ({"single": "studio_any_string", "string": STRINGS["piano_c4"], "solo": 55}, "this string has 53"),
     ],
 )
-def test_the_reason_is_named(library: Library, changes: dict[str, object], words: str) -> None:
-    found = why_silent(Choices(single="small", **changes), library)
+def test_the_reason_is_named(small_preset: Path, changes: dict[str, object], words: str) -> None:
+    library = Library([*list_presets(small_preset.parent)[0], *list_presets(SHIPPED)[0]])
+    found = why_silent(Choices(**{"single": "small", **changes}), library)
     assert words in found
     assert bool(found) == bool(words)
 
