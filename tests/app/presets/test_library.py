@@ -1,7 +1,8 @@
-"""The library and what comes into it: refreshing, searching, installing, dropped files."""
+"""The library and what comes into it: refreshing, searching, installing, dropped files, and figures in words."""
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from dataclasses import replace
@@ -16,6 +17,7 @@ from app.export.choices import ExportChoices
 from app.player.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, list_presets
+from app.presets.words import judged, percent
 from app.rendering.note_sound import NoteSound
 from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
@@ -24,6 +26,7 @@ from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, preset_digest
 from engine.values.ear import Ear
+from tests.app.gestures import reported
 from tests.app.sounds import export_sound
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
@@ -42,9 +45,9 @@ def library(preset_folder: Path, own: Path) -> Library:
     return made
 
 
-def other_preset(small_preset: Path, path: Path) -> Path:
+def other_preset(small_preset: Path, path: Path, title: bytes = b"Another string") -> Path:
     """A preset of the same form with other bytes."""
-    path.write_bytes(small_preset.read_bytes().replace(b"A small string", b"Another string"))
+    path.write_bytes(small_preset.read_bytes().replace(b"A small string", title))
     return path
 
 
@@ -53,20 +56,17 @@ def files(folder: Path) -> list[str]:
 
 
 def test_a_refresh_reports_only_when_there_are_others(library: Library, small_preset: Path, own: Path) -> None:
-    seen: list[None] = []
-    library.changed.connect(lambda: seen.append(None))
+    seen = reported(library.changed)
     assert (library.refresh(), library.names, seen) == ([], ["first", "second"], [])
     own.mkdir()
-    shutil.copy(small_preset, own / "mine.safetensors")
-    shutil.copy(small_preset, own / "first.safetensors")
+    for name in ("mine", "first"):
+        shutil.copy(small_preset, own / f"{name}.safetensors")
     (problem,) = library.refresh()
     assert "first.safetensors: a preset of this name exists already" in problem
     assert library.refresh() == []  # it has been reported
     assert (library.names, len(seen)) == (["first", "mine", "second"], 1)
-    mine = library.find("mine")
-    assert mine is not None
-    first = library.find("first")
-    assert first is not None
+    mine, first = library.find("mine"), library.find("first")
+    assert mine is not None and first is not None
     assert [mine.title, mine.info.title] == [f"{first.title} (yours)", first.title]
     assert (mine.path, mine.size_bytes) == (own / "mine.safetensors", small_preset.stat().st_size)
 
@@ -77,15 +77,14 @@ def test_a_preset_is_installed_and_a_taken_name_gets_a_number(
     given = other_preset(small_preset, tmp_path / "first.safetensors")
     present = [entry.path for entry in library.entries]
     path, was_there = install_preset(given, own, present)
-    assert (path.name, was_there) == ("first_2.safetensors", False)
-    assert path.read_bytes() == given.read_bytes()
+    assert (path.name, was_there, path.read_bytes()) == ("first_2.safetensors", False, given.read_bytes())
     assert install_preset(given, own, [*present, path]) == (path, True)
-    assert files(own) == ["first_2.safetensors"]
     assert install_preset(small_preset, own, present)[1]
+    assert files(own) == ["first_2.safetensors"]
 
 
 @pytest.mark.parametrize("data", [b"", b"no preset", None])
-def test_what_is_no_preset_is_refused_and_leaves_nothing(
+def test_no_preset_is_refused_and_leaves_nothing(
     small_preset: Path, own: Path, tmp_path: Path, data: bytes | None
 ) -> None:
     given = tmp_path / "bad.safetensors"
@@ -116,37 +115,22 @@ def test_a_dropped_export_restores_its_choices(
 ) -> None:
     preset = preset_folder / "second.safetensors"
     other_preset(preset, preset)
-    pluck = Pluck(0.61, 2.5, "raised_cosine", 0.2)
-    sound = NoteSound(preset, pluck, 0.7, Ear((0.22,)))
+    sound = NoteSound(preset, Pluck(0.61, 2.5, "raised_cosine", 0.2), 0.7, Ear((0.22,)))
     export_sound(sound, tmp_path / f"A.{ending}", "truth")
     (tmp_path / f"A.{ending}").rename(tmp_path / f"b.{ending}")
     dropped = receive(tmp_path / f"b.{ending}", library)
     assert dropped.notice == ""
-    assert dropped.choices == {
-        "single": "second",
-        "string": None,
-        "position": 0.61,
-        "amplitude_mm": 2.5,
-        "shape": "raised_cosine",
-        "width": 0.2,
-        "listen": 0.22,
-        "seconds": 0.7,
-        "a": "model",
-        "b": "truth",
-        "heard": "b",
-        "solo": 0,
-        "stereo": False,
-        "pickup": "displacement",
-    }
-    shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
-    os.utime(preset_folder / "second.safetensors", ns=(1, 1))
+    pluck = {"position": 0.61, "amplitude_mm": 2.5, "shape": "raised_cosine", "width": 0.2, "string": None}
+    ear = {"listen": 0.22, "solo": 0, "stereo": False, "pickup": "displacement"}
+    slots = {"single": "second", "seconds": 0.7, "a": "model", "b": "truth", "heard": "b"}
+    assert dropped.choices == {**pluck, **ear, **slots}
+    shutil.copy(preset_folder / "first.safetensors", preset)
+    os.utime(preset, ns=(1, 1))
     assert "is not the one that made this file" in receive(tmp_path / f"b.{ending}", library).notice
     export_sound(replace(sound, seconds=0.1), tmp_path / "c.wav", "difference")
     dropped = receive(tmp_path / "c.wav", library)
-    assert "its duration of 0.1 s" in dropped.notice
-    assert "shown are 0.5 s" in dropped.notice
-    assert dropped.choices["seconds"] == 0.5
-    assert (dropped.choices["a"], dropped.choices["heard"]) == ("difference", "a")
+    assert "its duration of 0.1 s" in dropped.notice and "shown are 0.5 s" in dropped.notice
+    assert [dropped.choices[name] for name in ("seconds", "a", "heard")] == [0.5, "difference", "a"]
 
 
 def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
@@ -154,14 +138,11 @@ def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
 ) -> None:
     """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
     export = ExportChoices()
-    assert export.until_decayed
-    assert export.longest_s > OF_CHOICES["seconds"].limits[1]
+    assert export.until_decayed and export.longest_s > OF_CHOICES["seconds"].limits[1]
     sound = NoteSound(preset_folder / "first.safetensors", Pluck(0.5, 2.0), export.longest_s, Ear((0.3,)))
     export_sound(sound, tmp_path / "a.wav", settings=export.wav)
     dropped = receive(tmp_path / "a.wav", library)
-    assert dropped.notice == ""
-    assert "seconds" not in dropped.choices
-    assert dropped.choices["position"] == 0.5
+    assert (dropped.notice, "seconds" in dropped.choices, dropped.choices["position"]) == ("", False, 0.5)
 
 
 def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:
@@ -171,8 +152,7 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
         ("a.safetensors", "no such preset file"),
     ):
         dropped = receive(tmp_path / name, library)
-        assert dropped.choices == {}
-        assert words in dropped.notice
+        assert dropped.choices == {} and words in dropped.notice
     soundfile.write(tmp_path / "a.wav", np.zeros(5), 8000)
     assert "no impulse response" in receive(tmp_path / "a.wav", library).notice
     soundfile.write(tmp_path / "a.wav", np.zeros(8000), 8000)
@@ -180,9 +160,18 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
     assert "no impulse response" in receive_body(tmp_path / "a.wav").notice
 
 
-def entry(**changes: object) -> PresetEntry:
-    (one, *_), _ = list_presets()
-    return replace(one, name=str(changes.pop("name", one.name)), info=replace(one.info, **changes))  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [("a.wave", "WAV"), ("a.BWF", "RF64"), ("a.aifc", "AIFF"), ("a.ogg", "OGG"), ("a.oga", "OGG"), ("a.opus", "OGG")],
+)
+def test_a_sound_is_taken_by_every_usual_ending(name: str, form: str, library: Library, tmp_path: Path) -> None:
+    subtype = "OPUS" if name == "a.opus" else None
+    soundfile.write(tmp_path / name, 0.5 * np.sin(np.arange(24_000) / 20), 48_000, format=form, subtype=subtype)
+    assert receive(tmp_path / name, library) == Dropped(sound=True)
+    if form != "OGG":
+        noise = np.random.default_rng(0).uniform(-0.5, 0.5, 4_000) * np.geomspace(1, 1e-3, 4_000)
+        soundfile.write(tmp_path / name, noise, 48_000, format=form)
+        assert receive(tmp_path / name, library).body == "a" == body_names()[-1]
 
 
 def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first() -> None:
@@ -195,53 +184,46 @@ def heard(path: Path, distance_db: float) -> Heard:
     return Heard(path.stem, preset_digest(path), 4.0, distance_db, 0.0, 0.0)
 
 
-def test_what_was_heard_comes_with_the_preset_and_goes_with_its_change(
+def test_a_measured_distance_comes_with_the_preset_and_goes_with_its_change(
     library: Library, preset_folder: Path, small_preset: Path
 ) -> None:
-    first = preset_folder / "first.safetensors"
-    seen: list[None] = []
-    library.changed.connect(lambda: seen.append(None))
+    first, seen = preset_folder / "first.safetensors", reported(library.changed)
     assert library.entries[0].heard is None
     add_heard(preset_folder, [heard(first, 0.5)])
-    assert library.refresh() == []
-    assert len(seen) == 1
+    assert (library.refresh(), len(seen)) == ([], 1)
     assert [entry.heard.distance_db for entry in library.entries if entry.heard] == [0.5, 0.5]  # of one content
     other_preset(small_preset, first)
     library.refresh()
     assert [entry.heard is None for entry in library.entries] == [True, False]
-
-
-def test_a_hostile_table_is_reported_and_every_preset_listed(library: Library, preset_folder: Path) -> None:
     for content in (b"\x00" * 5000, b"<b>x</b>\n" * 200_000, ",".join(COLUMNS).encode() + b"\n<b>" * 1000):
         (preset_folder / NAME).write_bytes(content)
         entries, problems = list_presets()
-        assert [entry.name for entry in entries] == ["first", "second"]
-        assert 1 <= len(problems) <= 4
+        assert [entry.name for entry in entries] == ["first", "second"] and 1 <= len(problems) <= 4
 
 
-def test_the_most_accurate_come_first_and_what_was_not_measured_last(
+def test_the_most_accurate_come_first_and_those_not_measured_last(
     qtbot: QtBot, library: Library, preset_folder: Path, small_preset: Path
 ) -> None:
-    for name, word in (("third", b"Another string"), ("fourth", b"Fourth  string")):
-        path = preset_folder / f"{name}.safetensors"
-        path.write_bytes(small_preset.read_bytes().replace(b"A small string", word[:14].ljust(14)))
-        add_heard(preset_folder, [heard(path, {"third": 3.0, "fourth": 0.1}[name])])
+    for name, title, distance_db in (("third", b"Another string", 3.0), ("fourth", b"Fourth  string", 0.1)):
+        path = other_preset(small_preset, preset_folder / f"{name}.safetensors", title)
+        add_heard(preset_folder, [heard(path, distance_db)])
     library.refresh()
-
-    def order(number: int = 0, favourites: tuple[str, ...] = (), words: str = "") -> list[str]:
-        rows = [preset_row(entry) for entry in library.entries]
-        return [row.name for row in listed_rows(rows, favourites, (words,), order=number)]
-
-    assert order() == ["fourth", "third", "first", "second"]
-    assert order(0, ("second", "third")) == ["third", "second", "fourth", "first"]
-    assert order(1) == ["first", "fourth", "second", "third"]
-    assert order(2) == ["first", "fourth", "second", "third"]
-    assert order(words="not measured") == ["first", "second"]
+    rows = [preset_row(entry) for entry in library.entries]
+    for favourites, words, order, names in (
+        ((), "", 0, "fourth third first second"),
+        (("second", "third"), "", 0, "third second fourth first"),
+        ((), "", 1, "first fourth second third"),
+        ((), "", 2, "first fourth second third"),
+        ((), "not measured", 0, "first second"),
+    ):
+        assert [row.name for row in listed_rows(rows, favourites, (words,), order=order)] == names.split()
 
 
 def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset_folder: Path) -> None:
-    low = preset_row(entry(name="low", title="Nylon B3, plucked"))
-    high = preset_row(entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman"))
+    one, *_ = list_presets()[0]
+    nylon = replace(one.info, title="Nylon B3, plucked")
+    steel = replace(one.info, title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman")
+    low, high = (preset_row(PresetEntry(name, one.path, info)) for name, info in (("low", nylon), ("high", steel)))
     for words, kinds, starred, found in (
         ("", (), False, [high, low]),  # a favourite is on top
         ("b3 nyl", (), False, [low]),
@@ -257,16 +239,10 @@ def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset
         assert listed_rows([low, high], {"high"}, words.split(), kinds, starred) == found, (words, kinds)
 
 
-@pytest.mark.parametrize(
-    ("name", "form"),
-    [("a.wave", "WAV"), ("a.BWF", "RF64"), ("a.aifc", "AIFF"), ("a.ogg", "OGG"), ("a.oga", "OGG"), ("a.opus", "OGG")],
-)
-def test_a_sound_is_taken_by_every_usual_ending(name: str, form: str, library: Library, tmp_path: Path) -> None:
-    subtype = "OPUS" if name == "a.opus" else None
-    soundfile.write(tmp_path / name, 0.5 * np.sin(np.arange(24_000) / 20), 48_000, format=form, subtype=subtype)
-    assert receive(tmp_path / name, library) == Dropped(sound=True)
-    if form != "OGG":
-        noise = np.random.default_rng(0).uniform(-0.5, 0.5, 4_000) * np.geomspace(1, 1e-3, 4_000)
-        soundfile.write(tmp_path / name, noise, 48_000, format=form)
-        assert receive(tmp_path / name, library).body == "a"
-        assert body_names()[-1] == "a"
+def test_figures_have_few_digits_and_the_measured_error_decides_whether_to_warn() -> None:
+    shares = (0.0, 1e-7, 1.2e-5, 0.0345, 0.5, 1.16)
+    assert [*map(percent, shares)] == ["< 0.001 %", "< 0.001 %", "0.0012 %", "3.5 %", "50 %", "116 %"]
+    outside = "decay time near 3 kHz 1.9 s is outside the trained 0.1 … 1 s"
+    for error, words in ((math.nan, "{}"), (1e-6, "accurate, although {}"), (0.03, "inaccurate: {}")):
+        assert judged(outside, error) == (words.format(outside), error == 0.03)
+        assert judged("", error) == ("", False)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from app.instruments.instrument import Instrument
+from app.instruments.instrument import ASSIGNABLE, Instrument
 from app.instruments.library import SHIPPED, read_instrument
 from app.session.choices import Choices
+from app.shared.parameters import OF_INSTRUMENTS
 from app.stage.session import GATHER_S, RECORDED, Session
+from app.stage.step_words import step_words
 
 
 class Hand:
@@ -40,6 +42,21 @@ def guitar() -> Instrument:
     return read_instrument(SHIPPED / "classical_guitar.json")
 
 
+def test_whatever_a_knob_turns_has_words_without_marks_and_a_macro_its_name(guitar: Instrument) -> None:
+    for field in set(ASSIGNABLE) - {"pickup.points.1"}:
+        value = guitar.value(field)
+        for turned in (0.9 * value + 0.011, 0.9 * value - 0.011):
+            try:
+                words = step_words({"instrument": guitar}, {"instrument": guitar.with_value(field, turned)})
+            except ValueError:
+                continue
+            assert words and "_" not in words and "." not in words, field
+            assert words == ("listening point" if field.startswith("pickup.") else OF_INSTRUMENTS[field].name)
+    macro = {"name": "Damp", "value": 0.5, "targets": ({"field": "knobs.decay", "low": 1.0, "high": 3.0},)}
+    instrument = Instrument.model_validate({**dict(guitar), "macros": (macro,)})
+    assert step_words({"instrument": instrument}, {"instrument": instrument.turned(0, 0.9)}) == "Damp"
+
+
 def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
     start = hand.session.choices
     hand.change(position=0.5, amplitude_mm=2)
@@ -50,6 +67,10 @@ def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
         for state in states:
             act()
             assert hand.session.choices == state
+    hand.session.undo()
+    hand.change(width=0.3)
+    assert not hand.session.redo_words, "a new change forgets what was undone"
+    assert hand.undone("width") == [0.06, 0.06]
 
 
 def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand) -> None:
@@ -82,39 +103,29 @@ def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Han
     assert set(Choices.model_fields) > RECORDED
 
 
-def test_a_new_change_forgets_what_was_undone(hand: Hand) -> None:
-    hand.change(position=0.6)
-    hand.session.undo()
-    hand.change(width=0.3)
-    assert not hand.session.redo_words
-    assert hand.undone("width") == [0.06]
-    assert hand.session.choices.position == 0.35
-
-
 def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:
     session = hand.session
+
+    def state() -> tuple[float, float, float]:
+        choices = session.choices
+        return choices.width, choices.position, choices.amplitude_mm
+
     session.play(position=0.2, amplitude_mm=6)
     assert not session.undo_words
     hand.change(width=0.2)
     session.play(position=0.7, amplitude_mm=2)
     session.undo()
-    assert (session.choices.width, session.choices.position, session.choices.amplitude_mm) == (0.06, 0.7, 2)
-    assert not session.undo_words
+    assert (state(), session.undo_words) == ((0.06, 0.7, 2), "")
     session.play(position=0.3)
     session.redo()  # a note forgets nothing of what was undone
-    assert (session.choices.width, session.choices.position) == (0.2, 0.3)
-
-
-def test_a_drag_after_a_note_goes_back_to_where_the_note_was(hand: Hand) -> None:
-    session = hand.session
-    session.play(position=0.7)
+    assert state() == (0.2, 0.3, 2)
     session.hold()
-    hand.change(position=0.5, amplitude_mm=2)
-    session.play(position=0.3)  # played while the knob is in the other hand
-    hand.change(amplitude_mm=3)
+    hand.change(position=0.5, amplitude_mm=3)
+    session.play(position=0.9)  # played while the knob is in the other hand
+    hand.change(amplitude_mm=5)
     session.release()
     session.undo()
-    assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)
+    assert state() == (0.2, 0.3, 2), "back to where the note was"
 
 
 def pickup_of(session: Session) -> tuple[object, ...]:
@@ -122,25 +133,21 @@ def pickup_of(session: Session) -> tuple[object, ...]:
     return choices.stereo, choices.pickup, choices.listen, choices.instrument and choices.instrument.pickup
 
 
-def test_where_a_instrument_is_heard_is_one_step_of_undo(hand: Hand, guitar: Instrument) -> None:
-    hand.session.update(played=guitar)
-    states, words = [pickup_of(hand.session)], []
-    for change in ({"pickup": "velocity"}, {"stereo": not hand.session.choices.stereo}, {"listen": 0.11}):
-        hand.change(1, **change)
-        states.append(pickup_of(hand.session))
-        words.append(hand.session.undo_words)
-    assert words == ["pick-up", "stereo", "listening point"]
-    for there, back in ((states[:-1][::-1], hand.session.undo), (states[1:], hand.session.redo)):
-        for state in there:
-            back()
-            assert pickup_of(hand.session) == state
-    assert not hand.session.redo_words
-
-
-def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(hand: Hand, guitar: Instrument) -> None:
+def test_what_is_played_and_where_it_is_heard_are_steps(hand: Hand, guitar: Instrument) -> None:
     session = hand.session
     session.update(played=guitar)
     own = pickup_of(session)
+    states, words = [own], []
+    changes = ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11})
+    for change in changes:
+        hand.change(1, **change)
+        states.append(pickup_of(session))
+        words.append(session.undo_words)
+    assert words == ["pick-up", "stereo", "listening point"]
+    for there, act in ((states[-2::-1], session.undo), (states[1:], session.redo), (states[-2::-1], session.undo)):
+        for state in there:
+            act()
+            assert pickup_of(session) == state
     hand.now_s += 1
     session.play_string()
     hand.change(1, listen=0.9)

@@ -1,6 +1,6 @@
 """The laws of every control, plot and dialog: a name, the keyboard alone, both themes, room, and no thread left.
 
-Views are found in their modules; one that needs arguments has a maker here. Every test checks that no thread is left.
+Views are found in their modules, and given arguments by their annotations; a few have a maker here.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -45,95 +46,56 @@ from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.shared.parameters import OF_CHOICES
 from app.views import theme
-from app.views.controls import (
-    browser,
-    browser_rows,
-    choosers,
-    deck,
-    drop_sign,
-    elided_label,
-    focus_ring,
-    form,
-    knob,
-    notice_bar,
-    number_box,
-    overflow,
-    plain,
-    progress_strip,
-    segments,
-    sideways,
-)
-from app.views.dialogs import (
-    abx_dialog,
-    abx_pages,
-    export_dialog,
-    export_pages,
-    help_dialog,
-    learn_dialog,
-)
+from app.views.controls.browser_rows import BrowserColumn
+from app.views.controls.choosers import FilterButton
+from app.views.controls.deck import Deck
+from app.views.controls.notice_bar import NoticeBar
+from app.views.controls.plain import Label
+from app.views.dialogs.abx_dialog import AbxDialog
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import Kind
+from app.views.dialogs.learn_dialog import LearnDialog
 from app.views.file_places import FilePlaces
-from app.views.instrument import instrument_card
-from app.views.plots import figures_table, kept_plot, legend, plots, time_plot
-from app.views.plots import plot as plot_module
+from app.views.instrument.instrument_card import instrument_browser
+from app.views.plots import plots
+from app.views.plots.figures_table import FigureColumn
+from app.views.plots.time_plot import TimePlot
 from tests.app.conftest import make_sound
 from tests.app.gestures import picture
 from tests.app.places import choose_files
 
 BASES = {"ChoiceBar", "ExportPage", "Form", "Playable", "StageView", "WorkDialog", "ZoomPlot"}
 SCREEN = 1280, 720
-MATERIAL = AbxRecord(
-    a=Candidate(label="Model", preset="small", preset_sha256="0f" * 32),
-    b=Candidate(label="Truth", preset="small", preset_sha256="0f" * 32),
-    pluck={"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1},
-    through={"volume_db": 0.0},
-    planned_trials=1,
-    seed=0,
-)
-
-
-def made_deck() -> QWidget:
-    made = deck.Deck("Views")
-    for key in ("first", "second"):
-        made.add(key, key, plain.Label(key))
-    return made
-
-
-def filtered() -> QWidget:
-    made = choosers.FilterButton("presets", lambda: None)
-    made.show_listed(2, 3)
-    return made
-
-
-def with_ring() -> QWidget:
-    plot = time_plot.TimePlot("A plot", "A tip")
-    focus_ring.FocusRing(plot)
-    return plot
-
-
-def notice() -> QWidget:
-    made = notice_bar.NoticeBar()
-    made.report("No sound.", "device 3")
-    return made
-
-
-def made_legend() -> QWidget:
-    plot = time_plot.TimePlot("A plot", "A tip")
-    plot.legend = legend.Legend(plot)
-    return plot
-
-
-def export_at(kind: export_pages.Kind) -> Callable[[], QWidget]:
-    def make() -> QWidget:
-        made = export_dialog.ExportDialog((ExportChoices(), SampledChoices()), FilePlaces())
-        made.open_at(kind)
-        return made
-
-    return make
+SEGMENTS = [("a", "A", "The first"), ("b", "B", "The second")]
+ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "str": lambda: "A text",
+    "int": lambda: 16,
+    "float": lambda: 1,
+    "tuple[float, float]": lambda: (0, 5),
+    "Handler": lambda: print,
+    "Path": lambda: Path(__file__),
+    "QWidget": lambda: TimePlot("A plot", "A tip"),
+    "pg.PlotWidget": lambda: TimePlot("A plot", "A tip"),
+    "Parameter": lambda: OF_CHOICES["position"],
+    "FilePlaces": FilePlaces,
+    "FileKind": lambda: "note",
+    "AbxChoices": AbxChoices,
+    "ExportChoices": ExportChoices,
+    "SampledChoices": SampledChoices,
+    "Remembered": lambda: (ExportChoices(), SampledChoices()),
+    "Sequence[str]": lambda: ("Model", "Truth"),
+    "Sequence[tuple[str, str]]": lambda: [("A view", "All")],
+    "Iterable[tuple[str, str]]": lambda: [("F1", "Help")],
+    "Iterable[tuple[str, str, str]]": lambda: SEGMENTS,
+    "Sequence[BrowserColumn]": lambda: (BrowserColumn("Name"),),
+    "Sequence[FigureColumn]": lambda: [FigureColumn("name", "name", "a name")],
+}
+PAGES = {"ExportDialog": "note", **{f"{page.title()}Page": page for page in get_args(Kind)}}
 
 
 def learn() -> QWidget:
     sound = make_sound()
-    made = learn_dialog.LearnDialog(Path(__file__), sound)
+    made = LearnDialog(Path(__file__), sound)
     made.finished.connect(sound.close)
     return made
 
@@ -141,68 +103,40 @@ def learn() -> QWidget:
 def abx() -> QWidget:
     rendered: Future[dict[str, np.ndarray]] = Future()
     rendered.set_result({name: np.ones((480, 1), np.float32) for name in ("model", "truth")})
+    a, b = (Candidate(label=label, preset="small", preset_sha256="0f" * 32) for label in ("Model", "Truth"))
+    pluck = {"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1}
+    material = AbxRecord(a=a, b=b, pluck=pluck, through={"volume_db": 0.0}, planned_trials=1, seed=0)
     sound = make_sound()
-    made = abx_dialog.AbxDialog(sound, MATERIAL, AbxChoices(), lambda rate_hz: rendered, FilePlaces())
+    made = AbxDialog(sound, material, AbxChoices(), lambda rate_hz: rendered, FilePlaces())
     made.finished.connect(sound.close)
     return made
 
 
-def with_name(part: QWidget) -> QWidget:
-    """A part, named as by its owner."""
-    part.setAccessibleName("A part")
-    part.setToolTip("A tip")
-    return part
-
-
-def with_text(label: QLabel) -> QLabel:
-    label.setText("A text")
-    return label
-
-
-MAKERS: dict[type[QWidget], Callable[[], QWidget]] = {
-    browser.Browser: instrument_card.instrument_browser,
-    browser_rows.RowList: lambda: with_name(browser_rows.RowList((browser_rows.BrowserColumn("Name"),))),
-    deck.Deck: made_deck,
-    drop_sign.DropSign: lambda: with_text(drop_sign.DropSign(QWidget())),
-    elided_label.ElidedLabel: lambda: with_text(elided_label.ElidedLabel()),
-    choosers.FilterButton: filtered,
-    focus_ring.FocusRing: with_ring,
-    form.FilePicker: lambda: form.FilePicker(FilePlaces(), "note", "Where it is saved"),
-    knob.Knob: lambda: knob.Knob(OF_CHOICES["position"]),
-    choosers.NameButton: lambda: with_name(choosers.NameButton("A name", "A tip", print)),
-    number_box.NoteBox: lambda: number_box.NoteBox("Lowest key", "The lowest"),
-    notice_bar.NoticeBar: notice,
-    number_box.NumberBox: lambda: number_box.NumberBox("Length", (0, 5), 1, "The length", " m", 2),
-    number_box.CountBox: lambda: number_box.CountBox("Trials", 50, 16, "How many"),
-    overflow.Overflow: lambda: overflow.Overflow("the row"),
-    plain.Label: lambda: plain.Label("A text"),
-    plain.SteadyLabel: lambda: with_text(plain.SteadyLabel("A wide text")),
-    progress_strip.ProgressStrip: lambda: progress_strip.ProgressStrip("Progress"),
-    elided_label.Readout: lambda: with_text(elided_label.Readout()),
-    segments.Segments: lambda: segments.Segments("Surface", [("a", "A", "The first"), ("b", "B", "The second")]),
-    sideways.Sideways: lambda: sideways.Sideways(plain.Label("A text")),
-    figures_table.FiguresTable: lambda: figures_table.FiguresTable(
-        "Figures", [figures_table.FigureColumn("name", "name", "a name")]
-    ),
-    kept_plot.KeptPlot: lambda: kept_plot.KeptPlot("A plot", "A tip"),
-    legend.Legend: made_legend,
-    plot_module.Plot: lambda: plot_module.Plot("A plot", "A tip"),
-    time_plot.TimePlot: lambda: time_plot.TimePlot("A plot", "A tip"),
-    abx_pages.SetupPage: lambda: abx_pages.SetupPage("A pluck", ("Model", "Truth"), AbxChoices()),
-    abx_pages.TrialPage: lambda: abx_pages.TrialPage(("Model", "Truth")),
-    abx_dialog.AbxDialog: abx,
-    export_pages.WavForm: lambda: export_pages.WavForm(ExportChoices()),
-    export_pages.NotePage: export_at("note"),
-    export_pages.PerformancePage: export_at("performance"),
-    export_pages.ModelsPage: export_at("models"),
-    export_pages.SamplerPage: export_at("sampler"),
-    export_pages.PluginPage: export_at("plugin"),
-    export_dialog.ExportDialog: export_at("note"),
-    help_dialog.HelpDialog: lambda: help_dialog.HelpDialog(
-        [("F1", "Help")], [("A view", "All")], Path("log"), "About"
-    ),
-    learn_dialog.LearnDialog: learn,
-}
+def make(kind: type[QWidget]) -> QWidget:
+    """An empty one; a page within its dialog, and a part of a plot on one."""
+    if maker := {"LearnDialog": learn, "AbxDialog": abx, "Browser": instrument_browser}.get(kind.__name__):
+        return maker()
+    if page := PAGES.get(kind.__name__):
+        dialog = ExportDialog((ExportChoices(), SampledChoices()), FilePlaces())
+        dialog.open_at(page)
+        return dialog
+    needed = [each for each in inspect.signature(kind).parameters.values() if each.default is each.empty]
+    values = [ARGUMENTS[each.annotation]() for each in needed if each.kind is each.POSITIONAL_OR_KEYWORD]
+    made = kind(*values)
+    if kind.__name__ in ("Legend", "FocusRing"):
+        return values[0]
+    if kind.__name__ in ("NameButton", "RowList"):
+        made.setAccessibleName("A part")  # as its owner does
+    if isinstance(made, QLabel):
+        made.setText("A text")
+    if isinstance(made, FilterButton):
+        made.show_listed(2, 3)
+    if isinstance(made, NoticeBar):
+        made.report("No sound.", "device 3")
+    if isinstance(made, Deck):
+        for key in ("first", "second"):
+            made.add(key, key, Label(key))
+    return made
 
 
 def found_views() -> Iterator[type[QWidget]]:
@@ -217,19 +151,13 @@ VIEWS = list(found_views())
 
 
 @pytest.fixture(scope="module")
-def themes(qapp: QApplication) -> Iterator[None]:
-    """Plots follow the theme; afterwards all is as it was."""
-    style, palette, font = qapp.styleSheet(), qapp.palette(), qapp.font()
-    theme.apply_theme(qapp, "dark")
+def themes(own_look: QApplication) -> Iterator[None]:
+    """Plots follow the theme."""
+    theme.apply_theme(own_look, "dark")
     plots.recolour(theme.present, theme.present)
     theme.changes.theme_changed.connect(plots.recolour)
     yield
     theme.changes.theme_changed.disconnect(plots.recolour)
-    theme.use(theme.DARK)
-    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
-    qapp.setStyleSheet(style)
-    qapp.setPalette(palette)
-    qapp.setFont(font)
 
 
 @pytest.fixture
@@ -241,7 +169,7 @@ def size_percent() -> int:
 @contextmanager
 def shown(kind: type[QWidget], qtbot: QtBot) -> Iterator[QWidget]:
     """An empty one: a dialog alone, another in the column of a window."""
-    made = MAKERS.get(kind, kind)()
+    made = make(kind)
     window = made if isinstance(made, QDialog) else QWidget()
     qtbot.addWidget(window)
     if window is not made:
@@ -253,10 +181,10 @@ def shown(kind: type[QWidget], qtbot: QtBot) -> Iterator[QWidget]:
     made.show()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
-    if isinstance(made, learn_dialog.LearnDialog):
+    if isinstance(made, LearnDialog):
         qtbot.waitUntil(made.start.isEnabled)
     yield made
-    made.abandon() if isinstance(made, abx_dialog.AbxDialog) else window.close()
+    made.abandon() if isinstance(made, AbxDialog) else window.close()
     assert not window.isVisible()
 
 
