@@ -19,7 +19,10 @@ Show = Callable[..., Any]
 def show(qtbot: QtBot) -> Show:
     """A function that shows a widget, in a size if that is given, and returns it."""
 
+    kept = []
+
     def shown(widget: QWidget, *size: int) -> QWidget:
+        kept.append(widget)
         qtbot.addWidget(widget)
         if size:
             widget.resize(*size)

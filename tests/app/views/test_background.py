@@ -41,36 +41,25 @@ def background(qtbot: QtBot, threads_begun: Callable[[], list[str]]) -> Iterator
     assert threads_begun() == []
 
 
-def test_a_job_reports_and_returns_here(qtbot: QtBot, background: Background) -> None:
+def test_a_job_reports_and_returns_here(
+    qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Shares are reported now and then, and each result at once."""
+    monkeypatch.setattr(worker, "REPORT_EVERY_S", 60.0)  # each takes a breath, which may be long
     here, seen = threading.get_ident(), []
     background.progressed.connect(lambda *values: seen.append((*values, threading.get_ident())))
 
     def work(job: Job) -> str:
         assert threading.get_ident() != here
-        job.report(0.5, "the first half", so_far="half")
+        for count in range(20):
+            job.report(0.05 * count, "words", so_far=count if count >= 18 else None)
         return "whole"
 
     with qtbot.waitSignal(background.finished) as finished:
         background.start(work)
         assert background.busy
-    assert finished.args == ["whole"]
-    assert seen == [(0.5, "the first half", "half", here)]
-    assert not background.busy
-
-
-def test_shares_are_reported_now_and_then_and_each_result_at_once(
-    qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worker, "REPORT_EVERY_S", 60.0)  # each takes a breath, which may be long
-    progress = reported(background.progressed)
-
-    def work(job: Job) -> None:
-        for count in range(20):
-            job.report(0.05 * count, so_far=count if count >= 18 else None)
-
-    with qtbot.waitSignal(background.finished):
-        background.start(work)
-    assert [so_far for _, _, so_far in progress] == [None, 18, 19]
+    assert finished.args == ["whole"] and not background.busy
+    assert seen == [(0.05 * count, "words", so_far, here) for count, so_far in ((0, None), (18, 18), (19, 19))]
 
 
 def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot: QtBot, background: Background) -> None:
@@ -96,9 +85,7 @@ def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot: Qt
     assert progress == []
 
 
-def test_a_job_that_is_stopped_reports_its_end_and_one_may_be_waited_for(
-    qtbot: QtBot, background: Background
-) -> None:
+def test_a_stopped_job_reports_its_end_and_one_may_be_waited_for(qtbot: QtBot, background: Background) -> None:
     endless, under_way, done = Endless(), threading.Event(), []
     background.start(endless)
     assert endless.under_way.wait(10)
@@ -118,19 +105,18 @@ def test_a_job_that_is_stopped_reports_its_end_and_one_may_be_waited_for(
     assert done == [True]
 
 
-@pytest.mark.parametrize(
-    ("error", "message", "has_details"),
-    [(PresetError("x: broken"), "x: broken", False), (ZeroDivisionError("none"), "Computing failed: none", True)],
-)
-def test_errors_are_reported_and_the_thread_lives_on(
-    qtbot: QtBot, background: Background, error: Exception, message: str, has_details: bool
-) -> None:
-    def fail(job: Job) -> None:
-        raise error
+def test_errors_are_reported_and_the_thread_lives_on(qtbot: QtBot, background: Background) -> None:
+    for error, message, has_details in (
+        (PresetError("x: broken"), "x: broken", False),
+        (ZeroDivisionError("none"), "Computing failed: none", True),
+    ):
 
-    with qtbot.waitSignal(background.failed) as failed:
-        background.start(fail)
-    assert (failed.args[0], bool(failed.args[1])) == (message, has_details)
+        def fail(job: Job, error: Exception = error) -> None:
+            raise error
+
+        with qtbot.waitSignal(background.failed) as failed:
+            background.start(fail)
+        assert (failed.args[0], bool(failed.args[1])) == (message, has_details)
     with qtbot.waitSignal(background.finished):
         background.start(lambda job: None)
 
@@ -146,18 +132,16 @@ class Counting:
         return self.done == 10
 
     def advance(self) -> bool:
-        if self.done >= self.allowed:
-            return False
-        self.done += 1
-        return True
+        more = self.done < self.allowed
+        self.done += more
+        return more
 
 
-def test_what_grows_is_kept_up_with_and_only_the_latest(qtbot: QtBot, background: Background) -> None:
+def test_the_latest_that_grows_alone_is_kept_up_with(qtbot: QtBot, background: Background) -> None:
     old, new = Counting(allowed=3), Counting(allowed=4)
     for growing in (old, new):
         background.start(lambda job, growing=growing: keep_up(growing, job))
         qtbot.waitUntil(lambda growing=growing: growing.done == growing.allowed)
-    old.allowed = new.allowed = 10
     with qtbot.waitSignal(background.finished):  # of `new`: `old` was given up before it began
-        pass
+        old.allowed = new.allowed = 10
     assert (old.done, new.done) == (3, 10)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtGui import Qt as GuiQt
@@ -35,12 +34,6 @@ from tests.app.places import places_in
 EVIL = "<img src=evil>"
 
 
-@pytest.fixture
-def entry(small_preset: Path) -> PresetEntry:
-    words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
-    return PresetEntry(f"name {EVIL}", Path("/x") / f"{EVIL}.safetensors", replace(read_info(small_preset), **words))
-
-
 def formatted(root: QWidget) -> Iterator[str]:
     """Every text beneath a widget that Qt would take for HTML: labels, editors, tips."""
     for label in [*root.findChildren(QLabel), *([root] if isinstance(root, QLabel) else [])]:
@@ -64,61 +57,46 @@ def texts(root: QObject) -> str:
 
 
 def test_no_view_that_holds_a_files_text_takes_it_for_markup(
-    qtbot: QtBot, entry: PresetEntry, tmp_path: Path
+    qtbot: QtBot, small_preset: Path, tmp_path: Path
 ) -> None:
-    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
+    """An instrument's name can hold no markup, for it is a file's; its other texts can."""
+    words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
+    path = Path("/x") / f"{EVIL}.safetensors"
+    entry = PresetEntry(f"name {EVIL}", path, replace(read_info(small_preset), **words))
+    guitar = read_instrument(SHIPPED / "classical_guitar.json")
+    macros = tuple(macro.model_copy(update={"name": EVIL}) for macro in guitar.macros)
+    body = guitar.body.model_copy(update={"name": EVIL})
+    instrument = guitar.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
+    notices, bar, slots, readout = NoticeBar(), PresetBar(), SlotButtons(), Readout()
+    presets, instruments, panel = preset_browser(), instrument_browser(), InstrumentPanel()
     dialog = ExportDialog((ExportChoices(), SampledChoices()), places_in(tmp_path / EVIL))
-    instrument = read_instrument(SHIPPED / "classical_guitar.json")
-    note = heard_note(Choices(single=entry.name), Library([entry]), None)
-    dialog.show_subjects({"note": note, "sampler": HeardInstrument(instrument, entry)})
-    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
+    views: list[QWidget] = [notices, bar, bar.card, slots, presets, instruments, panel, readout, dialog]
     for view in views:
         qtbot.addWidget(view)
+    note = heard_note(Choices(single=entry.name), Library([entry]), None)
+    dialog.show_subjects({"note": note, "sampler": HeardInstrument(guitar, entry)})
     notices.report(f"{EVIL}: tensor {EVIL} is unknown", EVIL)
     notices.show_all()
     bar.set_chosen(entry)
     slots.set_entries([entry])
     slots.show_choices(Choices(a=f"preset:{entry.name}", b="difference"))
-    browser.show_rows([preset_row(entry)], (), entry.name, str(tmp_path / EVIL))
+    presets.show_rows([preset_row(entry)], (), entry.name, str(tmp_path / EVIL))
     readout.report(EVIL)
-    for view in views:
-        assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
-    assert "evil" in texts(notices)  # and it is shown
-
-
-def test_a_instrument_is_shown_as_it_is(qtbot: QtBot) -> None:
-    """Its name can hold no markup, for it is a file's; its other texts can."""
-    instrument = read_instrument(SHIPPED / "classical_guitar.json")
-    macros = tuple(macro.model_copy(update={"name": EVIL}) for macro in instrument.macros)
-    body = instrument.body.model_copy(update={"name": EVIL})
-    instrument = instrument.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
-    entry = InstrumentEntry(Path("/x") / f"{EVIL}.json", instrument)
-    panel, browser = InstrumentPanel(), instrument_browser()
-    views: list[QWidget] = [panel, browser]
-    for view in views:
-        qtbot.addWidget(view)
     panel.bar.show_instrument(instrument, own=True, changed=True)
     panel.bar.show_note(EVIL)
     panel.knobs.facts.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
-    browser.show_rows([instrument_row(entry)], (), entry.name, EVIL)
+    own = InstrumentEntry(Path("/x") / f"{EVIL}.json", instrument)
+    instruments.show_rows([instrument_row(own)], (), own.name, EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
-        assert "evil" in texts(view)
+    assert all("evil" in texts(view) for view in (notices, panel, instruments)), "and it is shown"
 
 
-def test_labels_are_made_in_one_place() -> None:
+def test_labels_are_made_in_one_place_and_show_the_text_as_it_is(qtbot: QtBot) -> None:
     """A QLabel of its own would look at its text and guess; the preset's card alone is HTML, and escapes."""
-    app = Path(__file__).parents[3] / "app"
-    made = [
-        path.relative_to(app).as_posix()
-        for path in sorted(app.rglob("*.py"))
-        if "QLabel(" in path.read_text("utf-8").replace("(QLabel)", "")
-    ]
-    assert made == []
-
-
-def test_a_tip_or_a_label_shows_what_it_is_given(qtbot: QtBot) -> None:
+    sources = sorted((Path(__file__).parents[3] / "app").rglob("*.py"))
+    assert [each for each in sources if "QLabel(" in each.read_text("utf-8").replace("(QLabel)", "")] == []
     label = Label(EVIL)
     qtbot.addWidget(label)
     assert label.textFormat() == Qt.TextFormat.PlainText

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
 
 import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
@@ -20,42 +19,25 @@ from app.views.plots.plots import recolour
 from app.window.panels.waveform import WaveformPanel
 from tests.app.gestures import picture
 
-BOTH = pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
-CHOICES = (("dark", theme.DARK), ("light", theme.LIGHT))
 
-
-@pytest.fixture
-def own_look(qapp: QApplication) -> Iterator[QApplication]:
-    """The application, whose look is as before afterwards."""
-    style, palette, font = qapp.styleSheet(), qapp.palette(), qapp.font()
-    yield qapp
-    theme.use(theme.DARK)
-    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
-    qapp.setStyleSheet(style)
-    qapp.setPalette(palette)
-    qapp.setFont(font)
-
-
-@BOTH
-def test_text_can_be_read_on_every_ground(chosen: theme.Theme) -> None:
+@pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen: theme.Theme) -> None:
+    """Else a plot could not know which role to take on."""
     for ground in (chosen.background, chosen.panel, chosen.raised, chosen.ground_top, chosen.ground_bottom):
         for text in (chosen.text, chosen.faint, chosen.model, chosen.truth, chosen.warning, chosen.good):
             assert theme.contrast(text, ground) >= 4.5, (text, ground)
     for filled in (chosen.model, chosen.truth, chosen.good):  # the text of a checked button
         assert theme.contrast(chosen.background, filled) >= 4.5
-
-
-@BOTH
-def test_no_two_roles_share_a_colour(chosen: theme.Theme) -> None:
-    """Else a plot could not know which role to take on."""
     colours = chosen.colours.values()
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
 
 
-def test_the_choice_is_put_on_and_a_checked_box_has_a_tick_that_is_seen(qtbot: QtBot, own_look: QApplication) -> None:
-    for choice, chosen in CHOICES:
-        theme.apply_theme(own_look, choice)  # type: ignore[arg-type]
-        assert theme.present == chosen
+def test_the_choice_is_put_on_with_larger_text_a_tick_that_is_seen_and_maps_on_its_ground(
+    qtbot: QtBot, own_look: QApplication
+) -> None:
+    for choice, chosen in (("dark", theme.DARK), ("light", theme.LIGHT)):
+        theme.apply_theme(own_look, choice, 150)  # type: ignore[arg-type]
+        assert theme.present == replace(chosen, scale=1.5)
         assert chosen.panel in own_look.styleSheet()
         assert own_look.palette().window().color() == QColor(chosen.background)
         box = QCheckBox("tick")
@@ -68,6 +50,10 @@ def test_the_choice_is_put_on_and_a_checked_box_has_a_tick_that_is_seen(qtbot: Q
         assert QColor(chosen.background).rgb() in seen  # and the tick stands out from it
         box.setChecked(False)
         assert picture(box) != image
+        for made, ground_at in ((level_map, 0.0), (share_map, 0.0), (error_map, 0.5), (displacement_map, 0.5)):
+            ground, much = made().map([ground_at, 1.0], mode="qcolor")
+            assert theme.contrast(ground.name(), chosen.panel) < 1.25
+            assert theme.contrast(much.name(), chosen.panel) > 3
 
 
 def test_plots_take_on_another_theme_and_come_back(
@@ -97,13 +83,3 @@ def test_plots_take_on_another_theme_and_come_back(
         assert view.plot.backgroundBrush().color() == QColor(new.panel)
         assert item.getAxis("left").textPen().color() == QColor(new.faint)
         assert stranger.opts["pen"].color() == QColor("#123456")
-
-
-def test_maps_of_colours_lie_on_the_ground_of_the_theme_also_with_larger_text(own_look: QApplication) -> None:
-    """What is nothing is as light, or as dark, as the panel; what is much is not."""
-    for choice, chosen in CHOICES:
-        theme.apply_theme(own_look, choice, 150)  # type: ignore[arg-type]
-        for made, ground_at in ((level_map, 0.0), (share_map, 0.0), (error_map, 0.5), (displacement_map, 0.5)):
-            ground, much = made().map([ground_at, 1.0], mode="qcolor")
-            assert theme.contrast(ground.name(), chosen.panel) < 1.25
-            assert theme.contrast(much.name(), chosen.panel) > 3

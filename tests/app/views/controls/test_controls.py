@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
+from collections.abc import Callable
+from typing import Any
+
 from PySide6.QtWidgets import QApplication, QLabel, QMenu
 from pytestqt.qtbot import QtBot
 
@@ -13,9 +15,8 @@ from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
 from tests.app.gestures import Paints, picture
 
 
-def test_every_entry_is_in_its_menu_and_undo_says_what_it_would_change(qtbot: QtBot) -> None:
-    made = AppMenu()
-    qtbot.addWidget(made)
+def test_every_entry_is_in_its_menu_and_undo_says_what_it_would_change(show: Callable[..., Any]) -> None:
+    made = show(AppMenu())
     menus = {action.text(): action.menu() for action in made.actions()}
     assert list(menus) == list(MENUS)
     for title, entries in MENUS.items():
@@ -27,9 +28,8 @@ def test_every_entry_is_in_its_menu_and_undo_says_what_it_would_change(qtbot: Qt
     assert (made.action["undo"].text(), made.action["redo"].text()) == ("Undo: tension && length", "Redo")
 
 
-def test_the_longest_wording_that_fits_is_shown(qtbot: QtBot) -> None:
-    label = ElidedLabel()
-    qtbot.addWidget(label)
+def test_the_longest_wording_that_fits_is_shown(show: Callable[..., Any]) -> None:
+    label = show(ElidedLabel())
     wordings = ("1.305 s   106 Hz   -63.2 dB", "106 Hz   -63.2 dB", "-63.2 dB")
     label.say(*wordings)
     for words in wordings:
@@ -40,12 +40,12 @@ def test_the_longest_wording_that_fits_is_shown(qtbot: QtBot) -> None:
     assert label.text() == wordings[0]
 
 
-def test_the_meter_is_painted_when_it_looks_another_way_and_not_sixty_times_a_second(qtbot: QtBot) -> None:
-    meter = Meter()
-    qtbot.addWidget(meter)
+def test_the_meter_is_painted_when_it_looks_another_way_and_not_sixty_times_a_second(
+    show: Callable[..., Any],
+) -> None:
+    meter = show(Meter())
     meter.resize(meter.sizeHint())
-    with qtbot.waitExposed(meter):
-        meter.show()
+    QApplication.processEvents()
     paints = Paints(meter)
 
     def painted(*levels: tuple[float, bool]) -> int:
@@ -65,15 +65,10 @@ def test_the_meter_is_painted_when_it_looks_another_way_and_not_sixty_times_a_se
     assert not meter.limit_light and picture(meter) == dark
 
 
-@pytest.fixture
-def bar(qtbot: QtBot) -> NoticeBar:
-    made = NoticeBar()
-    qtbot.addWidget(made)
-    qtbot.addWidget(made.bell)
-    return made
-
-
-def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(bar: NoticeBar) -> None:
+def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(qtbot: QtBot) -> None:
+    bar = NoticeBar()
+    for widget in (bar, bar.bell):
+        qtbot.addWidget(widget)
     bar.report("No sound.", "device 3")
     bar.inform("Disk full.")
     for _ in range(100):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -19,17 +19,15 @@ Key = Qt.Key
 
 
 @pytest.fixture
-def knob(qtbot: QtBot) -> Iterator[Knob]:
+def knob(qtbot: QtBot, show: Callable[..., QWidget]) -> Knob:
     """From 0 to 20 by 0.25, at 4, in an active window; it follows what is asked."""
     window = QWidget()
-    qtbot.addWidget(window)
     made = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
     made.resize(made.sizeHint())
     made.value_asked.connect(made.set_value)
-    window.show()
-    window.activateWindow()
+    show(window).activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
-    yield made
+    return made
 
 
 def type_in(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key) -> None:
@@ -63,34 +61,30 @@ def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot:
     assert drags == [(), ()]
 
 
-@pytest.mark.parametrize(
-    ("turned", "held", "value"),
-    [((0, 120), NONE, 4.25), ((0, -240), NONE, 3.5), ((0, 120), SHIFT, 4.025), ((120, 0), SHIFT, 4.025)],
-)
-def test_the_wheel(knob: Knob, turned: tuple[int, int], held: Qt.KeyboardModifier, value: float) -> None:
-    assert turn_wheel(knob, PRESSED, QPoint(*turned), held)
-    assert knob.value == pytest.approx(value)
-
-
-@pytest.mark.parametrize(
-    ("key", "held", "value"),
-    [
-        (Key.Key_Up, NONE, 4.25),
-        (Key.Key_Left, NONE, 3.75),
-        (Key.Key_Right, SHIFT, 4.025),
-        (Key.Key_PageUp, NONE, 6.5),
-        (Key.Key_PageDown, NONE, 1.5),
+def test_the_wheel_and_keys(knob: Knob) -> None:
+    for turned, held, value in (
+        ((0, 120), NONE, 4.25),
+        ((0, -240), NONE, 3.5),
+        ((0, 120), SHIFT, 4.025),
+        ((120, 0), SHIFT, 4.025),
+    ):
+        knob.set_value(4.0)
+        assert turn_wheel(knob, PRESSED, QPoint(*turned), held)
+        assert knob.value == pytest.approx(value)
+    for key, held, value in (
+        (Key.Key_Up, NONE, 12.25),
+        (Key.Key_Left, NONE, 11.75),
+        (Key.Key_Right, SHIFT, 12.025),
+        (Key.Key_PageUp, NONE, 14.5),
+        (Key.Key_PageDown, NONE, 9.5),
         (Key.Key_Home, NONE, 0),
         (Key.Key_End, NONE, 20),
         (Key.Key_Delete, NONE, 4),
-    ],
-)
-def test_keys(knob: Knob, key: Qt.Key, held: Qt.KeyboardModifier, value: float) -> None:
-    if key == Key.Key_Delete:
-        knob.set_value(12)
-    press_keys(knob, key, held=held)
-    assert knob.value == pytest.approx(value)
-    assert keeps(knob, key) == (key in (Key.Key_PageUp, Key.Key_PageDown))  # shortcuts of the window
+    ):
+        knob.set_value(12.0)
+        press_keys(knob, key, held=held)
+        assert knob.value == pytest.approx(value), key
+        assert keeps(knob, key) == (key in (Key.Key_PageUp, Key.Key_PageDown))  # shortcuts of the window
 
 
 @pytest.mark.parametrize(
