@@ -27,11 +27,9 @@ from tests.app.places import choose_files
 from tests.app.questions import answered
 
 RATE_HZ = 48_000
-FRAMES = 4800
 HEADPHONES = AudioDevice("Headphones", "Test API", RATE_HZ)
-PLUCK: dict[str, object] = {"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1}
 A, B = (Candidate(label=label, preset="small", preset_sha256="0f" * 32) for label in ("Model", "Truth"))
-MATERIAL = AbxRecord(a=A, b=B, pluck=PLUCK, through={"volume_db": 0.0}, planned_trials=1, seed=0)
+MATERIAL = AbxRecord(a=A, b=B, pluck={"position": 0.4}, through={"volume_db": 0.0}, planned_trials=1, seed=0)
 Open = Callable[..., AbxDialog]
 Sounds = Mapping[str, NDArray[np.float32]]
 
@@ -53,7 +51,7 @@ def sound(
 
 
 def sounds_of(model_hz: float = 401.0, truth_hz: float = 400.0) -> Sounds:
-    time_s = np.arange(FRAMES)[:, None] / RATE_HZ
+    time_s = np.arange(4800)[:, None] / RATE_HZ
     sounds = {"model": 0.2 * np.sin(6.28 * model_hz * time_s), "truth": 0.3 * np.sin(6.28 * truth_hz * time_s)}
     return {source: samples.astype(np.float32) for source, samples in sounds.items()}
 
@@ -69,15 +67,15 @@ def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr("app.views.dialogs.abx_dialog.default_folder", lambda: tmp_path / "records")
 
     def open_dialog(
-        seed: int = 1, trials: int = 3, rendered: Future[Sounds] | None = None, through: Sound = sound
+        seed: int = 1, trials: int = 3, render: Callable[[int], Future[Sounds]] | None = None, through: Sound = sound
     ) -> AbxDialog:
+        rendered = render or (lambda rate_hz: done(sounds_of()))
         choices = AbxChoices(trials=trials)
-        rendering = rendered or done(sounds_of())
-        dialog = AbxDialog(through, MATERIAL, choices, lambda rate_hz: rendering, FilePlaces(), seed=lambda: seed)
+        dialog = AbxDialog(through, MATERIAL, choices, rendered, FilePlaces(), seed=lambda: seed)
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
         with qtbot.waitExposed(dialog):
             dialog.open()
-        if rendered is None and through is sound:
+        if render is None and through is sound:
             qtbot.waitUntil(start_button(dialog).isEnabled)
         return dialog
 
@@ -110,29 +108,10 @@ def saved(tmp_path: Path) -> AbxRecord:
     return AbxRecord.model_validate_json(path.read_bytes())
 
 
-def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
-    seed, order = 4, draw_order(4, 3)
-    dialog = open_dialog(seed)
-    start(dialog)
-    keys = {"A": ("1", "left"), "B": ("2", "right")}
-    for number, x in enumerate(order):
-        assert f"Trial {number + 1} of 3" in texts(dialog)
-        assert "right" not in texts(dialog)
-        press(qtbot, dialog, "a", "b", "x", " ", keys[x][number % 2])
-    text = texts(dialog)
-    assert "3 of 3 right" in text
-    assert "p = 0.125" in text
-    record = saved(tmp_path)
-    assert str(tmp_path / "records") in text
-    assert (record.seed, record.correct, record.complete) == (seed, 3, True)
-    assert [trial.x for trial in record.trials] == list(order)
-    assert (record.through["device"], record.through["rate_hz"]) == ("Headphones", RATE_HZ)
-    assert (record.a.label, record.b.label) == ("Model", "Truth")
-    assert record.a.gain_db == pytest.approx(0, abs=0.01)
-    assert record.b.gain_db == pytest.approx(-3.52, abs=0.02)
-
-
-def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_whole_test_by_keyboard(
+    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A key sounds what it says, and X must be heard before it is judged."""
     heard: list[str] = []
 
     class Heard(Pair):
@@ -141,43 +120,45 @@ def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, monkeypatch:
             super().select(name)
 
     monkeypatch.setattr("app.views.dialogs.abx_dialog.Pair", Heard)
-    dialog = open_dialog(seed=2)
+    seed, order = 4, draw_order(4, 3)
+    dialog = open_dialog(seed)
     start(dialog)
-    assert draw_order(2, 3)[0] == "B"
-    press(qtbot, dialog, "a", "b", "x", "a", "x")
-    assert heard == ["A", "B", "B", "A", "B"]
-
-
-def test_x_must_be_heard_before_it_is_judged(qtbot: QtBot, open_dialog: Open) -> None:
-    dialog = open_dialog()
-    start(dialog)
-    press(qtbot, dialog, "1", "a", "b", "2", "right")
-    assert "Trial 1 of 3" in texts(dialog)
-    press(qtbot, dialog, "x", "1", "1")
-    assert "Trial 2 of 3" in texts(dialog)
+    keys = {"A": ("1", "left"), "B": ("2", "right")}
+    for number, x in enumerate(order):
+        press(qtbot, dialog, "1", "a", "b", "2", "right")
+        assert f"Trial {number + 1} of 3" in texts(dialog)
+        assert "right" not in texts(dialog)
+        press(qtbot, dialog, "x")
+        assert heard[-3:] == ["A", "B", x]
+        press(qtbot, dialog, " ", keys[x][number % 2])
+    text, record = texts(dialog), saved(tmp_path)
+    for words in ("3 of 3 right", "p = 0.125", str(tmp_path / "records")):
+        assert words in text
+    assert (record.seed, record.correct, record.complete) == (seed, 3, True)
+    assert [trial.x for trial in record.trials] == list(order)
+    assert (record.through["device"], record.through["rate_hz"]) == ("Headphones", RATE_HZ)
+    assert (record.a.label, record.b.label) == ("Model", "Truth")
+    assert (record.a.gain_db, record.b.gain_db) == pytest.approx((0, -3.52), abs=0.02)
 
 
 def test_nothing_that_is_shown_depends_on_x(qtbot: QtBot, open_dialog: Open) -> None:
     """Two tests with another X: after the same keys the dialogs are the same, pixel by pixel, word by word."""
     seeds = [next(seed for seed in range(99) if "".join(draw_order(seed, 2)) == order) for order in ("AB", "BA")]
-    pictures, words = [], []
+    seen: list[list[object]] = []
     for seed in seeds:
         dialog = open_dialog(seed, trials=2)
         start(dialog)
-        pictures.append([])
-        words.append([])
+        seen.append([])
         for key in ("x", "a", "x", "b", "x", " ", "1", "x"):
             press(qtbot, dialog, key)
-            pictures[-1].append(dialog.grab().toImage())
-            widgets = [dialog, *dialog.findChildren(QWidget)]
-            words[-1].append(
-                [(w.objectName(), w.accessibleName(), w.accessibleDescription(), w.toolTip()) for w in widgets]
-                + [(texts(dialog), dialog.windowTitle(), "", "")]
-            )
+            words = [
+                (each.objectName(), each.accessibleName(), each.accessibleDescription(), each.toolTip())
+                for each in (dialog, *dialog.findChildren(QWidget))
+            ]
+            seen[-1].append((dialog.grab().toImage(), words, texts(dialog), dialog.windowTitle()))
         dialog.abandon()
-    assert words[0] == words[1]
-    assert pictures[0] == pictures[1]
-    assert pictures[0][0] != pictures[0][1]
+    assert seen[0] == seen[1]
+    assert seen[0][0] != seen[0][1]
 
 
 def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
@@ -220,44 +201,33 @@ def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> No
         assert not start_button(dialog).isEnabled()
 
 
-@pytest.mark.parametrize(("model_hz", "message", "can_start"), [(400.0, SAME, False), (900.0, TRIVIAL, True)])
-def test_a_test_without_a_point_is_reported(
-    qtbot: QtBot, open_dialog: Open, model_hz: float, message: str, can_start: bool
+@pytest.mark.parametrize(
+    ("sounds", "message", "can_start"),
+    [
+        (dict.fromkeys(("model", "truth"), sounds_of()["truth"]), SAME, False),
+        (sounds_of(900.0), TRIVIAL, True),
+        (sounds_of(), "", True),
+        (RuntimeError("the model's output diverges 0.1 s after the pluck"), "diverges", False),
+    ],
+    ids=["same", "trivial", "apart", "runs away"],
+)
+def test_sounds_are_waited_for_and_a_test_without_a_point_is_reported(
+    qtbot: QtBot, open_dialog: Open, sounds: Sounds | Exception, message: str, can_start: bool
 ) -> None:
-    sounds = sounds_of(model_hz)
-    if model_hz == 400:
-        sounds = dict.fromkeys(sounds, sounds["truth"])
-    dialog = open_dialog(rendered=done(sounds))
-    qtbot.waitUntil(lambda: message in texts(dialog))
+    rendered: Future[Sounds] = Future()
+    dialog = open_dialog(render=lambda rate_hz: rendered)
+    qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
+    assert not start_button(dialog).isEnabled()
+    rendered.set_exception(sounds) if isinstance(sounds, Exception) else rendered.set_result(sounds)
+    qtbot.waitUntil(lambda: message in texts(dialog) and "being rendered" not in texts(dialog))
     assert start_button(dialog).isEnabled() == can_start
 
 
-@pytest.mark.parametrize("runs_away", [False, True])
-def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open, runs_away: bool) -> None:
-    rendered: Future[Sounds] = Future()
-    dialog = open_dialog(rendered=rendered)
-    qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
-    if runs_away:
-        rendered.set_exception(RuntimeError("the model's output diverges 0.1 s after the pluck"))
-        qtbot.waitUntil(lambda: "diverges" in texts(dialog))
-    else:
-        rendered.set_result(sounds_of())
-        qtbot.waitUntil(start_button(dialog).isEnabled)
-    assert start_button(dialog).isEnabled() != runs_away
-
-
 def test_at_another_rate_of_the_device_it_is_rendered_again(
-    qtbot: QtBot, sound: Sound, devices: list[AudioDevice], tmp_path: Path
+    qtbot: QtBot, sound: Sound, devices: list[AudioDevice], open_dialog: Open
 ) -> None:
     asked: list[int] = []
-
-    def render(rate_hz: int) -> Future[Sounds]:
-        asked.append(rate_hz)
-        return done(sounds_of())
-
-    dialog = AbxDialog(sound, MATERIAL, AbxChoices(), render, FilePlaces())
-    qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
-    dialog.open()
+    dialog = open_dialog(render=lambda rate_hz: asked.append(rate_hz) or done(sounds_of()))
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):
         devices.append(AudioDevice("Loudspeaker", "Test API", rate_hz, channels))
         sound.open(devices[-1])
