@@ -1,12 +1,17 @@
-"""The export dialog: what it writes, remembers, and says when it cannot."""
+"""The export dialog: what its pages write, remember, and say when they cannot."""
 
 from __future__ import annotations
 
 import json
 import shutil
+import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 import soundfile
 from PySide6.QtCore import Qt
@@ -17,62 +22,65 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.note import HeardNote
+from app.export.plugin.formats import FORMATS, install_folder, this_target
+from app.export.plugin.identity import identifier
 from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
-from app.instruments.instrument import Instrument
-from app.instruments.library import SHIPPED as INSTRUMENTS
-from app.instruments.library import read_instrument
+from app.export.sampled.plan import SampledPlan
+from app.export.sampled.words import pitch_words
+from app.instruments.library import find_instrument
 from app.player.events import NoteOn
-from app.presets.library import Library, list_presets
+from app.presets.library import Library, PresetEntry, list_presets
 from app.rendering.note_sound import Struck
 from app.rendering.subject import path_of
 from app.session.choices import Choices
 from app.views import theme
 from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import PLUGIN_NAMES, PLUGIN_NOTE, SYSTEM_NAMES, HeardInstrument
 from app.window.exports import heard_note
 from engine.presets import SHIPPED
-from tests.app.places import places_in
+from tests.app.places import choose_files, places_in
 from tests.app.questions import answered
 
 Make = Callable[..., ExportDialog]
-GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
+GUITAR, HARP = (find_instrument(name).instrument for name in ("Classical guitar", "Concert harp"))
+SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
 
 
 @pytest.fixture
-def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
-    """Makes a dialog for two presets, `small` and `other`."""
+def library(small_preset: Path, tmp_path: Path) -> Library:
+    """Two presets, `small` and `other`, and one of any string."""
     folder = tmp_path / "presets"
     folder.mkdir()
     for name in ("small", "other"):
         shutil.copy(small_preset, folder / f"{name}.safetensors")
     shutil.copy(SHIPPED / "studio_any_string.safetensors", folder)
-    library = Library(list_presets(folder)[0])
-
-    def note(heard: dict[str, object]) -> HeardNote | None:
-        choices = Choices(single="small", position=0.4).changed(heard)
-        struck = Struck(choices.played, NoteOn(59, 100)) if isinstance(choices.played, Instrument) else None
-        return heard_note(choices, library, struck)
-
-    dialogs = []
-
-    def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
-        settings = {"rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
-        dialog = ExportDialog((ExportChoices.model_validate(settings), SampledChoices()), places_in(tmp_path))
-        dialogs.append(dialog)
-        qtbot.addWidget(dialog)
-        dialog.show_subjects({"note": note(heard or {})})
-        dialog.open_at("note")
-        return dialog
-
-    make.note = note  # type: ignore[attr-defined]
-    yield make
-    for dialog in dialogs:
-        dialog.accept()
+    return Library(list_presets(folder)[0])
 
 
 @pytest.fixture
-def dialog(made) -> ExportDialog:
-    return made()
+def folder(tmp_path: Path) -> Path:
+    made = tmp_path / "exports"
+    made.mkdir()
+    return made
+
+
+@pytest.fixture
+def open_at(qtbot: QtBot, folder: Path) -> Iterator[Callable[..., ExportDialog]]:
+    """A function that opens a dialog at a page of these remembered choices, for this subject."""
+    dialogs = []
+
+    def opened(page: Any, subject: Any, note: ExportChoices, sampled: SampledChoices) -> ExportDialog:
+        dialog = ExportDialog((note, sampled), places_in(folder))
+        dialogs.append(dialog)
+        qtbot.addWidget(dialog)
+        dialog.show_subjects({page: subject})
+        dialog.open_at(page)
+        return dialog
+
+    yield opened
+    for dialog in dialogs:
+        dialog.accept()
 
 
 def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
@@ -80,81 +88,110 @@ def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
     qtbot.waitUntil(lambda: words in dialog.state.text())
 
 
-def wavs(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.glob("*.wav"))
+def choose(box: Any, data: object) -> None:
+    box.setCurrentIndex(box.findData(data))
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def note(library: Library) -> Callable[..., HeardNote | None]:
+    """A note of `small`, as it is heard with these choices."""
+
+    def made(**heard: Any) -> HeardNote | None:
+        choices = Choices(single="small", position=0.4).changed(heard)
+        struck = Struck(choices.played, NoteOn(59, 100)) if choices.played else None  # type: ignore[arg-type]
+        return heard_note(choices, library, struck)
+
+    return made
+
+
+@pytest.fixture
+def made(open_at: Make, note: Callable[..., HeardNote | None]) -> Make:
+    """A function that opens the dialog for a note."""
+
+    def opened(more: dict[str, object] | None = None, **heard: Any) -> ExportDialog:
+        settings = {"rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
+        return open_at("note", note(**heard), ExportChoices.model_validate(settings), SampledChoices())
+
+    return opened
 
 
 def test_it_writes_the_file_that_it_named(
-    qtbot: QtBot, dialog: ExportDialog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot, made: Make, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    dialog = made()
     assert not dialog.show_folder.isVisible()
     run(qtbot, dialog, "Saved")
-    path = tmp_path / "A small string B3 medium.wav"
+    path = folder / "A small string B3 medium.wav"
     for words in (str(path), "dBFS, 0 clipped", "The model was trained on the first "):
         assert words in dialog.state.text()
     info = soundfile.info(path)
     assert (info.samplerate, info.frames, info.subtype) == (4000, 2000, "PCM_24")
-    assert wavs(tmp_path) == [path.name]
-    assert dialog.save.text() == "Replace"
+    assert names_in(folder) == [path.name] and dialog.save.text() == "Replace"
     opened: list[str] = []
     monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or True)
     dialog.show_folder.click()
-    assert opened == [str(tmp_path)]
+    assert opened == [str(folder)]
 
 
-def test_flac_is_chosen_in_the_list_or_by_the_ending_and_is_remembered(qtbot: QtBot, made, tmp_path: Path) -> None:
+def test_flac_is_chosen_in_the_list_or_by_the_ending_and_is_remembered(
+    qtbot: QtBot, made: Make, folder: Path
+) -> None:
     dialog = made({"format": "wav 32f"})
     edit, form = dialog.note.file.edit, dialog.wav["format"]
-    form.setCurrentIndex(form.findData("flac 16"))
+    choose(form, "flac 16")
     assert Path(edit.text()).name == "A small string B3 medium.flac"
-    form.setCurrentIndex(form.findData("wav 32f"))
+    choose(form, "wav 32f")
     edit.selectAll()
-    qtbot.keyClicks(edit, str(tmp_path / "mine.flac"))
-    assert (form.currentData(), edit.text()) == ("flac 24", str(tmp_path / "mine.flac")), "it has no floating point"
+    qtbot.keyClicks(edit, str(folder / "mine.flac"))
+    assert (form.currentData(), edit.text()) == ("flac 24", str(folder / "mine.flac")), "it has no floating point"
     run(qtbot, dialog, "Saved")
-    assert soundfile.info(tmp_path / "mine.flac").subtype == "PCM_24"
-    assert read_recipe(tmp_path / "mine.flac").bits == "24"
+    assert soundfile.info(folder / "mine.flac").subtype == "PCM_24"
+    assert read_recipe(folder / "mine.flac").bits == "24"
     assert made(dialog.choices()[0].model_dump()).note.file.edit.text().endswith("medium.flac")
-    form.setCurrentIndex(form.findData("wav 16"))
-    assert edit.text() == str(tmp_path / "mine.wav"), "a name that was given keeps its stem"
+    choose(form, "wav 16")
+    assert edit.text() == str(folder / "mine.wav"), "a name that was given keeps its stem"
 
 
-def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog = made({"source": "files"}, {"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
+def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made: Make, folder: Path) -> None:
+    dialog = made({"source": "files"}, stereo=True, listen_right=0.7, pickup="velocity")
     names = ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
     assert dialog.note.names.text() == "\n".join(names)
     run(qtbot, dialog, "Saved")
-    assert wavs(tmp_path) == names
-    with soundfile.SoundFile(tmp_path / names[0]) as file:
+    assert names_in(folder) == names
+    with soundfile.SoundFile(folder / names[0]) as file:
         recipe = json.loads(file.comment)
         assert (file.channels, recipe["listen_right"], recipe["pickup"]) == (2, 0.7, "velocity")
+    dialog.note.file.edit.clear()
+    QTest.keyClicks(dialog.note.file.edit, "guitar v1.2")  # without its suffix
+    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2 model.wav", "guitar v1.2 truth.wav"]
     dialog.note["source"].setCurrentIndex(0)
+    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2.wav"]
     assert dialog.note.names.isHidden()
 
 
-def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
+def test_it_follows_another_pluck_until_it_begins_and_cancel_leaves_nothing(
+    qtbot: QtBot, made: Make, note: Callable[..., HeardNote | None], folder: Path
+) -> None:
+    dialog = made()
+    dialog.show_subjects({"note": note(amplitude_mm=0.01, heard="b")})
+    assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
     dialog.note["seconds"].setValue(600)
     dialog.save.click()
+    dialog.show_subjects({"note": note()})
     assert dialog.close_button.text() == "Cancel"
     for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):
         with answered(key):
             QTest.keyClick(dialog, Qt.Key.Key_Escape)
         assert dialog.job is not None and dialog.isVisible()
     dialog.close_button.click()
-    qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text())
-    assert wavs(tmp_path) == []
-    assert list(tmp_path.glob(".*.unfinished")) == []
-
-
-def test_its_state_is_remembered(made, tmp_path: Path) -> None:
-    dialog = made()
-    dialog.note["source"].setCurrentIndex(dialog.note["source"].findData("difference"))
-    dialog.note["difference_gain_db"].setValue(30)
-    assert "difference.wav" in dialog.note.file.edit.text()
-    choices, _ = dialog.choices()
-    assert (choices.source, choices.seconds) == ("difference", 0.5)
-    assert choices.difference_gain_db == 30
-    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).choices()[0] == choices
+    assert "soft" in dialog.note.file.edit.text()
+    qtbot.waitUntil(lambda: "Cancelled; no file was written" in dialog.state.text())
+    assert "medium" in dialog.note.file.edit.text()
+    assert names_in(folder) == []
 
 
 @pytest.mark.parametrize(
@@ -169,77 +206,299 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
         ({}, {"a": "preset:gone"}, "model", "small"),
     ],
 )
-def test_what_is_heard_is_offered_first(
-    made, remembered: dict[str, object], heard: dict[str, object], source: str, preset: str
+def test_the_sound_that_is_heard_is_offered_first_and_the_choices_are_remembered(
+    made: Make, remembered: dict[str, object], heard: dict[str, object], source: str, preset: str
 ) -> None:
-    page = made(remembered, heard).note
+    dialog = made(remembered, **heard)
+    page = dialog.note
     assert page["source"].currentData() == source
     assert path_of(page.job().sound.preset).stem == preset
     if "solo" in heard:
         assert (page["difference_gain_db"].isVisible(), page["difference_gain_db"].value()) == (True, 36)
-        assert "All modes" in page.what.text()
+        assert "All modes" in page.what.text() and "difference.wav" in page.file.edit.text()
+    choices, _ = dialog.choices()
+    assert (choices.source, choices.seconds) == (source, 0.5)
+    assert made(choices.model_dump(), **heard).choices()[0] == choices
 
 
-def test_a_name_without_its_suffix_gets_it(made) -> None:
-    dialog = made({"source": "files"})
-    dialog.note.file.edit.clear()
-    QTest.keyClicks(dialog.note.file.edit, "guitar v1.2")
-    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2 model.wav", "guitar v1.2 truth.wav"]
-    dialog.note["source"].setCurrentIndex(0)
-    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2.wav"]
-
-
-def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_wanted(
-    qtbot: QtBot, made, tmp_path: Path
+def test_the_instruments_part_is_in_the_file_unless_the_string_alone_is_wanted(
+    qtbot: QtBot, made: Make, folder: Path
 ) -> None:
     """One line says which, with words and not in small print."""
-    dialog = made({}, {"played": GUITAR})
+    dialog = made({}, instrument=GUITAR)
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
     words = "Classical guitar with body, room, sympathetic strings and level, as it is heard"
     assert (page.through_words.text(), page.through_words.objectName()) == (words, "")
     run(qtbot, dialog, "Saved")
-    path = tmp_path / "Classical guitar B3 hard.wav"
-    struck = read_recipe(path).struck
+    path = folder / "Classical guitar B3 hard.wav"
+    struck, heard = read_recipe(path).struck, path.read_bytes()
     assert struck is not None and (struck.instrument, struck.key) == (GUITAR.name, 59)
     assert soundfile.info(path).channels == 2
-    heard = path.read_bytes()
     page.through.setChecked(False)
     assert page.through_words.text() == "The string alone, without Classical guitar"
     run(qtbot, dialog, "Rendering")
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices()[0].model_dump(), {"played": GUITAR})
+    again = made(dialog.choices()[0].model_dump(), instrument=GUITAR)
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
-def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made) -> None:
-    dialog, other = made(), made.note({"amplitude_mm": 0.01, "heard": "b"})
-    dialog.show_subjects({"note": other})
-    assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
-    dialog.note["seconds"].setValue(600)
-    dialog.save.click()
-    dialog.show_subjects({"note": made.note({})})
+def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, own_look: QApplication, made: Make) -> None:
+    theme.apply_theme(own_look, "dark", 150)
+    dialog = made(None, instrument=HARP)
+    texts = [dialog.note.what, dialog.note.through_words]
+    for long in (False, True):  # as it opens, and as a text changes
+        if long:
+            texts[0].setText("A pluck of a string, heard at two places. " * 3)
+        for text in texts:
+            qtbot.waitUntil(lambda text=text: text.height() >= text.heightForWidth(text.width()))
+    assert dialog.height() <= dialog.screen().availableSize().height()
+    theme.apply_theme(own_look, "dark")
+
+
+class Notes:
+    """In place of the instrument: decaying sines. After the `last` one each waits until `gate` is open."""
+
+    def __init__(self) -> None:
+        self.rendered: list[tuple] = []
+        self.gate = threading.Event()  # never closed again: a note that looks late finds it open
+        self.last = 10**6
+
+    def render_note(self, instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
+        assert len(self.rendered) < self.last or self.gate.wait(20)
+        advanced(seconds)
+        self.rendered.append((instrument, key, velocity, seconds, rate_hz, source))
+        time_s = np.arange(round(seconds * rate_hz)) / rate_hz
+        sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
+        return np.stack([sound] * len(instrument.pickup.points), axis=1).astype(np.float32)
+
+
+@pytest.fixture
+def notes(monkeypatch: pytest.MonkeyPatch) -> Iterator[Notes]:
+    made = Notes()
+    monkeypatch.setitem(sys.modules, "app.player.offline", SimpleNamespace(render_note=made.render_note))
+    yield made
+    made.gate.set()
+
+
+@pytest.fixture
+def preset(library: Library) -> PresetEntry:
+    return library.entries[0]
+
+
+@pytest.fixture
+def sampler(open_at: Make, preset: PresetEntry, notes: Notes) -> Make:
+    """A function that opens the dialog for the guitar and samplers."""
+
+    def opened(**choices: object) -> ExportDialog:
+        remembered = SampledChoices.model_validate({**SMALL, **choices})
+        return open_at("sampler", HeardInstrument(GUITAR, preset), ExportChoices(), remembered)
+
+    return opened
+
+
+def test_an_sfz_is_written_as_it_was_reported(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes) -> None:
+    dialog = sampler(rate_hz=44_100, source="truth", form="wav", bits="16")
+    assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.sampler.size_text.text()
+    run(qtbot, dialog, "Saved")
+    softer = "softer than the instrument, so that no note clips"
+    for words in (f"Saved {folder / 'Classical_guitar.sfz'} (6 samples, ", "peak -1.0 dBFS", softer):
+        assert words in dialog.state.text()
+    zones = SampledPlan(GUITAR, SMALL["keys"], layers=SMALL["layers"]).zones
+    assert [note[1:] for note in notes.rendered] == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
+    samples = [*map(soundfile.info, (folder / "Classical_guitar_samples").glob("*.wav"))]
+    assert [(each.samplerate, each.subtype) for each in samples] == 6 * [(44_100, "PCM_16")]
+    assert dialog.save.text() == "Replace"
+
+
+def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
+    qtbot: QtBot, sampler: Make, folder: Path, notes: Notes
+) -> None:
+    dialog = sampler()
+    form, text = dialog.sampler, dialog.sampler.size_text.text
+    for box, value, words in (
+        (form["layers"], 8, "24 samples (3 keys, 8 velocity layers)"),
+        (form["every"], 3, "8 samples (1 key, each for 3 keys, 8 velocity layers)"),
+    ):
+        box.setValue(value)
+        qtbot.waitUntil(lambda words=words: words in text())
+    for box, value in ((form.highest, 60), (form["every"], 1), (form["layers"], 1), (form["seconds"], 10)):
+        box.setValue(value)
+    pitch = pitch_words(SampledPlan(GUITAR, (60, 60), layers=1).pitch_error_cents)
+    counted = "1 sample (1 key, 1 velocity layer), at most"
+    qtbot.waitUntil(lambda: f"{counted} 2.9 MB, before FLAC compression; {pitch}" in text())
+    choose(form["form"], "sf2")
+    said = f"{counted} 1.9 MB (16-bit), and up to 2.9 MB more while it is written; {pitch}"
+    qtbot.waitUntil(lambda: said in text())
+    assert not form["bits"].isVisible()
     dialog.close_button.click()
-    assert "soft" in dialog.note.file.edit.text()
-    qtbot.waitUntil(lambda: "Cancelled; no file was written" in dialog.state.text())
-    assert "medium" in dialog.note.file.edit.text()
+    assert not dialog.isVisible() and names_in(folder) == [] and notes.rendered == []
 
 
-def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplication, made) -> None:
-    sheet, font = qapp.styleSheet(), qapp.font()
-    try:
-        theme.apply_theme(qapp, "dark", 150)
-        dialog = made(None, {"played": read_instrument(INSTRUMENTS / "concert_harp.json")})
-        texts = [dialog.note.what, dialog.note.through_words]
-        for long in (False, True):  # as it opens, and as a text changes
-            if long:
-                texts[0].setText("A pluck of a string, heard at two places. " * 3)
-            for text in texts:
-                qtbot.waitUntil(lambda text=text: text.height() >= text.heightForWidth(text.width()))
-        assert dialog.height() <= dialog.screen().availableSize().height()
-    finally:
-        theme.apply_theme(qapp, "dark")
-        qapp.setStyleSheet(sheet)
-        qapp.setFont(font)
+@pytest.mark.parametrize("form", ["flac", "sf2"])
+def test_a_cancelled_export_leaves_nothing(
+    qtbot: QtBot, sampler: Make, notes: Notes, folder: Path, form: str
+) -> None:
+    notes.last = 3
+    dialog = sampler(form=form)
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
+    with answered("Cancel export"):
+        dialog.close()  # as its cross does: it stays, to report what was written
+    assert dialog.isVisible()
+    notes.gate.set()
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text())
+    assert len(notes.rendered) < 6 and names_in(folder) == [] and dialog.save.text() == "Export"
+
+
+def edit(form: Any, path: Path | str) -> None:
+    form.file.edit.setText(str(path))
+    form.file.edit.textEdited.emit(str(path))
+
+
+IMPOSSIBLE = {
+    "the lowest is above the highest": lambda form, folder: form.lowest.setValue(63),
+    "choose where": lambda form, folder: edit(form, ""),
+    "make the folder first": lambda form, folder: edit(form, folder / "nowhere" / "x.sfz"),
+    "a SoundFont's rate": lambda form, folder: (choose(form["form"], "sf2"), form["rate_hz"].setCurrentIndex(2)),
+}
+
+
+@pytest.mark.parametrize("words", IMPOSSIBLE)
+def test_impossible_choices_are_reported_before_it_begins(
+    qtbot: QtBot, sampler: Make, folder: Path, notes: Notes, words: str
+) -> None:
+    dialog = sampler()
+    form = dialog.sampler
+    IMPOSSIBLE[words](form, folder)
+    dialog.save.click()  # before they have settled
+    assert words in dialog.state.text() and notes.rendered == []
+    qtbot.waitUntil(lambda: (dialog.save.isEnabled(), form.size_text.text()) == (False, ""))
+    assert dialog.state.objectName() == "warning"
+    edit(form, folder / f"y{form.file.suffix}")
+    form["rate_hz"].setCurrentIndex(1)
+    form.lowest.setValue(60)
+    qtbot.waitUntil(dialog.save.isEnabled)
+    form["layers"].setValue(1)
+    run(qtbot, dialog, "Saved")
+    assert len(notes.rendered) == 3
+
+
+def test_choices_of_samples_are_remembered(sampler: Make) -> None:
+    chosen = {"form": "wav", "bits": "16", "rate_hz": 44_100, "source": "truth"}
+    dialog = sampler()
+    for name, data in chosen.items():
+        choose(dialog.sampler[name], data)
+    dialog.sampler["every"].setValue(2)
+    dialog.sampler["dry"].setChecked(True)
+    choices = dialog.choices()[1]
+    assert choices == SampledChoices.model_validate({**chosen, **SMALL, "every": 2, "dry": True})
+    assert sampler(**choices.model_dump()).choices()[1] == choices
+    whole = sampler(keys=None)
+    assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == GUITAR.range
+    assert whole.choices()[1].keys is None
+    assert sampler(keys=(0, 127)).choices()[1].keys is None  # not of this instrument
+
+
+def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
+    sampler: Make, folder: Path, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = sampler()
+    dialog.show_subjects({"sampler": HeardInstrument(HARP, preset)})
+    file = dialog.sampler.file
+    assert file.path == folder / "Concert_harp.sfz"
+    assert dialog.sampler.what.text().startswith("Concert harp")
+    assert dialog.choices()[1].keys == (60, 62)
+    choose_files(monkeypatch, folder / "mine")
+    file.browse()
+    assert file.path == folder / "mine.sfz"
+    choose(dialog.sampler["form"], "sf2")
+    dialog.show_subjects({"sampler": HeardInstrument(GUITAR, preset)})
+    assert file.path == folder / "mine.sf2"
+
+
+def test_a_instrument_that_is_turned_meanwhile_waits_for_the_next_time(
+    qtbot: QtBot, sampler: Make, notes: Notes, preset: PresetEntry
+) -> None:
+    notes.last = 1
+    dialog = sampler()
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 1)
+    dialog.show_subjects({"sampler": HeardInstrument(GUITAR.with_value("knobs.decay", 3.0), preset)})
+    notes.gate.set()
+    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
+    assert {note[0].knobs.decay for note in notes.rendered} == {GUITAR.knobs.decay}
+    dialog.save.click()
+    qtbot.waitUntil(lambda: notes.rendered[-1][0].knobs.decay == 3.0)
+    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
+
+
+@pytest.fixture
+def gate() -> threading.Event:
+    """What building waits for."""
+    made = threading.Event()
+    made.set()
+    return made
+
+
+@pytest.fixture
+def plugin(
+    open_at: Make, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, tmp_path: Path
+) -> Iterator[ExportDialog]:
+    def build(images: list[str], form: str, target: str, path: Path, cache: Path, advanced: Any, *, replace: bool):
+        assert replace
+        while not gate.wait(0.01):
+            advanced("compiling the kernels", 0.4)
+        advanced("linking", 0.97)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{images} {form} {target} {identifier(images[0])}\0", encoding="utf-8")
+        return path
+
+    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: name)
+    monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
+    monkeypatch.setattr("app.export.plugin.image.image_of", lambda instrument, preset: instrument.name)
+    monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
+    yield open_at("plugin", HeardInstrument(GUITAR, preset), ExportChoices(), SampledChoices())
+    gate.set()
+
+
+def test_a_plug_in_is_built_where_hosts_look_and_what_would_be_lost_is_said(
+    qtbot: QtBot, plugin: ExportDialog, folder: Path
+) -> None:
+    page = plugin.plugin
+    assert set(PLUGIN_NAMES) == set(FORMATS)
+    choose(page["form"], "vst3")
+    choose(page["system"], next(each for each in SYSTEM_NAMES if each != this_target()))
+    assert page.file.path == folder / "Classical guitar.vst3"
+    choose(page["system"], this_target())
+    for form in (*FORMATS, "clap"):
+        choose(page["form"], form)
+        assert page.file.path == install_folder(form, this_target()) / f"Classical guitar.{form}"
+    assert plugin.state.text() == PLUGIN_NOTE
+    run(qtbot, plugin, f"Built {page.file.path}")
+    assert "next scan" in plugin.state.text() and plugin.save.text() == "Replace"
+    assert page.file.path.read_text(encoding="utf-8").startswith(f"['Classical guitar'] clap {this_target()}")
+    for names, said in (
+        (["Classical guitar"], "Replaces the one before."),
+        (["Classical guitar", "Concert harp"], "The plug-in that is there holds another instrument, concert-harp"),
+        (["Concert harp", "Electric bass"], "The plug-in that is there holds 2 other instruments, as concert-harp"),
+    ):
+        page.file.path.write_text("".join(f"{identifier(name)}\0" for name in names), encoding="utf-8")
+        button, words = page.offer()
+        assert button == "Replace" and words.startswith(said)
+    page.file.path.write_text("of somebody", encoding="utf-8")
+    page.changed.emit()
+    qtbot.waitUntil(lambda: "is no plug-in of this program" in plugin.state.text())
+    assert not plugin.save.isEnabled()
+
+
+def test_a_plug_in_can_be_cancelled_while_it_compiles(
+    qtbot: QtBot, plugin: ExportDialog, gate: threading.Event
+) -> None:
+    gate.clear()
+    run(qtbot, plugin, "Compiling the kernels")
+    plugin.close_button.click()
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written." in plugin.state.text())
+    assert not plugin.plugin.file.path.exists()
