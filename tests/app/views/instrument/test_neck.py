@@ -22,13 +22,10 @@ Notes = list[tuple[str, int]]
 
 
 @pytest.fixture
-def neck(qtbot: QtBot) -> Neck:
-    made = Neck()
-    qtbot.addWidget(made)
-    made.resize(1000, 110)
+def neck(show: Callable[..., Neck]) -> Neck:
+    made = show(Neck(), 1000, 110)
     made.set_strings(GUITAR)
     made.set_range(40, 86)
-    made.show()
     return made
 
 
@@ -60,6 +57,13 @@ def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck, no
     qtbot.mouseClick(neck, LEFT, pos=on(neck, 5, 7))
     qtbot.mouseClick(neck, LEFT, pos=NUMBERS)
     assert len(notes) == 10, "beyond the range nothing is played"
+    neck.set_range(40, 86)
+    for strings in ((("E2", 40),), tuple((str(key), key) for key in range(40, 87, 3)), ()):
+        neck.set_strings(strings)
+        notes.clear()
+        for key in (40, 63, 86):
+            qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
+        assert not neck.in_rows and [key for what, key in notes if what == "on"] == [40, 63, 86], "a fan of the keys"
 
 
 def lit_x(neck: Neck, string: int) -> float:
@@ -85,17 +89,6 @@ def test_a_note_is_seen_on_the_highest_string_at_or_below_it_and_slides_on_its_o
     assert on_the_way == sorted(on_the_way) and on_the_way[-1] < last
 
 
-@pytest.mark.parametrize("strings", [(("E2", 40),), tuple((str(key), key) for key in range(40, 87, 3)), ()])
-def test_many_strings_or_one_are_a_fan_of_the_keys(
-    qtbot: QtBot, neck: Neck, notes: Notes, strings: tuple[tuple[str, int], ...]
-) -> None:
-    neck.set_strings(strings)
-    assert not neck.in_rows
-    for key in (40, 63, 86):
-        qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
-    assert [key for what, key in notes if what == "on"] == [40, 63, 86]
-
-
 def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
     pressed, chord = reported(neck.pressed), [42, 47, 52, 57, 61, 66]
     qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
@@ -107,6 +100,10 @@ def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, 
     qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 2))
     assert sorted(notes[6:]) == [("off", key) for key in chord]
     assert not any(neck.is_down(key) for key in chord)
+    pressed.clear()
+    released = reported(neck.released)
+    drag(neck, on(neck, 4, 5), on(neck, 5, 0))
+    assert [(key, string) for key, _, string in pressed] == released == [(64, 1), (64, 0)], "of one pitch"
 
 
 @pytest.mark.parametrize("legato", [False, True])
@@ -117,12 +114,6 @@ def test_a_drag_along_a_string_takes_its_note_over_where_keys_are_legato(
     drag(neck, on(neck, 0, 1), on(neck, 0, 3))
     moved = [("on", 43), ("off", 41)]
     assert notes == [("on", 41), *(moved if legato else moved[::-1]), ("off", 43)]
-
-
-def test_a_click_gives_its_string_and_two_strings_have_one_pitch(neck: Neck) -> None:
-    pressed, released = reported(neck.pressed), reported(neck.released)
-    drag(neck, on(neck, 4, 5), on(neck, 5, 0))
-    assert [(key, string) for key, _, string in pressed] == released == [(64, 1), (64, 0)]
 
 
 @pytest.mark.parametrize(("button", "modifier"), [(RIGHT, NONE), (LEFT, SHIFT)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics
@@ -10,7 +12,6 @@ from pytestqt.qtbot import QtBot
 
 from app.instruments.instrument import Instrument, Pickup
 from app.instruments.library import SHIPPED, read_instrument
-from app.instruments.tuning import TuningChoice
 from app.views import theme
 from app.views.controls.sideways import Sideways
 from app.views.instrument.string_knobs import StringKnobs
@@ -20,11 +21,8 @@ Key = Qt.Key
 
 
 @pytest.fixture
-def knobs(qtbot: QtBot, guitar: Instrument) -> StringKnobs:
-    made = StringKnobs()
-    qtbot.addWidget(made)
-    made.resize(1200, 110)
-    made.show()
+def knobs(show: Callable[..., StringKnobs], guitar: Instrument) -> StringKnobs:
+    made = show(StringKnobs(), 1200, 110)
     made.show_instrument(guitar)
     return made
 
@@ -71,18 +69,13 @@ def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
     knobs: StringKnobs, guitar: Instrument
 ) -> None:
     keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
-    changes = {
-        "pluck": guitar.pluck.model_copy(update={"shape": "triangular"}),
-        "damping": guitar.damping.model_copy(update={"let_ring": True}),
-        "tuning": TuningChoice(keymap=keymap),
-    }
-    why = {
-        "pluck.width": "no width",
-        "pluck.width_hard": "no width",
-        "damping.release_t60_s": "ring",
-        "tuning.a4_hz": "reference pitch of its own",
-    }
-    for instrument, barred in ((guitar.model_copy(update=changes), set(why)), (guitar, set())):
+    changes = {"pluck.shape": "triangular", "damping.let_ring": True, "tuning.keymap": keymap}
+    dead = guitar.model_dump()
+    for (part, _, name), value in ((field.partition("."), value) for field, value in changes.items()):
+        dead[part][name] = value
+    widths = dict.fromkeys(("pluck.width", "pluck.width_hard"), "no width")
+    why = {**widths, "damping.release_t60_s": "ring", "tuning.a4_hz": "reference pitch of its own"}
+    for instrument, barred in ((Instrument.model_validate(dead), set(why)), (guitar, set())):
         knobs.show_instrument(instrument)
         assert {field for field, knob in knobs.knobs.items() if not knob.isEnabled()} == barred
         for field, words in why.items():
@@ -91,18 +84,15 @@ def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
     assert not knobs.shape.isEnabled(), "drums have no pluck to shape"
 
 
-def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qapp: QApplication) -> None:
-    row = Sideways(knobs := StringKnobs())
-    qtbot.addWidget(row)
-    row.resize(700, 200)
-    row.show()
+def test_knobs_that_were_hidden_while_text_grew_have_their_room(
+    show: Callable[..., Sideways], own_look: QApplication
+) -> None:
+    knobs = StringKnobs()
+    row = show(Sideways(knobs), 700, 200)
     row.hide()
-    theme.apply_theme(qapp, "dark", 150)
-    try:
-        row.show()
-        QApplication.processEvents()
-        for knob in knobs.knobs.values():
-            assert knob.width() >= knob.sizeHint().width()
-        assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
-    finally:
-        theme.apply_theme(qapp, "dark")
+    theme.apply_theme(own_look, "dark", 150)
+    row.show()
+    QApplication.processEvents()
+    assert all(knob.width() >= knob.sizeHint().width() for knob in knobs.knobs.values())
+    assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
+    theme.apply_theme(own_look, "dark")
