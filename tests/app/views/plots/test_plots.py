@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -22,18 +24,15 @@ from app.views.plots.time_plot import TimePlot
 from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_keys, reported, turn_wheel
 
 Key = Qt.Key
+Show = Callable[..., Any]
 TICKS = [(float(place), f"{place}") for place in range(11)]
 COLUMNS = (FigureColumn("name", "name", "a name"), FigureColumn("level", "level", "in dB", lambda v: f"{v:.1f}"))
 
 
 @pytest.fixture
-def plot(qtbot: QtBot) -> TimePlot:
+def plot(show: Show) -> TimePlot:
     """Four seconds, of which a quarter of one is trained; a curve from corner to corner."""
-    made = TimePlot("A plot", "A tip")
-    qtbot.addWidget(made)
-    made.resize(640, 240)
-    with qtbot.waitExposed(made):
-        made.show()
+    made = show(TimePlot("A plot", "A tip"), 640, 240)
     made.set_times(4.0, 0.25)
     made.getPlotItem().setYRange(0, 1, padding=0)
     made.plot([0, 4], [0, 1], pen=pg.mkPen(theme.MODEL, width=1))
@@ -83,7 +82,9 @@ def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot
         assert (pixels(plot) == whole).all()
 
 
-def test_the_keyboard_seeks_and_zooms(plot: TimePlot) -> None:
+def test_the_keyboard_seeks_and_zooms_and_a_click_seeks_and_with_shift_reports_the_place_too(
+    qtbot: QtBot, plot: TimePlot
+) -> None:
     asked = reported(plot.seek_asked)
     plot.show_playhead(1.0)
     press_keys(plot, Key.Key_Right, Key.Key_Left, Key.Key_Home)
@@ -98,6 +99,13 @@ def test_the_keyboard_seeks_and_zooms(plot: TimePlot) -> None:
     assert asked[-1] == pytest.approx(1.001)  # no more than a little of the view
     press_keys(plot, Key.Key_0)
     assert plot.times_s == pytest.approx((0, 4))
+    seeks, points = reported(plot.seek_asked), reported(plot.pointed)
+    place = place_of(plot, 2.0, 0.25)
+    qtbot.mouseClick(plot.viewport(), LEFT, pos=place)
+    assert points == []
+    qtbot.mouseClick(plot.viewport(), LEFT, SHIFT, pos=place)
+    assert seeks == pytest.approx([2.0, 2.0], abs=0.02)
+    assert points[0] == pytest.approx((2.0, 0.25), abs=0.02)
 
 
 def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(qtbot: QtBot, plot: TimePlot) -> None:
@@ -117,16 +125,6 @@ def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(q
     qtbot.mouseRelease(view, RIGHT, pos=end)
 
 
-def test_a_click_seeks_and_with_shift_reports_the_place_too(qtbot: QtBot, plot: TimePlot) -> None:
-    seeks, points = reported(plot.seek_asked), reported(plot.pointed)
-    place = place_of(plot, 2.0, 0.25)
-    qtbot.mouseClick(plot.viewport(), LEFT, pos=place)
-    assert points == []
-    qtbot.mouseClick(plot.viewport(), LEFT, SHIFT, pos=place)
-    assert seeks == pytest.approx([2.0, 2.0], abs=0.02)
-    assert points[0] == pytest.approx((2.0, 0.25), abs=0.02)
-
-
 def test_the_view_stays_for_a_take_of_the_same_length_and_the_end_of_training_is_seen(
     qtbot: QtBot, plot: TimePlot
 ) -> None:
@@ -143,12 +141,6 @@ def test_the_view_stays_for_a_take_of_the_same_length_and_the_end_of_training_is
     assert not plot.horizon.isVisible()
 
 
-def test_numbers_that_would_touch_are_left_out_the_ends_last() -> None:
-    for room, kept in ((1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))):
-        assert [text for _, text in sparse(TICKS, room)] == [str(number) for number in kept]
-    assert sparse([], 1) == []
-
-
 def numbers(axis: pg.AxisItem) -> dict[str, float]:
     """The heights in pixels at which an axis writes its numbers, from below."""
     image = QImage(10, 10, QImage.Format.Format_RGB32)
@@ -159,11 +151,11 @@ def numbers(axis: pg.AxisItem) -> dict[str, float]:
     return {text: y for y, text in written}
 
 
-def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot: QtBot) -> None:
-    plot = pg.PlotWidget()
-    qtbot.addWidget(plot)
-    plot.resize(300, 300)
-    plot.show()
+def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot: QtBot, show: Show) -> None:
+    for room, kept in ((1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))):
+        assert [text for _, text in sparse(TICKS, room)] == [str(number) for number in kept], "the ends go last"
+    assert sparse([], 1) == []
+    plot = show(pg.PlotWidget(), 300, 300)
     item = plot.getPlotItem()
     axis = item.getAxis("left")
     label = UprightLabel(item, ("amplitude (mm)", "mm"))
@@ -189,20 +181,13 @@ def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbo
         assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
 
 
-def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot) -> None:
-    plot = pg.PlotWidget()
-    qtbot.addWidget(plot)
-    plot.resize(900, 200)
-    plot.show()
+def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot, show: Show) -> None:
+    plot = show(pg.PlotWidget(), 900, 200)
     legend, seen = Legend(plot), {}
     long = "Classical guitar, nylon B3, plucked anywhere"
     for title in (long, long.replace("plucked", "struck")):
-        legend.show_sources(
-            (
-                ShownSource("preset:long", "A", title, heard=True),
-                ShownSource("difference", "B", "difference", gain_db=20.0),
-            )
-        )
+        difference = ShownSource("difference", "B", "difference", gain_db=20.0)
+        legend.show_sources((ShownSource("preset:long", "A", title, heard=True), difference))
         assert legend.text == f"A  {title} · heard   B  difference +20 dB"
         for width in (900, 400, 260):
             plot.resize(width, 200)
@@ -216,11 +201,9 @@ def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot) -> None:
 
 
 @pytest.fixture
-def table(qtbot: QtBot) -> FiguresTable:
-    made = FiguresTable("Figures", COLUMNS)
-    qtbot.addWidget(made)
+def table(show: Show) -> FiguresTable:
+    made = show(FiguresTable("Figures", COLUMNS))
     made.show_rows([TableRow("b", ("b", 2.12345)), TableRow("a", ("a", None)), TableRow("c", ("c", -10.0))])
-    made.show()
     return made
 
 

@@ -1,15 +1,20 @@
-"""Gestures on the string, and that its input is shown."""
+"""Gestures on the string, and its picture, in which all can be read."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
+from app.views.stage import LABEL_GAP, label_places
 from app.views.string.axes import StringAxes
-from app.views.string.ground import TrainedPlucks
+from app.views.string.ground import TrainedPlucks, paint_ground, scale
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from tests.app.gestures import (
@@ -33,13 +38,9 @@ Key = Qt.Key
 
 
 @pytest.fixture
-def view(qtbot: QtBot) -> StringView:
+def view(show: Callable[..., StringView]) -> StringView:
     """A string plucked at 0.5 by 4 mm that follows what is asked of it."""
-    made = StringView()
-    qtbot.addWidget(made)
-    made.resize(WIDTH, HEIGHT)
-    with qtbot.waitExposed(made):
-        made.show()
+    made = show(StringView(), WIDTH, HEIGHT)
     made.set_listening_points(0.37)
     made.pluck_drawn.connect(lambda position, mm: made.set_pluck(ShownPluck(position, mm, np.zeros(101))))
     made.pluck_drawn.emit(0.5, 4.0)
@@ -82,42 +83,38 @@ def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot: QtBot, vi
         assert whole is not False or paints.rects[-1].bottom() <= AXES.bottom
 
 
-def test_the_handle_is_dragged_without_a_jump(view: StringView, plucks: list[tuple[float, float]]) -> None:
+def test_the_handle_is_dragged_without_a_jump_also_beyond_the_top(
+    view: StringView, plucks: list[tuple[float, float]]
+) -> None:
     drags = reported(view.drag_started, view.drag_ended, view.pluck_released)
     grip = HANDLE + QPoint(5, 4)
     drag(view, grip, grip + QPoint(80, 0))
     assert plucks == [(pytest.approx(0.5 + 80 / AXES.length), pytest.approx(4.0))]
     assert len(drags) == 3
+    view.pluck_drawn.emit(0.5, 4.0)
+    drag(view, *(HANDLE - QPoint(0, 5 * step) for step in range(13)))
+    grown = np.diff([mm for _, mm in plucks[1:]])  # the scale steps up under the pointer
+    assert ((grown >= 0) & (grown < 1.0)).all() and (grown[1:] > 0).all() and plucks[-1][1] > 5
 
 
 @pytest.mark.parametrize("mm", [4.0, 0.2])  # the latter is the knob's doing
-def test_a_click_plucks_there_as_far_as_the_last_time(
+def test_a_click_plucks_there_as_far_as_the_last_time_and_a_drag_sets_an_amplitude_that_is_not_next_to_nothing(
     view: StringView, plucks: list[tuple[float, float]], mm: float
 ) -> None:
     """On the string's own line too, where the pointer gives next to no amplitude; and a hand is not still."""
     released = reported(view.pluck_released)
     view.pluck_drawn.emit(0.5, mm)
-    at = QPoint(round(AXES.x(0.3)), round(AXES.middle) - 1)
+    x = round(AXES.x(0.3))
+    at = QPoint(x, round(AXES.middle) - 1)
     drag(view, at, at + QPoint(1, -2))
     assert plucks[-1] == (pytest.approx(0.3, abs=0.003), mm)
     assert len(released) == 1
-
-
-def test_a_drag_sets_the_amplitude_which_is_never_next_to_nothing(
-    view: StringView, plucks: list[tuple[float, float]]
-) -> None:
-    x = round(AXES.x(0.3))
-    places = [QPoint(x + 40, round(AXES.y(mm))) for mm in (3.0, -2.0, 0.1, 0.0)]
-    drag(view, QPoint(x, round(AXES.y(2.0))), *places)
-    assert [mm for _, mm in plucks[1:]] == pytest.approx([3.0, 2.0, 0.5, 0.5], abs=0.05)
-
-
-def test_a_drag_beyond_the_top_grows_steadily(view: StringView, plucks: list[tuple[float, float]]) -> None:
-    """The scale steps up under the pointer; the amplitude must not jump with it."""
-    drag(view, *(HANDLE - QPoint(0, 5 * step) for step in range(13)))
-    grown = np.diff([mm for _, mm in plucks])
-    assert ((grown > 0) & (grown < 1.0)).all()
-    assert plucks[-1][1] > 5
+    view.pluck_drawn.emit(0.5, 4.0)
+    plucks.clear()
+    drag(
+        view, *(QPoint(x + by, round(AXES.y(to))) for by, to in ((0, 2.0), (40, 3.0), (40, -2.0), (40, 0.1), (40, 0)))
+    )
+    assert [to for _, to in plucks[1:]] == pytest.approx([3.0, 2.0, 0.5, 0.5], abs=0.05)
 
 
 def test_the_wheel_over_the_handle_sets_width_and_with_shift_the_shape(view: StringView) -> None:
@@ -228,3 +225,39 @@ def test_the_scale_follows_the_decay_and_the_pluck_comes_back(view: StringView, 
     view.show_frame(None)
     picture(view)  # its scale comes back first
     assert picture(view) == rest
+
+
+class Recorder(QPainter):
+    """Keeps what is written."""
+
+    def __init__(self, image: QImage) -> None:
+        super().__init__(image)
+        self.written: list[str] = []
+
+    def drawText(self, *arguments: object) -> None:
+        self.written.append(str(arguments[-1]))
+
+
+@pytest.mark.parametrize(("height", "figures"), [(300, 5), (112, 3), (90, 1)])
+def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, height: int, figures: int) -> None:
+    axes = StringAxes(1200, height, 5.0)
+    assert len(scale(axes)) == figures
+    image = QImage(1200, height, QImage.Format.Format_ARGB32)
+    painter = Recorder(image)
+    paint_ground(painter, axes, TrainedPlucks((0.3, 0.7)), 0)
+    painter.end()
+    assert sum(text[-1].isdigit() or text.endswith("mm") for text in painter.written) >= figures
+    assert painter.written.count("not trained here") == (2 if height == 300 else 0)
+
+
+@pytest.mark.parametrize("points", [(0.10, 0.15), (0.15, 0.10), (0.0, 0.01), (0.99, 1.0), (0.5, 0.5), (0.2, 0.8)])
+def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot: QtBot, points: tuple[float, float]) -> None:
+    axes = StringAxes(560, 200, 5.0)
+    marks = [(axes.x(point), f"{name} {point:.2f}") for name, point in zip(("left", "right"), points, strict=True)]
+    places = label_places(QFontMetrics(QFont()), marks, axes.width, axes.bottom)
+    assert {text for _, text in places} == {text for _, text in marks}
+    for (before, _), (after, _) in pairwise(places):
+        assert after.left() >= before.right() + LABEL_GAP - 0.01
+    assert all(place.left() >= 0 and place.right() <= axes.width for place, _ in places)
+    if points == (0.2, 0.8):  # each under its point
+        assert [place.center().x() for place, _ in places] == pytest.approx([axes.x(point) for point in points])
