@@ -95,7 +95,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
 
 @PRESETS
 @pytest.mark.parametrize("ear", EARS, ids=["one", "stereo velocity", "solo"])
-def test_a_signal_is_that_of_the_motion_and_a_point_that_moves_hears_what_one_there_hears(
+def test_a_signal_is_that_of_the_motion_also_where_a_point_moves_to(
     preset: Any, ear: Ear, job: Render, sources: Sources, derivative: Callable[..., np.ndarray]
 ) -> None:
     """Up to what the truth's voice leaves out, 108 dB below the rest. It moves half-way and afterwards."""
@@ -125,7 +125,6 @@ def test_a_signal_is_that_of_the_motion_and_a_point_that_moves_hears_what_one_th
 
 
 def test_while_a_point_is_dragged_all_of_the_signal_follows(job: Render) -> None:
-    """It follows, though no point stays long enough."""
     made = job(NETWORK)
     take, seen = finished(made), set()
     for number in range(40):
@@ -139,7 +138,6 @@ def test_while_a_point_is_dragged_all_of_the_signal_follows(job: Render) -> None
 @PRESETS
 @pytest.mark.parametrize("blocks", [2, 1_000])
 def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, job: Render) -> None:
-    """Half-way and afterwards."""
     there, slower = finished(job(preset, speed=0.02)), job(preset)
     while not slower.idle and blocks:
         slower.advance()
@@ -159,7 +157,6 @@ def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, 
 
 
 def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources: Sources) -> None:
-    """Of a model whose relative MSE is 1e-8: far below what a voice keeps."""
     take, loaded = finished(job(STUDIO)), sources.load(STUDIO)
     model, truth = (frames_m(source, take)[None, 1:] for source in (loaded.model, loaded.truth))
     sums = ErrorSums(model.shape[1])

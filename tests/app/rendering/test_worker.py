@@ -70,10 +70,7 @@ def heard() -> Iterator[Heard]:
     wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
 
 
-def test_the_latest_request_wins_and_is_announced_again_when_it_is_asked_for_again(
-    small_preset: Path, heard: Heard
-) -> None:
-    """The window may have chosen something else in between, of which the worker had no request."""
+def test_the_latest_request_wins_and_is_announced_again_when_asked_for(small_preset: Path, heard: Heard) -> None:
     heard.gate.clear()  # or the first could be finished before the last is submitted
     for position in (0.3, 0.35, 0.4, 0.45, 0.5):
         heard.submit(small_preset, position)
@@ -85,10 +82,9 @@ def test_the_latest_request_wins_and_is_announced_again_when_it_is_asked_for_aga
     assert heard.started[-2:] == heard.finished == 2 * heard.finished[:1]
 
 
-def test_the_first_motion_waits_until_a_pluck_would_sound_and_keeps_step_with_its_sound_while_it_is_heard(
+def test_a_motion_waits_for_the_sound_and_keeps_step(
     small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It may load torch, which would keep the sound waiting."""
     monkeypatch.setattr(worker_module, "IN_STEP_S", 600.0)  # not over before this is looked at
     heard.sounds, heard.hurried = False, True
     heard.submit(small_preset, seconds=8.0)
@@ -103,9 +99,7 @@ def test_the_first_motion_waits_until_a_pluck_would_sound_and_keeps_step_with_it
     wait_until(lambda: take.complete)
 
 
-def test_a_broken_preset_is_reported_and_the_worker_lives_on(
-    small_preset: Path, tmp_path: Path, heard: Heard
-) -> None:
+def test_a_broken_preset_is_reported_and_work_continues(small_preset: Path, tmp_path: Path, heard: Heard) -> None:
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(small_preset.read_bytes()[:100])
     heard.submit(broken)
@@ -115,9 +109,7 @@ def test_a_broken_preset_is_reported_and_the_worker_lives_on(
     wait_until(lambda: heard.finished)
 
 
-def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
-    small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_runaway_model_alone_is_silenced(small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch) -> None:
     advance = KoopmanVar.advance
 
     def faulty(
@@ -154,9 +146,7 @@ def test_another_presets_model_moves_beside_it(small_preset: Path, tmp_path: Pat
     assert {*map(id, heard.started), *map(id, heard.finished)} == {id(take)}
 
 
-def test_another_pluck_does_not_wait_for_the_one_before(
-    small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_pluck_waits_for_none(small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch) -> None:
     advance = SourceLine.advance
 
     def slow(line: SourceLine, samples: int) -> None:

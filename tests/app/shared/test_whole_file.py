@@ -72,7 +72,6 @@ def test_a_write_that_the_system_stops_half_way_leaves_nothing(tmp_path: Path) -
     ],
 )
 def test_where_nothing_can_be_written_the_block_does_not_run(tmp_path: Path, place: str, words: str) -> None:
-    """A folder or a device is never replaced."""
     if place.startswith("locked") and (not hasattr(os, "geteuid") or os.geteuid() == 0):
         pytest.skip("root may write anywhere")
     if place.startswith("/dev") and not Path(place).exists():

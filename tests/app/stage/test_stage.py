@@ -1,4 +1,4 @@
-"""The stage after each event, without a window."""
+"""The stage after each event, and steps of undo: gestures in plain words; what is only looked at is none."""
 
 from __future__ import annotations
 
@@ -6,14 +6,191 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from app.instruments.instrument import ASSIGNABLE, Instrument
 from app.instruments.library import SHIPPED, read_instrument
 from app.player.strings import Strings
 from app.playing.note import PluckVoices
 from app.rendering import NoteSound
 from app.session.choices import Choices
+from app.shared.parameters import OF_INSTRUMENTS
+from app.stage.session import GATHER_S, RECORDED, Session
 from app.stage.stage import Asked, Begun, Chosen, Parked, Rendered, Turned, first_stage, next_stage
+from app.stage.step_words import step_words
 from engine.pluck import Pluck
 from engine.values.ear import Ear
+
+
+class Hand:
+    """A session with its history, and the time in s at which its changes come."""
+
+    def __init__(self) -> None:
+        self.now_s = 10.0
+        self.session = Session(now_s=lambda: self.now_s)
+
+    def change(self, after_s: float = 0.0, **choices: object) -> None:
+        self.now_s += after_s
+        self.session.update(**choices)
+
+    def undone(self, field: str) -> list[object]:
+        """The values of a field after each step back, until there is none."""
+        values = []
+        while self.session.undo_words:
+            self.session.undo()
+            values.append(getattr(self.session.choices, field))
+        return values
+
+
+@pytest.fixture
+def hand() -> Hand:
+    return Hand()
+
+
+@pytest.fixture(scope="module")
+def guitar() -> Instrument:
+    return read_instrument(SHIPPED / "classical_guitar.json")
+
+
+def test_whatever_a_knob_turns_has_words_without_marks_and_a_macro_its_name(guitar: Instrument) -> None:
+    for field in set(ASSIGNABLE) - {"pickup.points.1"}:
+        value = guitar.value(field)
+        for turned in (0.9 * value + 0.011, 0.9 * value - 0.011):
+            try:
+                words = step_words({"instrument": guitar}, {"instrument": guitar.with_value(field, turned)})
+            except ValueError:
+                continue
+            assert words and "_" not in words and "." not in words, field
+            assert words == ("listening point" if field.startswith("pickup.") else OF_INSTRUMENTS[field].name)
+    macro = {"name": "Damp", "value": 0.5, "targets": ({"field": "knobs.decay", "low": 1.0, "high": 3.0},)}
+    instrument = Instrument.model_validate({**dict(guitar), "macros": (macro,)})
+    assert step_words({"instrument": instrument}, {"instrument": instrument.turned(0, 0.9)}) == "Damp"
+
+
+def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
+    start = hand.session.choices
+    hand.change(position=0.5, amplitude_mm=2)
+    middle = hand.session.choices
+    hand.change(1, shape="triangular")
+    end = hand.session.choices
+    for act, states in ((hand.session.undo, (middle, start, start)), (hand.session.redo, (middle, end, end))):
+        for state in states:
+            act()
+            assert hand.session.choices == state
+    hand.session.undo()
+    hand.change(width=0.3)
+    assert not hand.session.redo_words, "a new change forgets what was undone"
+    assert hand.undone("width") == [0.06, 0.06]
+
+
+def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand) -> None:
+    for position in (0.4, 0.41, 0.42):
+        hand.change(0.9 * GATHER_S, position=position)
+    hand.change(2 * GATHER_S, position=0.6)
+    hand.change(width=0.2)  # another field: another step
+    hand.change(position=0.7)
+    assert hand.undone("position") == [0.6, 0.6, 0.42, 0.35]
+
+
+def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand: Hand) -> None:
+    for positions in ((0.4, 0.41, 0.44), (0.6, 0.5), (0.7, 0.5)):
+        hand.session.hold()
+        for moved, position in enumerate(positions):
+            hand.change(3, position=position, amplitude_mm=4 + moved % 2)
+        hand.change(amplitude_mm=4)
+        hand.session.release()
+    assert hand.undone("position") == [0.44, 0.35]
+
+
+def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Hand) -> None:
+    seen = {"heard": "b", "loop": True, "speed": 1, "left_view": "x", "motion": False, "envelope": False}
+    hand.change(volume_db=-6, **seen)
+    assert not hand.session.undo_words
+    hand.change(position=0.6)
+    hand.change(volume_db=-9)
+    hand.session.undo()
+    assert hand.session.choices == Choices(volume_db=-9, **seen)  # type: ignore[arg-type]
+    assert set(Choices.model_fields) > RECORDED
+
+
+def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:
+    session = hand.session
+
+    def state() -> tuple[float, float, float]:
+        choices = session.choices
+        return choices.width, choices.position, choices.amplitude_mm
+
+    session.play(position=0.2, amplitude_mm=6)
+    assert not session.undo_words
+    hand.change(width=0.2)
+    session.play(position=0.7, amplitude_mm=2)
+    session.undo()
+    assert (state(), session.undo_words) == ((0.06, 0.7, 2), "")
+    session.play(position=0.3)
+    session.redo()  # a note forgets nothing of what was undone
+    assert state() == (0.2, 0.3, 2)
+    session.hold()
+    hand.change(position=0.5, amplitude_mm=3)
+    session.play(position=0.9)  # played while the knob is in the other hand
+    hand.change(amplitude_mm=5)
+    session.release()
+    session.undo()
+    assert state() == (0.2, 0.3, 2), "back to where the note was"
+
+
+def pickup_of(session: Session) -> tuple[object, ...]:
+    choices = session.choices
+    return choices.stereo, choices.pickup, choices.listen, choices.instrument and choices.instrument.pickup
+
+
+def test_what_is_played_and_where_it_is_heard_are_steps(hand: Hand, guitar: Instrument) -> None:
+    session = hand.session
+    session.update(played=guitar)
+    own = pickup_of(session)
+    states, words = [own], []
+    changes = ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11})
+    for change in changes:
+        hand.change(1, **change)
+        states.append(pickup_of(session))
+        words.append(session.undo_words)
+    assert words == ["pick-up", "stereo", "listening point"]
+    for there, act in ((states[-2::-1], session.undo), (states[1:], session.redo), (states[-2::-1], session.undo)):
+        for state in there:
+            act()
+            assert pickup_of(session) == state
+    hand.now_s += 1
+    session.play_string()
+    hand.change(1, listen=0.9)
+    hand.now_s += 1
+    session.play_instrument()
+    assert pickup_of(session) == own
+    steps = []
+    for plays_instrument, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
+        steps.append(session.undo_words)
+        session.undo()
+        assert (session.choices.plays_instrument, session.choices.listen) == (plays_instrument, listen)
+    assert steps == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
+    assert pickup_of(session) == own
+    for _ in steps:
+        session.redo()
+    assert (session.choices.plays_instrument, pickup_of(session)) == (True, own)
+
+
+def test_each_way_the_next_step_is_named_and_two_knobs_are_two_however_quick(hand: Hand, guitar: Instrument) -> None:
+    hand.change(played=guitar)
+    for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
+        instrument = hand.session.choices.instrument
+        assert instrument is not None
+        hand.change(instrument=instrument.with_value(field, value))
+    hand.session.play(position=0.2)
+    hand.change(position=0.5)
+    words = []
+    while hand.session.undo_words:
+        words.append(hand.session.undo_words)
+        hand.session.undo()
+        assert hand.session.redo_words == words[-1]
+    assert words == ["pluck position", "stiffness", "decay", "instrument Classical guitar"]
+
 
 HARP, GUITAR = (read_instrument(SHIPPED / f"{name}.json") for name in ("concert_harp", "classical_guitar"))
 REQUEST = NoteSound(Path("one"), Pluck(0.3), 1.0, Ear((0.2,)))

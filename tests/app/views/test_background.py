@@ -41,10 +41,7 @@ def background(qtbot: QtBot, threads_begun: Callable[[], list[str]]) -> Iterator
     assert threads_begun() == []
 
 
-def test_a_job_reports_and_returns_here(
-    qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Shares are reported now and then, and each result at once."""
+def test_a_job_reports_here(qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "REPORT_EVERY_S", 60.0)  # each takes a breath, which may be long
     here, seen = threading.get_ident(), []
     background.progressed.connect(lambda *values: seen.append((*values, threading.get_ident())))

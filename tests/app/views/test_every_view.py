@@ -152,7 +152,6 @@ VIEWS = list(found_views())
 
 @pytest.fixture(scope="module")
 def themes(own_look: QApplication) -> Iterator[None]:
-    """Plots follow the theme."""
     theme.apply_theme(own_look, "dark")
     plots.recolour(theme.present, theme.present)
     theme.changes.theme_changed.connect(plots.recolour)
@@ -162,7 +161,6 @@ def themes(own_look: QApplication) -> Iterator[None]:
 
 @pytest.fixture
 def size_percent() -> int:
-    """The size of the text."""
     return 100
 
 
@@ -258,7 +256,6 @@ def share_of(image: QImage, *colours: str) -> float:
 
 
 def test_all_have_names_tips_and_the_colours_of_the_theme(themes: None, qtbot: QtBot, qapp: QApplication) -> None:
-    """All at once, as another theme takes as long for one."""
     with ExitStack() as stack:
         views = {kind.__name__: stack.enter_context(shown(kind, qtbot)) for kind in VIEWS}
         for each in itertools.chain.from_iterable(map(controls, views.values())):
@@ -289,13 +286,11 @@ def test_each_has_room_with_larger_text(view: QWidget) -> None:
     assert window.height() <= SCREEN[1]
     for each in controls(view):
         area = QRect(each.mapTo(view, QPoint()), each.size())
-        inside = each is view or any(isinstance(above, QScrollArea) for above in ancestors(each))
+        inside = each is view or any(above.isAncestorOf(each) for above in view.window().findChildren(QScrollArea))
         assert inside or view.rect().contains(area), name_of(each)
         if isinstance(each, QAbstractButton):
             assert each.height() >= min(each.fontMetrics().height(), each.sizeHint().height()), name_of(each)
+    for text in view.findChildren(QLabel):
+        if text.wordWrap() and text.isVisible():
+            assert text.height() >= text.heightForWidth(text.width()), text.text()
     assert not picture(view).isNull()
-
-
-def ancestors(widget: QWidget) -> Iterator[QWidget]:
-    while (widget := widget.parentWidget()) is not None:
-        yield widget

@@ -1,34 +1,51 @@
-"""Controls without a file of their own: what they say, report and paint."""
+"""Controls: what they say, report, paint and take from mouse and keys."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtWidgets import QApplication, QLabel, QMenu
+import pytest
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QDialog,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QToolTip,
+    QVBoxLayout,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
-from app.views.controls.app_menu import ENTRIES, MENUS, AppMenu
+from app.shared.parameters import Parameter, Taper
+from app.views.controls.app_menu import AppMenu
 from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.knob import DRAG_PIXELS, Knob
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
 from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
-from tests.app.gestures import Paints, picture
+from app.views.controls.number_box import CountBox, NoteBox, NumberBox
+from app.views.controls.playing_keys import X11, PlayingKeys
+from tests.app.gestures import (
+    CONTROL,
+    LEFT,
+    NONE,
+    SHIFT,
+    Paints,
+    keeps,
+    move,
+    picture,
+    press_keys,
+    reported,
+    turn_wheel,
+)
 
 
-def test_every_entry_is_in_its_menu_and_undo_says_what_it_would_change(show: Callable[..., Any]) -> None:
-    made = show(AppMenu())
-    menus = {action.text(): action.menu() for action in made.actions()}
-    assert list(menus) == list(MENUS)
-    for title, entries in MENUS.items():
-        menu = menus[title]
-        assert isinstance(menu, QMenu)
-        assert [made.action[entry.name] for entry in entries] == menu.actions()[: len(entries)]
-    assert len(made.action) == len(ENTRIES)
-    made.show_steps("tension & length", "")
-    assert (made.action["undo"].text(), made.action["redo"].text()) == ("Undo: tension && length", "Redo")
-
-
-def test_the_longest_wording_that_fits_is_shown(show: Callable[..., Any]) -> None:
+def test_the_longest_wording_that_fits_is_shown_and_no_sign_is_taken_for_a_mnemonic(show: Callable[..., Any]) -> None:
     label = show(ElidedLabel())
     wordings = ("1.305 s   106 Hz   -63.2 dB", "106 Hz   -63.2 dB", "-63.2 dB")
     label.say(*wordings)
@@ -38,11 +55,12 @@ def test_the_longest_wording_that_fits_is_shown(show: Callable[..., Any]) -> Non
     label.resize(20, 20)
     assert label.shown.endswith("…")
     assert label.text() == wordings[0]
+    menu = show(AppMenu())
+    menu.show_steps("tension & length", "")
+    assert [menu.action[name].text() for name in ("undo", "redo")] == ["Undo: tension && length", "Redo"]
 
 
-def test_the_meter_is_painted_when_it_looks_another_way_and_not_sixty_times_a_second(
-    show: Callable[..., Any],
-) -> None:
+def test_the_meter_is_painted_when_it_looks_another_way_and_not_all_the_time(show: Callable[..., Any]) -> None:
     meter = show(Meter())
     meter.resize(meter.sizeHint())
     QApplication.processEvents()
@@ -87,3 +105,279 @@ def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(qtbot: QtBot
     for number in range(MOST_KEPT + 5):
         bar.inform(f"Fact {number}.")
     assert (len(bar.notices), label.objectName()) == (MOST_KEPT, "")
+
+
+PRESSED = QPoint(30, 40)
+Key = Qt.Key
+
+
+@pytest.fixture
+def knob(qtbot: QtBot, show: Callable[..., QWidget]) -> Knob:
+    """From 0 to 20 by 0.25, at 4, in an active window; it follows what is asked."""
+    window = QWidget()
+    made = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
+    made.resize(made.sizeHint())
+    made.value_asked.connect(made.set_value)
+    show(window).activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    return made
+
+
+def type_in(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key) -> None:
+    """Type with the knob's editor, which is gone after the last key."""
+    qtbot.keyClicks(knob, text[0])
+    editor = knob.findChild(QLineEdit)
+    assert editor.hasFocus()
+    qtbot.keyClicks(editor, text[1:])
+    qtbot.keyClick(editor, end)
+    qtbot.waitUntil(lambda: knob.findChild(QLineEdit) is None)
+
+
+def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot: QtBot, knob: Knob) -> None:
+    drags = reported(knob.drag_started, knob.drag_ended)
+    qtbot.mousePress(knob, LEFT, pos=PRESSED)
+    up = 0
+    for pixels, held, value in (
+        (DRAG_PIXELS // 4, NONE, 9),
+        (0, SHIFT, 9),
+        (9, SHIFT, 9.1),
+        (9, NONE, 10.1),
+        (-2 * DRAG_PIXELS, NONE, 0),
+    ):
+        up += pixels
+        move(knob, PRESSED - QPoint(0, up), held=held)
+        assert knob.value == pytest.approx(value)
+        assert QToolTip.text() == f"{value:.2f} mm"
+    qtbot.mouseRelease(knob, LEFT)
+    move(knob, PRESSED)
+    assert knob.value == 0
+    assert drags == [(), ()]
+
+
+def test_the_wheel_and_keys(knob: Knob) -> None:
+    for turned, held, value in (
+        ((0, 120), NONE, 4.25),
+        ((0, -240), NONE, 3.5),
+        ((0, 120), SHIFT, 4.025),
+        ((120, 0), SHIFT, 4.025),
+    ):
+        knob.set_value(4.0)
+        assert turn_wheel(knob, PRESSED, QPoint(*turned), held)
+        assert knob.value == pytest.approx(value)
+    for key, held, value in (
+        (Key.Key_Up, NONE, 12.25),
+        (Key.Key_Left, NONE, 11.75),
+        (Key.Key_Right, SHIFT, 12.025),
+        (Key.Key_PageUp, NONE, 14.5),
+        (Key.Key_PageDown, NONE, 9.5),
+        (Key.Key_Home, NONE, 0),
+        (Key.Key_End, NONE, 20),
+        (Key.Key_Delete, NONE, 4),
+    ):
+        knob.set_value(12.0)
+        press_keys(knob, key, held=held)
+        assert knob.value == pytest.approx(value), key
+        assert keeps(knob, key) == (key in (Key.Key_PageUp, Key.Key_PageDown))  # shortcuts of the window
+
+
+@pytest.mark.parametrize(
+    ("text", "end", "value", "words"),
+    [
+        ("7,5", Key.Key_Return, 7.5, ""),
+        ("7.5 mm", Key.Key_Return, 7.5, ""),
+        ("1,000.5e-2", Key.Key_Return, 10.005, ""),
+        ("99", Key.Key_Return, 20, "At most 20.00 mm"),
+        ("-1", Key.Key_Return, 0, "At least 0.00 mm"),
+        ("3-", Key.Key_Return, 4.0, "“3-” is no number here, as 4.00 mm is, which is kept"),
+        ("9", Key.Key_Escape, 4.0, "4.00 mm is kept"),
+        ("7 m", Key.Key_A, 4.0, "4.00 mm is kept"),  # no number has it: it plays
+    ],
+)
+def test_a_number_is_typed(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key, value: float, words: str) -> None:
+    QToolTip.hideText()
+    qtbot.waitUntil(lambda: not QToolTip.isVisible())
+    letters: list[str] = []
+    PlayingKeys(knob.window()).pressed.connect(lambda press: letters.append(press.letter))
+    type_in(qtbot, knob, text, end)
+    assert knob.value == value
+    assert (QToolTip.text() if QToolTip.isVisible() else "") == words
+    assert letters == (["A"] if end == Key.Key_A else [])
+
+
+@pytest.mark.parametrize("end", [Key.Key_Return, Key.Key_Escape])
+@pytest.mark.parametrize("reason", [Qt.FocusReason.MouseFocusReason, Qt.FocusReason.TabFocusReason])
+def test_the_focus_returns_where_it_was_brought(
+    qtbot: QtBot, knob: Knob, reason: Qt.FocusReason, end: Qt.Key
+) -> None:
+    knob.window().setFocus()
+    knob.setFocus(reason)
+    type_in(qtbot, knob, "7", end)
+    assert QApplication.focusWidget() is (knob if reason == Qt.FocusReason.TabFocusReason else knob.window())
+
+
+def test_value_figure_and_bar_are_seen_and_said(qtbot: QtBot, knob: Knob) -> None:
+    figures, pictures = reported(knob.figure_asked), [picture(knob)]
+
+    def changed() -> str:
+        pictures.append(picture(knob))
+        assert pictures[-1] != pictures[-2]
+        return knob.accessibleDescription()
+
+    knob.set_value(11)
+    assert changed() == "11.00 mm"
+    knob.show_figure("72.3 N")
+    assert changed() == "72.3 N (11.00 mm)"
+    assert "72.3 N (11.00 mm)" in knob.toolTip()
+    type_in(qtbot, knob, "8", Key.Key_Return)
+    assert (figures, knob.value) == ([8.0], 11.0)
+    knob.show_figure("")
+    assert changed() == "11.00 mm"
+    knob.set_barred("A triangle has no width")
+    changed()
+    assert not knob.isEnabled()
+    assert knob.toolTip() == "amplitude\nA triangle has no width"
+    knob.set_barred("")
+    assert knob.isEnabled()
+    assert "no width" not in knob.toolTip()
+
+
+def type_over(qtbot: QtBot, box: QAbstractSpinBox, text: str) -> None:
+    box.selectAll()
+    qtbot.keyClicks(box, text)
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+
+
+def test_a_refused_text_leaves_the_value_and_presses_no_button(qtbot: QtBot, show: Callable[..., QDialog]) -> None:
+    dialog, button = QDialog(), QPushButton("Do it", default=True)
+    box = NumberBox("length", (0, 5), 0.65, "", " m", 3)
+    column = QVBoxLayout(dialog)
+    for part in (box, button):
+        column.addWidget(part)
+    pressed, changes = reported(button.clicked), reported(box.valueChanged)
+    show(dialog)
+    for text in ("", "x", "2.5.1", "0.3 cm", "1e", "65", "-1", "nan"):
+        QToolTip.hideText()
+        qtbot.waitUntil(lambda: not QToolTip.isVisible())
+        box.selectAll()
+        qtbot.keyClick(box, Qt.Key.Key_Delete)
+        type_over(qtbot, box, text)
+        assert (box.value(), box.text(), changes, pressed) == (0.65, "0.650 m", [], []), text
+        assert QToolTip.isVisible() and "0.650 m is" in QToolTip.text()
+    type_over(qtbot, box, "1,2")
+    assert len(pressed) == 1 and box.value() == 1.2
+
+
+def test_counts_are_whole(qtbot: QtBot, show: Callable[..., CountBox]) -> None:
+    box = show(CountBox("trials", 5000, 16, ""))
+    for text, value in (("12", 12), ("2.5", 12), ("1 234", 1234), ("5001", 1234), ("0", 1234), ("8.0", 8), ("a", 8)):
+        type_over(qtbot, box, text)
+        assert (box.value(), box.text()) == (value, str(value)), text
+    qtbot.keyClick(box, Qt.Key.Key_Up)
+    assert box.value() == 9
+
+
+def test_a_note_is_typed_by_its_name_within_its_range(qtbot: QtBot, show: Callable[..., NoteBox]) -> None:
+    box = show(NoteBox("Lowest key", ""))
+    box.setRange(40, 76)
+    box.setValue(52)
+    assert box.text() == "E3"
+    box.selectAll()
+    qtbot.keyClicks(box, "bb2")
+    assert box.value() == 52  # only when it is whole
+    for text in ("bb2", "C9", "x"):
+        type_over(qtbot, box, text)
+        assert (box.value(), box.text()) == (46, "A♯2")
+    qtbot.keyClick(box, Qt.Key.Key_Up)
+    assert box.text() == "B2"
+
+
+DOWN, UP = QEvent.Type.KeyPress, QEvent.Type.KeyRelease
+Hear = Callable[[str], list[str]]
+
+
+@pytest.fixture
+def window(qtbot: QtBot) -> QWidget:
+    """A line, and a list of which the second entry begins with an A."""
+    made = QWidget()
+    qtbot.addWidget(made)
+    column = QVBoxLayout(made)
+    for child in (QLineEdit(), QComboBox()):
+        column.addWidget(child)
+    made.findChild(QComboBox).addItems(["first", "a song"])
+    made.show()
+    return made
+
+
+@pytest.fixture
+def hear(window: QWidget) -> Hear:
+    """The letters from now on: S as it is pressed, s as it is released."""
+
+    def begin(platform: str) -> list[str]:
+        letters: list[str] = []
+        keys = PlayingKeys(window, platform)
+        keys.pressed.connect(lambda press: letters.append(press.letter))
+        keys.released.connect(lambda press: letters.append(press.letter.lower()))
+        return letters
+
+    return begin
+
+
+def focus(widget: QWidget | None) -> None:
+    QApplication.instance().focusChanged.emit(None, widget)  # type: ignore[union-attr]
+
+
+def test_a_list_takes_no_notes_and_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+    letters, box, line = hear("windows"), window.findChild(QComboBox), window.findChild(QLineEdit)
+    for focused, heard, text, chosen in (
+        (box, ["A", "a"], "", "first"),
+        (line, [], "a", "first"),
+        (None, [], "a", "a song"),
+    ):
+        letters.clear()
+        focus(focused)
+        qtbot.keyClicks(focused or box, "a")
+        assert (letters, line.text(), box.currentText()) == (heard, text, chosen)
+
+
+def test_a_held_key_is_reported_once_and_shortcuts_are_no_notes(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+    letters = hear("windows")
+    qtbot.keyPress(window, Qt.Key.Key_S)
+    for _ in range(5):
+        QApplication.sendEvent(window, QKeyEvent(DOWN, Qt.Key.Key_S, NONE, "s", True))
+    qtbot.keyClick(window, Qt.Key.Key_D, CONTROL)
+    assert letters == ["S"]
+
+
+@pytest.mark.parametrize(
+    ("platforms", "events", "letters"),
+    [
+        # on X11 a repetition looks like a release and a press
+        ([X11], [(DOWN, 1_000), (UP, 1_660), (DOWN, 1_660), (UP, 1_700), (DOWN, 1_700), (UP, 2_000)], "Ss"),
+        # struck fast again, it is released first
+        ([X11, "windows"], [(DOWN, 1_000), (UP, 1_030), (DOWN, 1_042)], "SsS"),
+        # a menu has taken the release
+        ([X11, "windows"], [(DOWN, 1_000), (DOWN, 3_000)], "SsS"),
+        (["windows", "cocoa", "wayland", X11], [(DOWN, 1_000), (UP, 1_500)], "Ss"),
+    ],
+)
+def test_releases_and_repetitions(
+    qtbot: QtBot,
+    window: QWidget,
+    hear: Hear,
+    platforms: list[str],
+    events: list[tuple[QEvent.Type, int]],
+    letters: str,
+) -> None:
+    """Of two keys together, as the platform gives them: with the key's code and the server's time."""
+    for platform in platforms:
+        heard = hear(platform)
+        for kind, time_ms in events:
+            for key, code in ((Qt.Key.Key_S, 39), (Qt.Key.Key_D, 40)):
+                event = QKeyEvent(kind, key, NONE, code, 0, 0, chr(key).lower())
+                event.setTimestamp(time_ms)
+                QApplication.sendEvent(window, event)
+        if platform == X11:
+            qtbot.waitUntil(lambda heard=heard: len(heard) >= 2 * len(letters))
+        of_s = [letter for letter in heard if letter in "Ss"]
+        of_d = [letter.replace("D", "S").replace("d", "s") for letter in heard if letter in "Dd"]
+        assert of_s == of_d == list(letters)

@@ -98,7 +98,6 @@ def start(dialog: AbxDialog) -> None:
 
 
 def texts(widget: QWidget) -> str:
-    """All that can be read now."""
     shown = [w for w in widget.findChildren(QLabel) + widget.findChildren(QAbstractButton) if w.isVisible()]
     return "\n".join(w.text() for w in shown)
 
@@ -108,10 +107,7 @@ def saved(tmp_path: Path) -> AbxRecord:
     return AbxRecord.model_validate_json(path.read_bytes())
 
 
-def test_a_whole_test_by_keyboard(
-    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A key sounds what it says, and X must be heard before it is judged."""
+def test_a_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     heard: list[str] = []
 
     class Heard(Pair):
@@ -181,7 +177,7 @@ def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, t
     assert not dialog.isVisible()
 
 
-def test_a_device_that_vanishes_ends_the_test(
+def test_a_vanished_device_ends_it(
     qtbot: QtBot, open_dialog: Open, sound: Sound, devices: list[AudioDevice], tmp_path: Path
 ) -> None:
     dialog = open_dialog()
@@ -223,7 +219,7 @@ def test_sounds_are_waited_for_and_a_test_without_a_point_is_reported(
     assert start_button(dialog).isEnabled() == can_start
 
 
-def test_at_another_rate_of_the_device_it_is_rendered_again(
+def test_another_rate_is_rendered_again(
     qtbot: QtBot, sound: Sound, devices: list[AudioDevice], open_dialog: Open
 ) -> None:
     asked: list[int] = []

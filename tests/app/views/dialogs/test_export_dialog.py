@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +16,6 @@ import soundfile
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
@@ -34,7 +32,6 @@ from app.presets.library import Library, PresetEntry, list_presets
 from app.rendering.note_sound import Struck
 from app.rendering.subject import path_of
 from app.session.choices import Choices
-from app.views import theme
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import PLUGIN_NAMES, PLUGIN_NOTE, SYSTEM_NAMES, HeardInstrument
 from app.window.exports import heard_note
@@ -43,6 +40,7 @@ from tests.app.places import choose_files, places_in
 from tests.app.questions import answered
 
 Make = Callable[..., ExportDialog]
+Notes = list[tuple[Any, ...]]
 GUITAR, HARP = (find_instrument(name).instrument for name in ("Classical guitar", "Concert harp"))
 SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
 
@@ -110,7 +108,6 @@ def note(library: Library) -> Callable[..., HeardNote | None]:
 
 @pytest.fixture
 def made(open_at: Make, note: Callable[..., HeardNote | None]) -> Make:
-    """A function that opens the dialog for a note."""
 
     def opened(more: dict[str, object] | None = None, **heard: Any) -> ExportDialog:
         settings = {"rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
@@ -119,9 +116,7 @@ def made(open_at: Make, note: Callable[..., HeardNote | None]) -> Make:
     return opened
 
 
-def test_it_writes_the_file_that_it_named(
-    qtbot: QtBot, made: Make, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_writes_the_named_file(qtbot: QtBot, made: Make, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dialog = made()
     assert not dialog.show_folder.isVisible()
     run(qtbot, dialog, "Saved")
@@ -137,9 +132,7 @@ def test_it_writes_the_file_that_it_named(
     assert opened == [str(folder)]
 
 
-def test_flac_is_chosen_in_the_list_or_by_the_ending_and_is_remembered(
-    qtbot: QtBot, made: Make, folder: Path
-) -> None:
+def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot: QtBot, made: Make, folder: Path) -> None:
     dialog = made({"format": "wav 32f"})
     edit, form = dialog.note.file.edit, dialog.wav["format"]
     choose(form, "flac 16")
@@ -221,10 +214,7 @@ def test_the_sound_that_is_heard_is_offered_first_and_the_choices_are_remembered
     assert made(choices.model_dump(), **heard).choices()[0] == choices
 
 
-def test_the_instruments_part_is_in_the_file_unless_the_string_alone_is_wanted(
-    qtbot: QtBot, made: Make, folder: Path
-) -> None:
-    """One line says which, with words and not in small print."""
+def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot: QtBot, made: Make, folder: Path) -> None:
     dialog = made({}, instrument=GUITAR)
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
@@ -245,42 +235,20 @@ def test_the_instruments_part_is_in_the_file_unless_the_string_alone_is_wanted(
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
-def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, own_look: QApplication, made: Make) -> None:
-    theme.apply_theme(own_look, "dark", 150)
-    dialog = made(None, instrument=HARP)
-    texts = [dialog.note.what, dialog.note.through_words]
-    for long in (False, True):  # as it opens, and as a text changes
-        if long:
-            texts[0].setText("A pluck of a string, heard at two places. " * 3)
-        for text in texts:
-            qtbot.waitUntil(lambda text=text: text.height() >= text.heightForWidth(text.width()))
-    assert dialog.height() <= dialog.screen().availableSize().height()
-    theme.apply_theme(own_look, "dark")
+@pytest.fixture
+def notes(monkeypatch: pytest.MonkeyPatch) -> Notes:
+    """What is asked of the instrument, in whose place are decaying sines."""
+    rendered: Notes = []
 
-
-class Notes:
-    """In place of the instrument: decaying sines. After the `last` one each waits until `gate` is open."""
-
-    def __init__(self) -> None:
-        self.rendered: list[tuple] = []
-        self.gate = threading.Event()  # never closed again: a note that looks late finds it open
-        self.last = 10**6
-
-    def render_note(self, instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
-        assert len(self.rendered) < self.last or self.gate.wait(20)
+    def render_note(instrument, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         advanced(seconds)
-        self.rendered.append((instrument, key, velocity, seconds, rate_hz, source))
+        rendered.append((key, velocity, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
         return np.stack([sound] * len(instrument.pickup.points), axis=1).astype(np.float32)
 
-
-@pytest.fixture
-def notes(monkeypatch: pytest.MonkeyPatch) -> Iterator[Notes]:
-    made = Notes()
-    monkeypatch.setitem(sys.modules, "app.player.offline", SimpleNamespace(render_note=made.render_note))
-    yield made
-    made.gate.set()
+    monkeypatch.setitem(sys.modules, "app.player.offline", SimpleNamespace(render_note=render_note))
+    return rendered
 
 
 @pytest.fixture
@@ -290,7 +258,6 @@ def preset(library: Library) -> PresetEntry:
 
 @pytest.fixture
 def sampler(open_at: Make, preset: PresetEntry, notes: Notes) -> Make:
-    """A function that opens the dialog for the guitar and samplers."""
 
     def opened(**choices: object) -> ExportDialog:
         remembered = SampledChoices.model_validate({**SMALL, **choices})
@@ -307,15 +274,13 @@ def test_an_sfz_is_written_as_it_was_reported(qtbot: QtBot, sampler: Make, folde
     for words in (f"Saved {folder / 'Classical_guitar.sfz'} (6 samples, ", "peak -1.0 dBFS", softer):
         assert words in dialog.state.text()
     zones = SampledPlan(GUITAR, SMALL["keys"], layers=SMALL["layers"]).zones
-    assert [note[1:] for note in notes.rendered] == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
+    assert notes == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
     samples = [*map(soundfile.info, (folder / "Classical_guitar_samples").glob("*.wav"))]
     assert [(each.samplerate, each.subtype) for each in samples] == 6 * [(44_100, "PCM_16")]
     assert dialog.save.text() == "Replace"
 
 
-def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
-    qtbot: QtBot, sampler: Make, folder: Path, notes: Notes
-) -> None:
+def test_size_and_error_of_pitch_follow_the_choices(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes) -> None:
     dialog = sampler()
     form, text = dialog.sampler, dialog.sampler.size_text.text
     for box, value, words in (
@@ -334,23 +299,7 @@ def test_size_and_error_of_pitch_follow_the_choices_and_nothing_is_written(
     qtbot.waitUntil(lambda: said in text())
     assert not form["bits"].isVisible()
     dialog.close_button.click()
-    assert not dialog.isVisible() and names_in(folder) == [] and notes.rendered == []
-
-
-@pytest.mark.parametrize("form", ["flac", "sf2"])
-def test_a_cancelled_export_leaves_nothing(
-    qtbot: QtBot, sampler: Make, notes: Notes, folder: Path, form: str
-) -> None:
-    notes.last = 3
-    dialog = sampler(form=form)
-    dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
-    with answered("Cancel export"):
-        dialog.close()  # as its cross does: it stays, to report what was written
-    assert dialog.isVisible()
-    notes.gate.set()
-    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text())
-    assert len(notes.rendered) < 6 and names_in(folder) == [] and dialog.save.text() == "Export"
+    assert not dialog.isVisible() and names_in(folder) == [] and notes == []
 
 
 def edit(form: Any, path: Path | str) -> None:
@@ -367,14 +316,12 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("words", IMPOSSIBLE)
-def test_impossible_choices_are_reported_before_it_begins(
-    qtbot: QtBot, sampler: Make, folder: Path, notes: Notes, words: str
-) -> None:
+def test_impossible_choices_are_reported(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes, words: str) -> None:
     dialog = sampler()
     form = dialog.sampler
     IMPOSSIBLE[words](form, folder)
     dialog.save.click()  # before they have settled
-    assert words in dialog.state.text() and notes.rendered == []
+    assert words in dialog.state.text() and notes == []
     qtbot.waitUntil(lambda: (dialog.save.isEnabled(), form.size_text.text()) == (False, ""))
     assert dialog.state.objectName() == "warning"
     edit(form, folder / f"y{form.file.suffix}")
@@ -383,23 +330,7 @@ def test_impossible_choices_are_reported_before_it_begins(
     qtbot.waitUntil(dialog.save.isEnabled)
     form["layers"].setValue(1)
     run(qtbot, dialog, "Saved")
-    assert len(notes.rendered) == 3
-
-
-def test_choices_of_samples_are_remembered(sampler: Make) -> None:
-    chosen = {"form": "wav", "bits": "16", "rate_hz": 44_100, "source": "truth"}
-    dialog = sampler()
-    for name, data in chosen.items():
-        choose(dialog.sampler[name], data)
-    dialog.sampler["every"].setValue(2)
-    dialog.sampler["dry"].setChecked(True)
-    choices = dialog.choices()[1]
-    assert choices == SampledChoices.model_validate({**chosen, **SMALL, "every": 2, "dry": True})
-    assert sampler(**choices.model_dump()).choices()[1] == choices
-    whole = sampler(keys=None)
-    assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == GUITAR.range
-    assert whole.choices()[1].keys is None
-    assert sampler(keys=(0, 127)).choices()[1].keys is None  # not of this instrument
+    assert len(notes) == 3
 
 
 def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
@@ -410,6 +341,8 @@ def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
     file = dialog.sampler.file
     assert file.path == folder / "Concert_harp.sfz"
     assert dialog.sampler.what.text().startswith("Concert harp")
+    for keys, kept in ((None, None), ((0, 127), None), ((60, 62), (60, 62))):  # not of this instrument: its own
+        assert sampler(keys=keys).choices()[1].keys == kept
     assert dialog.choices()[1].keys == (60, 62)
     choose_files(monkeypatch, folder / "mine")
     file.browse()
@@ -419,38 +352,10 @@ def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
     assert file.path == folder / "mine.sf2"
 
 
-def test_a_instrument_that_is_turned_meanwhile_waits_for_the_next_time(
-    qtbot: QtBot, sampler: Make, notes: Notes, preset: PresetEntry
-) -> None:
-    notes.last = 1
-    dialog = sampler()
-    dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 1)
-    dialog.show_subjects({"sampler": HeardInstrument(GUITAR.with_value("knobs.decay", 3.0), preset)})
-    notes.gate.set()
-    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
-    assert {note[0].knobs.decay for note in notes.rendered} == {GUITAR.knobs.decay}
-    dialog.save.click()
-    qtbot.waitUntil(lambda: notes.rendered[-1][0].knobs.decay == 3.0)
-    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
-
-
 @pytest.fixture
-def gate() -> threading.Event:
-    """What building waits for."""
-    made = threading.Event()
-    made.set()
-    return made
-
-
-@pytest.fixture
-def plugin(
-    open_at: Make, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, tmp_path: Path
-) -> Iterator[ExportDialog]:
+def plugin(open_at: Make, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ExportDialog:
     def build(images: list[str], form: str, target: str, path: Path, cache: Path, advanced: Any, *, replace: bool):
         assert replace
-        while not gate.wait(0.01):
-            advanced("compiling the kernels", 0.4)
         advanced("linking", 0.97)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{images} {form} {target} {identifier(images[0])}\0", encoding="utf-8")
@@ -460,11 +365,10 @@ def plugin(
     monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
     monkeypatch.setattr("app.export.plugin.image.image_of", lambda instrument, preset: instrument.name)
     monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
-    yield open_at("plugin", HeardInstrument(GUITAR, preset), ExportChoices(), SampledChoices())
-    gate.set()
+    return open_at("plugin", HeardInstrument(GUITAR, preset), ExportChoices(), SampledChoices())
 
 
-def test_a_plug_in_is_built_where_hosts_look_and_what_would_be_lost_is_said(
+def test_a_plug_in_is_built_where_hosts_look_and_losses_said(
     qtbot: QtBot, plugin: ExportDialog, folder: Path
 ) -> None:
     page = plugin.plugin
@@ -492,13 +396,3 @@ def test_a_plug_in_is_built_where_hosts_look_and_what_would_be_lost_is_said(
     page.changed.emit()
     qtbot.waitUntil(lambda: "is no plug-in of this program" in plugin.state.text())
     assert not plugin.save.isEnabled()
-
-
-def test_a_plug_in_can_be_cancelled_while_it_compiles(
-    qtbot: QtBot, plugin: ExportDialog, gate: threading.Event
-) -> None:
-    gate.clear()
-    run(qtbot, plugin, "Compiling the kernels")
-    plugin.close_button.click()
-    qtbot.waitUntil(lambda: "Cancelled; nothing was written." in plugin.state.text())
-    assert not plugin.plugin.file.path.exists()

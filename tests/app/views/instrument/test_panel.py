@@ -1,21 +1,37 @@
-"""The strip and its bar: surfaces, knobs on demand, macros, recording and scales."""
+"""The strip: its bar, the string's knobs on demand, and the browser of instruments."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QInputDialog, QLabel, QMenu, QStackedWidget
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QAbstractButton, QApplication, QInputDialog, QLabel, QMenu, QStackedWidget, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.instruments.instrument import Instrument, Macro, MacroTarget
+from app.instruments.instrument import Instrument, Macro, MacroTarget, Pickup
+from app.instruments.library import SHIPPED, InstrumentEntry, read_instrument
 from app.instruments.scales import SCALES
 from app.instruments.tuning import TuningChoice
 from app.player.events import Meter
+from app.views import theme
+from app.views.controls.browser import REALLY, Browser
+from app.views.controls.sideways import Sideways
 from app.views.instrument.instrument_bar import InstrumentBar
+from app.views.instrument.instrument_card import instrument_browser, instrument_row
 from app.views.instrument.panel import InstrumentPanel
-from tests.app.gestures import LEFT, RIGHT, named, press_keys, reported
+from app.views.instrument.string_knobs import StringKnobs
+from tests.app.gestures import LEFT, RIGHT, SHIFT, named, press_keys, reported
+
+Key = Qt.Key
+
+
+@pytest.fixture(scope="session")
+def guitar() -> Instrument:
+    """Six strings, stereo, five macros, a body."""
+    return read_instrument(SHIPPED / "classical_guitar.json")
 
 
 @pytest.fixture
@@ -51,23 +67,16 @@ def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: Inst
         panel.show_surface("neck")
 
 
-def test_in_a_low_window_the_knobs_of_the_string_take_the_place_of_the_keys(
-    qtbot: QtBot, panel: InstrumentPanel
-) -> None:
-    def seen() -> tuple[bool, bool, bool]:
-        return panel.bar.isVisible(), panel.knobs.isVisible(), panel.keys.isVisible()
-
+def test_in_a_low_window_the_strings_knobs_take_the_place_of_the_keys(qtbot: QtBot, panel: InstrumentPanel) -> None:
     hint, facts = panel.findChild(QLabel, "hint"), panel.knobs.facts
-    assert seen() == (True, False, True), "they are folded at first"
     panel.set_low(True)
     height = panel.sizeHint().height()
-    assert hint.isVisible()
+    assert hint.isVisible() and not panel.knobs.isVisible(), "they are folded at first"
     click(qtbot, panel, "String knobs")
-    assert panel.unfolded and seen() == (True, True, False) and not hint.isVisible()
+    assert panel.knobs.isVisible() and not panel.keys.isVisible() and not hint.isVisible()
     assert panel.sizeHint().height() <= height, "the strip takes no more room"
     panel.set_low(False)
-    assert seen() == (True, True, True)
-    assert panel.sizeHint().height() > height
+    assert panel.keys.isVisible() and panel.sizeHint().height() > height
     qtbot.waitUntil(lambda: facts.visibleRegion().boundingRect().height() == facts.height())  # and is not cut
     panel.set_low(True)
     for name, words in (("keys", "Surface: Keys"), ("neck", "Surface: Strings")):  # also the one checked already
@@ -77,9 +86,7 @@ def test_in_a_low_window_the_knobs_of_the_string_take_the_place_of_the_keys(
         assert panel.findChild(QStackedWidget).isVisible()
 
 
-def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button_that_is_there_only_then(
-    qtbot: QtBot, panel: InstrumentPanel
-) -> None:
+def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button(qtbot: QtBot, panel: InstrumentPanel) -> None:
     chosen, switched = reported(panel.touch_chosen), reported(panel.technique_switched)
     for part, names in ((panel.touch, "legato slide pluck"), (panel.techniques, "strum tremolo strum harmonics")):
         for name in names.split():
@@ -120,7 +127,7 @@ def test_macros_are_those_of_the_instrument_and_say_what_they_change(bar: Instru
     assert (shown(*[macro] * 8), shown()) == (8, 0)
 
 
-def test_the_record_button_shows_its_time_and_the_menu_beside_it_takes_and_settings(
+def test_the_record_button_and_the_menu_beside_it(
     qtbot: QtBot, bar: InstrumentBar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for seconds, text in ((73.4, "■  1:13"), (3.0, "■  0:03"), (-0.2, "■  −1"), (-1.5, "■  −2"), (None, "●  Record")):
@@ -146,22 +153,205 @@ def test_the_record_button_shows_its_time_and_the_menu_beside_it_takes_and_setti
 
 
 def test_a_scale_is_chosen_shown_by_name_and_left_again(bar: InstrumentBar, guitar: Instrument) -> None:
-    scale = "! a.scl\n!\nTwo <b>halves</b>\n 2\n!\n 600.\n 2/1\n"
     keymap = "2\n0\n127\n60\n69\n440\n2\n0\n1\n"
     actions = {each.text(): each for each in bar.scale.menu().actions()}
-
-    def shown(**tuning: str) -> tuple[str, list[str]]:
-        bar.show_instrument(guitar.model_copy(update={"tuning": TuningChoice(**tuning)}), own=True)
-        tip = bar.scale.toolTip()
-        assert ("halves" in tip, "keyboard mapping" in tip) == (tuning.get("scale") == scale, "keymap" in tuning)
-        assert "<b>" not in tip
-        return bar.scale.text(), [name for name, each in actions.items() if each.isChecked()]
-
-    assert shown(scale=scale)[0] == shown(scale=scale, keymap=keymap)[0] == "Two <b>halves</b>  ▾"
-    assert shown(keymap=keymap)[0] == "Twelve equal steps  ▾"
     asked = reported(bar.scale_asked)
-    actions["Vallotti"].trigger()
-    assert shown(scale=SCALES["Vallotti"]) == ("Vallotti  ▾", ["Vallotti"])
-    actions["Twelve equal steps"].trigger()
-    assert asked == ["Vallotti", ""]
-    assert shown() == ("Scale  ▾", ["Twelve equal steps"])
+    for tuning, text, chosen in (
+        ({"scale": SCALES["Vallotti"]}, "Vallotti", "Vallotti"),
+        ({"keymap": keymap}, "Twelve equal steps", "Twelve equal steps"),
+        ({}, "Scale", "Twelve equal steps"),
+    ):
+        bar.show_instrument(guitar.model_copy(update={"tuning": TuningChoice(**tuning)}), own=True)
+        assert (bar.scale.text(), "keyboard mapping" in bar.scale.toolTip()) == (f"{text}  ▾", "keymap" in tuning)
+        assert [name for name, each in actions.items() if each.isChecked()] == [chosen]
+        actions[chosen].trigger()
+    assert asked == ["Vallotti", "", ""]
+    bar.show_instrument(
+        guitar.model_copy(update={"tuning": TuningChoice(scale="Two <b>halves</b>\n 1\n 2/1\n")}), own=True
+    )
+    assert bar.scale.text() == "Two <b>halves</b>  ▾" and "<b>" not in bar.scale.toolTip()
+
+
+@pytest.fixture
+def knobs(show: Callable[..., StringKnobs], guitar: Instrument) -> StringKnobs:
+    made = show(StringKnobs(), 1200, 110)
+    made.show_instrument(guitar)
+    return made
+
+
+def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(
+    knobs: StringKnobs, guitar: Instrument
+) -> None:
+    stereo = guitar.model_copy(update={"pickup": Pickup(points=(0.1, 0.6))})
+    knobs.show_instrument(stereo)
+    metrics = QFontMetrics(theme.small_font(9, grows=False))
+    for field, knob in knobs.knobs.items():
+        assert metrics.horizontalAdvance(knob.accessibleName().upper()) <= knob.sizeHint().width(), field
+        if field.startswith("tuning."):
+            continue
+        assert knob.value == stereo.value(field)
+        for value in knob.parameter.limits:
+            if field not in ("pluck.softest_mm", "pluck.hardest_mm"):  # which bound each other
+                assert stereo.with_value(field, value).value(field) == pytest.approx(value)
+    assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
+
+
+def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs, guitar: Instrument) -> None:
+    asked = reported(knobs.changed)
+    press_keys(knobs.knobs["knobs.gauge"], Key.Key_Up)
+    knobs.knobs["tuning.transpose"].value_asked.emit(2.6)  # by whole keys
+    press_keys(knobs.knobs["tuning.transpose"], Key.Key_Down, held=SHIFT)
+    knobs.shape.activated.emit(knobs.shape.findText("Triangle"))
+    qtbot.mouseClick(knobs.knobs["knobs.decay"], LEFT)
+    knobs.show_instrument(guitar.with_value("pluck.position", 0.4), guitar)
+    qtbot.mouseDClick(knobs.knobs["pluck.position"], LEFT)  # back to what was saved
+    assert asked == [
+        ("knobs.gauge", pytest.approx(1.03 * guitar.knobs.gauge)),
+        ("tuning.transpose", 3.0),
+        ("tuning.transpose", 0.0),
+        ("pluck.shape", "triangular"),
+        ("pluck.position", guitar.pluck.position),
+    ]
+    assert knobs.shape.currentText() == "Rounded"
+    shapes = [knobs.shape.itemText(row) for row in range(knobs.shape.count())]
+    assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Rounded"]
+
+
+def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
+    knobs: StringKnobs, guitar: Instrument
+) -> None:
+    keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
+    changes = {"pluck.shape": "triangular", "damping.let_ring": True, "tuning.keymap": keymap}
+    dead = guitar.model_dump()
+    for (part, _, name), value in ((field.partition("."), value) for field, value in changes.items()):
+        dead[part][name] = value
+    widths = dict.fromkeys(("pluck.width", "pluck.width_hard"), "no width")
+    why = {**widths, "damping.release_t60_s": "ring", "tuning.a4_hz": "reference pitch of its own"}
+    for instrument, barred in ((Instrument.model_validate(dead), set(why)), (guitar, set())):
+        knobs.show_instrument(instrument)
+        assert {field for field, knob in knobs.knobs.items() if not knob.isEnabled()} == barred
+        for field, words in why.items():
+            assert (words in knobs.knobs[field].toolTip()) == (field in barred)
+    knobs.show_instrument(read_instrument(SHIPPED / "timpani.json"))
+    assert not knobs.shape.isEnabled(), "drums have no pluck to shape"
+
+
+def test_knobs_hidden_while_text_grew_have_their_room(show: Callable[..., Sideways], own_look: QApplication) -> None:
+    knobs = StringKnobs()
+    row = show(Sideways(knobs), 700, 200)
+    row.hide()
+    theme.apply_theme(own_look, "dark", 150)
+    row.show()
+    QApplication.processEvents()
+    assert all(knob.width() >= knob.sizeHint().width() for knob in knobs.knobs.values())
+    assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
+    theme.apply_theme(own_look, "dark")
+
+
+def entry(guitar: Instrument, name: str, own: bool = False, **changes: object) -> InstrumentEntry:
+    folder = Path("/own") if own else SHIPPED
+    return InstrumentEntry(folder / f"{name}.json", guitar.model_copy(update={"name": name, **changes}))
+
+
+def fill(browser: Browser, entries: list[InstrumentEntry], chosen: str) -> None:
+    browser.show_rows([instrument_row(each) for each in entries], {"steel"}, chosen, "/own")
+
+
+def place(browser: Browser, row: int) -> QRect:
+    return browser.list.visualRect(browser.list.model().index(row, 1))
+
+
+def state(browser: Browser) -> tuple[str, str]:
+    """What is selected, and what the list has as its current row."""
+    return browser.selected, str(browser.list.currentIndex().data())
+
+
+@pytest.fixture
+def browser(qtbot: QtBot, guitar: Instrument) -> Iterator[Browser]:
+    """Of nylon, steel, which is a favourite and loaded, one's own and a harp."""
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.resize(1280, 800)
+    made = instrument_browser(window)
+    entries = [
+        entry(guitar, "nylon"),
+        entry(guitar, "steel", description="Bright and long"),
+        entry(guitar, "mine", own=True),
+        entry(guitar, "harp of brass", category="harp"),
+    ]
+    fill(made, entries, "steel")
+    window.show()
+    made.show_over()
+    yield made
+    made.dismiss()
+
+
+@pytest.fixture
+def chosen(browser: Browser) -> list[str]:
+    return reported(browser.chosen)
+
+
+def test_words_in_any_order_category_owner_and_favourites_filter(browser: Browser) -> None:
+    for words, name, key, listed in (
+        ("BRASS harp", "", "", ["harp of brass"]),
+        ("long", "", "", ["steel"]),
+        ("guitar mi", "", "", ["mine"]),
+        ("", "Category", "harp", ["harp of brass"]),
+        ("", "Bank", "user", ["mine"]),
+        ("", "starred", "", ["steel"]),
+    ):
+        browser.search.setText(words)
+        browser.starred.setChecked(name == "starred")
+        if key:
+            browser.filters[name].setCurrentIndex(browser.filters[name].findData(key))
+        assert browser.listed == listed
+        browser.clear_filter()
+        assert len(browser.listed) == 4
+    browser.search.setText("tuba")
+    assert browser.listed == []
+    browser.dismiss()
+    assert browser.listed, "closed without any, next and previous would lead nowhere"
+
+
+def test_arrows_load_and_play_and_a_hit_is_only_shown(qtbot: QtBot, browser: Browser, chosen: list[str]) -> None:
+    with qtbot.waitSignal(browser.played) as heard:
+        for _ in range(3):
+            press_keys(browser.search if not chosen else browser.list, Key.Key_Down)
+    assert chosen == ["nylon", "mine", "harp of brass"] and heard.args == ["harp of brass"]
+    press_keys(browser.list, Key.Key_PageUp)
+    assert chosen.pop() == "steel"
+    asked = reported(browser.favourite_asked, browser.played)
+    browser.search.setText("harp")
+    assert state(browser) == ("harp of brass", "harp of brass") and "<b>harp of brass</b>" in browser.card.text()
+    qtbot.mouseClick(browser.star, LEFT)
+    assert (asked, len(chosen)) == (["harp of brass"], 3), "it is shown, not loaded"
+    qtbot.mouseClick(browser.play_button, LEFT)
+    assert asked[1:] == chosen[3:] == ["harp of brass"]
+
+
+def test_a_hit_by_name_is_better_than_one_by_description(qtbot: QtBot, browser: Browser, guitar: Instrument) -> None:
+    entries = [entry(guitar, "bass", description="Starts sharp"), entry(guitar, "nylon"), entry(guitar, "brass harp")]
+    fill(browser, entries, "nylon")
+    for words, selected in (("harp", "brass harp"), ("starts", "bass")):
+        browser.search.setText(words)
+        assert browser.selected == selected
+    browser.set_chosen("bass")
+    browser.search.setText("harp")
+    assert (browser.listed, browser.selected) == (["bass", "brass harp"], "brass harp"), "although bass is loaded"
+    qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place(browser, 1).center())
+    assert browser.selected == "bass" and "<b>bass</b>" in browser.card.text()
+
+
+def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: QtBot, browser: Browser) -> None:
+    renamed, deleted = reported(browser.rename_asked), reported(browser.delete_asked)
+    assert not browser.rename.isVisible() and not browser.delete.isVisible()
+    browser.set_chosen("mine")
+    qtbot.mouseClick(browser.rename, LEFT)
+    assert renamed == ["mine"]
+    qtbot.mouseClick(browser.delete, LEFT)
+    assert (browser.delete.text(), deleted) == (REALLY, [])
+    browser.set_chosen("steel")
+    browser.set_chosen("mine")
+    for asked in ([], ["mine"]):  # first: another was looked at meanwhile
+        qtbot.mouseClick(browser.delete, LEFT)
+        assert deleted == asked

@@ -1,4 +1,4 @@
-"""Plots over time, their line, axes and legend, and the table of figures."""
+"""Plots: their line, axes, legend and table, and what spectrum and waveform draw of a signal."""
 
 from __future__ import annotations
 
@@ -15,18 +15,24 @@ from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.analysis.moment import StringFrame
+from app.presets.library import Library
 from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.stage.session import Session
 from app.views import theme
 from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow
 from app.views.plots.legend import SHARE, Legend
 from app.views.plots.time_plot import TimePlot
+from app.views.string.view import StringView
+from app.window.panels.spectrum import COLUMNS, Analyser, SpectrumPanel
+from app.window.panels.waveform import WaveformPanel, extremes
 from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_keys, reported, turn_wheel
 
 Key = Qt.Key
 Show = Callable[..., Any]
 TICKS = [(float(place), f"{place}") for place in range(11)]
-COLUMNS = (FigureColumn("name", "name", "a name"), FigureColumn("level", "level", "in dB", lambda v: f"{v:.1f}"))
+FIGURES = (FigureColumn("name", "name", "a name"), FigureColumn("level", "level", "in dB", lambda v: f"{v:.1f}"))
 
 
 @pytest.fixture
@@ -82,9 +88,7 @@ def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot
         assert (pixels(plot) == whole).all()
 
 
-def test_the_keyboard_seeks_and_zooms_and_a_click_seeks_and_with_shift_reports_the_place_too(
-    qtbot: QtBot, plot: TimePlot
-) -> None:
+def test_the_keyboard_seeks_and_zooms_and_a_click_reports_its_place(qtbot: QtBot, plot: TimePlot) -> None:
     asked = reported(plot.seek_asked)
     plot.show_playhead(1.0)
     press_keys(plot, Key.Key_Right, Key.Key_Left, Key.Key_Home)
@@ -125,9 +129,7 @@ def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(q
     qtbot.mouseRelease(view, RIGHT, pos=end)
 
 
-def test_the_view_stays_for_a_take_of_the_same_length_and_the_end_of_training_is_seen(
-    qtbot: QtBot, plot: TimePlot
-) -> None:
+def test_the_view_stays_for_a_take_of_the_same_length_and_training_is_seen(qtbot: QtBot, plot: TimePlot) -> None:
     assert (plot.horizon.isVisible(), plot.horizon.value()) == (True, 0.25)
     shaded, unshaded = (
         pixels(plot)[place_of(plot, time_s, 0.9).y(), place_of(plot, time_s, 0.9).x()] for time_s in (0.12, 2.0)
@@ -202,7 +204,7 @@ def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot, show: Show)
 
 @pytest.fixture
 def table(show: Show) -> FiguresTable:
-    made = show(FiguresTable("Figures", COLUMNS))
+    made = show(FiguresTable("Figures", FIGURES))
     made.show_rows([TableRow("b", ("b", 2.12345)), TableRow("a", ("a", None)), TableRow("c", ("c", -10.0))])
     return made
 
@@ -227,3 +229,81 @@ def test_rows_are_chosen_by_keys_and_clicks_and_stay_chosen(qtbot: QtBot, table:
     for rows, chosen in ((("c", "d"), "c"), (("d",), None)):
         table.show_rows([TableRow(key, (key, 3.0)) for key in rows])
         assert table.chosen_key == chosen
+
+
+@pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])
+@pytest.mark.parametrize("level_db", [0.0, -40.0])
+def test_a_sine_shows_its_level_at_its_frequency(rate_hz: int, level_db: float) -> None:
+    analyser = Analyser(rate_hz)
+    time_s = np.arange(analyser.window_frames) / rate_hz
+    signal = 10 ** (level_db / 20) * np.sin(2 * np.pi * 997 * time_s)
+    shown_db = analyser.level_db(signal.astype(np.float32))
+    assert shown_db.max() == pytest.approx(level_db, abs=0.2)
+    assert analyser.column_hz[shown_db.argmax()] == pytest.approx(997, rel=0.02)
+    assert (analyser.level_db(np.zeros(10, np.float32)) == -130).all()
+
+
+def test_extremes_keep_every_peak_without_gaps_or_beats() -> None:
+    signal = np.zeros(100_000, np.float32)
+    signal[12_345], signal[67_890] = 1, -1
+    values = extremes(signal, np.linspace(0, 100_000, 1001).astype(int))
+    assert (len(values), values[247], values[1356], np.count_nonzero(values)) == (2000, 1, -1, 2)
+    flank = extremes(np.linspace(0, 1, 10_000, dtype=np.float32), np.linspace(0, 10_000, 101).astype(int))
+    lowest, highest = flank[0::2], flank[1::2]
+    assert (highest[:-1] >= lowest[1:]).all() and (lowest[:-1] < highest[:-1]).all() and highest[-1] == 1
+    sine = np.sin(2 * np.pi * np.arange(48_000) * 480 / 2.1 / 48_000).astype(np.float32)  # of 2.1 columns
+    edges = np.linspace(0, 48_000, 481).astype(np.int64)
+    values = extremes(sine, edges, around=3)
+    assert values[2:-2:2] == pytest.approx(-1, abs=0.01) and values[3:-2:2] == pytest.approx(1, abs=0.01)
+    assert np.ptp(extremes(sine, edges)[3:-2:2]) > 0.1, "or the test tests nothing"
+
+
+@pytest.fixture
+def waveform(show: Callable[..., WaveformPanel]) -> WaveformPanel:
+    """A second of the model alone."""
+    made = show(WaveformPanel(Session(), Library([])), 600, 240)
+    made.plot.set_times(1.0, 0.25)
+    made.set_sources(DEFAULT_SOURCES[:1])
+    return made
+
+
+def drawn(panel: WaveformPanel | SpectrumPanel) -> pg.PlotDataItem:
+    return panel.plot.getPlotItem().listDataItems()[0]
+
+
+def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(waveform: WaveformPanel) -> None:
+    signal, columns = np.sin(np.arange(48_000, dtype=np.float32)), waveform.plot.columns
+
+    def shown(frames: int) -> tuple[NDArray[np.float64], object]:
+        waveform.show_signal("model", signal[:frames], 48_000)
+        time_s = drawn(waveform).getData()[0]
+        return np.empty(0) if time_s is None else time_s, drawn(waveform).opts["connect"]
+
+    time_s, connect = shown(48_000)
+    assert (len(time_s), connect) == (2 * columns, "pairs")
+    time_s, _ = shown(24_000)  # rendered half-way: half of the columns
+    assert len(time_s) == pytest.approx(columns, abs=2)
+    assert np.diff(time_s[0::2]) * columns == pytest.approx(1), "no stroke beside the next pixel"
+    waveform.plot.getPlotItem().setXRange(0.1, 0.102, padding=0)
+    time_s, connect = shown(48_000)
+    assert (len(time_s), connect) == (pytest.approx(96, abs=3), "all")
+    assert len(shown(10)[0]) == 0, "nothing of what is in view"
+
+
+def test_animated_plots_survive(qtbot: QtBot, waveform: WaveformPanel, show: Callable[..., Any]) -> None:
+    """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
+    spectrum, string = (show(view, 600, 240) for view in (SpectrumPanel(Session(), Library([])), StringView()))
+    spectrum.set_rate(16_000)
+    random = np.random.default_rng(0)
+    for frame in range(150):
+        noise = random.standard_normal(16_000).astype(np.float32)
+        if frame % 4 == 0:
+            spectrum.show_signal("model", noise, Analyser(16_000))
+            waveform.show_signal("model", noise, 16_000)
+        waveform.plot.show_playhead(frame / 150)
+        shapes = {"model": noise[:101], "truth": noise[101:202]}
+        string.show_frame(StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()}))
+        qtbot.wait(1)
+    assert drawn(waveform).getData()[1].max() > 2
+    levels = [curve.getData()[0] for curve in spectrum.plot.getPlotItem().listDataItems()]
+    assert COLUMNS in {len(level) for level in levels if level is not None}

@@ -1,4 +1,4 @@
-"""What a file says is shown as it is: no label and no tip takes it for markup, which would load what it names."""
+"""Both themes can be read, and what a file says is shown as it is: no label and no tip takes it for markup."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QColor
 from PySide6.QtGui import Qt as GuiQt
-from PySide6.QtWidgets import QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
+from PySide6.QtWidgets import QApplication, QCheckBox, QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
@@ -17,6 +18,7 @@ from app.export.sampled.choices import SampledChoices
 from app.instruments.library import SHIPPED, InstrumentEntry, read_instrument
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
+from app.views import theme
 from app.views.controls.choosers import PresetBar
 from app.views.controls.elided_label import Readout
 from app.views.controls.notice_bar import NoticeBar
@@ -27,9 +29,47 @@ from app.views.dialogs.export_pages import HeardInstrument
 from app.views.dialogs.preset_card import preset_browser, preset_row
 from app.views.instrument.instrument_card import instrument_browser, instrument_row
 from app.views.instrument.panel import InstrumentPanel
+from app.views.plots.colour_maps import displacement_map, error_map, level_map, share_map
 from app.window.exports import heard_note
 from engine.presets import read_info
+from tests.app.gestures import picture
 from tests.app.places import places_in
+
+
+@pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen: theme.Theme) -> None:
+    for ground in (chosen.background, chosen.panel, chosen.raised, chosen.ground_top, chosen.ground_bottom):
+        for text in (chosen.text, chosen.faint, chosen.model, chosen.truth, chosen.warning, chosen.good):
+            assert theme.contrast(text, ground) >= 4.5, (text, ground)
+    for filled in (chosen.model, chosen.truth, chosen.good):  # the text of a checked button
+        assert theme.contrast(chosen.background, filled) >= 4.5
+    colours = chosen.colours.values()
+    assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
+
+
+def test_a_theme_is_put_on_with_ticks_that_are_seen_and_maps_on_its_ground(
+    qtbot: QtBot, own_look: QApplication
+) -> None:
+    for choice, chosen in (("dark", theme.DARK), ("light", theme.LIGHT)):
+        theme.apply_theme(own_look, choice, 150)  # type: ignore[arg-type]
+        assert theme.present == replace(chosen, scale=1.5)
+        assert chosen.panel in own_look.styleSheet()
+        assert own_look.palette().window().color() == QColor(chosen.background)
+        box = QCheckBox("tick")
+        qtbot.addWidget(box)
+        box.setChecked(True)
+        image = picture(box)
+        width = int(22 * image.devicePixelRatio())
+        seen = {image.pixelColor(x, y).rgb() for x in range(width) for y in range(image.height())}
+        assert QColor(chosen.text).rgb() in seen  # the box is filled
+        assert QColor(chosen.background).rgb() in seen  # and the tick stands out from it
+        box.setChecked(False)
+        assert picture(box) != image
+        for made, ground_at in ((level_map, 0.0), (share_map, 0.0), (error_map, 0.5), (displacement_map, 0.5)):
+            ground, much = made().map([ground_at, 1.0], mode="qcolor")
+            assert theme.contrast(ground.name(), chosen.panel) < 1.25
+            assert theme.contrast(much.name(), chosen.panel) > 3
+
 
 EVIL = "<img src=evil>"
 
@@ -56,9 +96,7 @@ def texts(root: QObject) -> str:
     return "\n".join([*(label.text() for label in labels), *(each.toolTip() for each in root.findChildren(QWidget))])
 
 
-def test_no_view_that_holds_a_files_text_takes_it_for_markup(
-    qtbot: QtBot, small_preset: Path, tmp_path: Path
-) -> None:
+def test_no_view_takes_a_files_text_for_markup(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> None:
     """An instrument's name can hold no markup, for it is a file's; its other texts can."""
     words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
     path = Path("/x") / f"{EVIL}.safetensors"

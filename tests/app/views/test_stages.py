@@ -1,4 +1,4 @@
-"""Gestures on the string, and its picture, in which all can be read."""
+"""Gestures on the string and on a drum, and their pictures, in which all can be read."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
+from app.session.shown import DEFAULT_SOURCES
+from app.views import theme
+from app.views.drum.axes import HeadAxes
+from app.views.drum.ink import HeadFrame, fitting_scale_m, image_of, kept_scale_m
+from app.views.drum.view import DrumView
 from app.views.stage import LABEL_GAP, label_places
 from app.views.string.axes import StringAxes
 from app.views.string.ground import TrainedPlucks, paint_ground, scale
@@ -21,11 +26,13 @@ from tests.app.gestures import (
     CONTROL,
     LEFT,
     NONE,
+    RIGHT,
     SHIFT,
     Paints,
     colour_at,
     drag,
     picture,
+    press_keys,
     reported,
     turn_wheel,
 )
@@ -50,7 +57,6 @@ def view(show: Callable[..., StringView]) -> StringView:
 
 @pytest.fixture
 def plucks(view: StringView) -> list[tuple[float, float]]:
-    """The positions and amplitudes in mm that are asked for."""
     return reported(view.pluck_drawn)
 
 
@@ -83,9 +89,7 @@ def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot: QtBot, vi
         assert whole is not False or paints.rects[-1].bottom() <= AXES.bottom
 
 
-def test_the_handle_is_dragged_without_a_jump_also_beyond_the_top(
-    view: StringView, plucks: list[tuple[float, float]]
-) -> None:
+def test_the_handle_is_dragged_without_a_jump(view: StringView, plucks: list[tuple[float, float]]) -> None:
     drags = reported(view.drag_started, view.drag_ended, view.pluck_released)
     grip = HANDLE + QPoint(5, 4)
     drag(view, grip, grip + QPoint(80, 0))
@@ -98,10 +102,9 @@ def test_the_handle_is_dragged_without_a_jump_also_beyond_the_top(
 
 
 @pytest.mark.parametrize("mm", [4.0, 0.2])  # the latter is the knob's doing
-def test_a_click_plucks_there_as_far_as_the_last_time_and_a_drag_sets_an_amplitude_that_is_not_next_to_nothing(
+def test_a_click_plucks_as_far_as_the_last_time_and_a_drag_sets_it(
     view: StringView, plucks: list[tuple[float, float]], mm: float
 ) -> None:
-    """On the string's own line too, where the pointer gives next to no amplitude; and a hand is not still."""
     released = reported(view.pluck_released)
     view.pluck_drawn.emit(0.5, mm)
     x = round(AXES.x(0.3))
@@ -155,27 +158,23 @@ def test_two_markers_are_reported_apart_and_reset_and_the_bridge_has_none(qtbot:
     assert resets == ["right"]
 
 
-@pytest.mark.parametrize(
-    ("key", "held", "signal", "values"),
-    [
-        (Key.Key_Right, NONE, "pluck_drawn", (pytest.approx(0.51), 4.0)),
-        (Key.Key_Down, NONE, "pluck_drawn", (0.5, 3.5)),
-        (Key.Key_Up, SHIFT, "pluck_drawn", (0.5, pytest.approx(4.05))),
-        (Key.Key_Left, SHIFT, "listening_point_moved", ("left", pytest.approx(0.36))),
-        (Key.Key_Right, SHIFT | CONTROL, "listening_point_moved", ("right", pytest.approx(0.71))),
-        (Key.Key_Up, CONTROL, "width_stepped", 1.0),
-        (Key.Key_Left, CONTROL, "shape_stepped", -1),
-        (Key.Key_Delete, NONE, "pluck_reset", ()),
-        (Key.Key_Delete, SHIFT, "listening_point_reset", "left"),
-    ],
-)
-def test_everything_by_keyboard(
-    qtbot: QtBot, view: StringView, key: Qt.Key, held: Qt.KeyboardModifier, signal: str, values: object
-) -> None:
+def test_everything_by_keyboard(view: StringView) -> None:
     view.set_listening_points(0.37, 0.7)
-    seen = reported(getattr(view, signal))
-    qtbot.keyClick(view, key, held)
-    assert seen[0] == values
+    for key, held, signal, values in (
+        (Key.Key_Right, NONE, view.pluck_drawn, (pytest.approx(0.51), 4.0)),
+        (Key.Key_Down, NONE, view.pluck_drawn, (0.5, 3.5)),
+        (Key.Key_Up, SHIFT, view.pluck_drawn, (0.5, pytest.approx(4.05))),
+        (Key.Key_Left, SHIFT, view.listening_point_moved, ("left", pytest.approx(0.36))),
+        (Key.Key_Right, SHIFT | CONTROL, view.listening_point_moved, ("right", pytest.approx(0.71))),
+        (Key.Key_Up, CONTROL, view.width_stepped, 1.0),
+        (Key.Key_Left, CONTROL, view.shape_stepped, -1),
+        (Key.Key_Delete, NONE, view.pluck_reset, ()),
+        (Key.Key_Delete, SHIFT, view.listening_point_reset, "left"),
+    ):
+        view.pluck_drawn.emit(0.5, 4.0)
+        seen = reported(signal)
+        press_keys(view, key, held=held)
+        assert seen[0] == values, (key, held)
 
 
 def test_what_was_not_trained_and_the_envelope_are_seen(view: StringView) -> None:
@@ -184,10 +183,8 @@ def test_what_was_not_trained_and_the_envelope_are_seen(view: StringView) -> Non
     shaded = picture(view)
     for position, mm in ((0.1, 3.0), (0.9, -3.0), (0.4, 3.0), (0.4, 0.5)):
         at = AXES.at(position, mm).toPoint()
-        assert any(shaded.pixel(at + QPoint(i, 0)) != plain.pixel(at + QPoint(i, 0)) for i in range(8)), (
-            position,
-            mm,
-        )
+        near = [at + QPoint(i, 0) for i in range(8)]
+        assert any(shaded.pixel(each) != plain.pixel(each) for each in near), (position, mm)
     inside = AXES.at(0.42, 1.5).toPoint()
     assert shaded.pixel(inside) == plain.pixel(inside)
     still = frame_of()
@@ -213,7 +210,6 @@ def test_of_two_motions_in_one_place_both_are_seen_and_of_two_that_part_the_one_
 
 
 def test_the_scale_follows_the_decay_and_the_pluck_comes_back(view: StringView, plucks: list[object]) -> None:
-    """A click half-way up asks for another amplitude at another scale."""
     rest, seen = picture(view), []
     for mm in (4.0, 1.5, 0.4, 0.05):
         view.show_frame(frame_of(mm))
@@ -261,3 +257,104 @@ def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot: QtBot,
     assert all(place.left() >= 0 and place.right() <= axes.width for place, _ in places)
     if points == (0.2, 0.8):  # each under its point
         assert [place.center().x() for place, _ in places] == pytest.approx([axes.x(point) for point in points])
+
+
+@pytest.fixture
+def drum(show: Callable[..., DrumView]) -> DrumView:
+    made = DrumView()
+    made.set_drum("Tom, A2", "circle", (0.33, 0.33))
+    made.set_plain(True)
+    made.set_sources(DEFAULT_SOURCES[:1])
+    return show(made, 900, 320)
+
+
+@pytest.mark.parametrize("shape", ["circle", "rectangle", "bar"])
+@pytest.mark.parametrize("heads", [1, 2])
+def test_places_lead_to_pixels_and_back(shape: str, heads: int) -> None:
+    axes = HeadAxes(900, 320, shape, (0.4, 0.2), heads)  # type: ignore[arg-type]
+    for head in range(heads):
+        for place in ((0.0, 0.0), (0.5, -0.3), (-0.6, 0.7)):
+            assert axes.place(axes.at(head, place)) == pytest.approx(place)
+        area = axes.rect(head)
+        assert area.left() >= 0 and area.right() <= 900
+        assert area.height() / area.width() == pytest.approx(0.5)
+    assert axes.place(QPointF(2, 2)) is None
+    corner = axes.place(axes.at(0, (0.9, 0.9)))
+    assert (corner is None) == (shape == "circle")
+
+
+def test_a_click_strikes_there_and_with_shift_hard(qtbot: QtBot, drum: DrumView) -> None:
+    struck = reported(drum.struck)
+    at = drum.axes.at(0, (0.4, -0.5)).toPoint()
+    qtbot.mouseClick(drum, LEFT, pos=at)
+    qtbot.mouseClick(drum, LEFT, SHIFT, pos=at)
+    qtbot.mouseDClick(drum, LEFT, pos=at)
+    qtbot.mouseClick(drum, LEFT, pos=QPoint(3, 3))
+    qtbot.mouseClick(drum, RIGHT, pos=at)
+    near = (pytest.approx(0.4, abs=0.01), pytest.approx(-0.5, abs=0.01))
+    assert struck == [(*near, False), (*near, True), (*near, False)]
+
+
+def test_a_mark_is_dragged_and_reset(qtbot: QtBot, drum: DrumView) -> None:
+    drum.set_listening_points(0.3, 0.8)
+    moved, reset = reported(drum.listening_point_moved), reported(drum.listening_point_reset)
+    struck, axes = reported(drum.struck), drum.axes
+    foot = round(axes.bottom) + 8
+    places = [QPoint(x, foot) for x in (round(axes.x(0.8)), round(axes.x(0.6)), 5_000)]
+    drag(drum, *places)
+    assert moved == [("right", pytest.approx(0.6, abs=0.01)), ("right", 1.0)]
+    cursors = set()
+    for at in (places[0], axes.at(0, (0.4, -0.5)).toPoint(), QPoint(3, 3)):
+        qtbot.mouseMove(drum, at)
+        cursors.add(drum.cursor().shape())
+    assert len(cursors) == 3, "the pointer shows what a press would do"
+    qtbot.mouseDClick(drum, LEFT, pos=QPoint(round(axes.x(0.3)), foot))
+    assert (reset, struck) == (["left"], [])
+
+
+def test_keys_move_the_place_the_mark_and_reset_them(drum: DrumView) -> None:
+    places, marks = reported(drum.place_moved), reported(drum.listening_point_moved)
+    resets = reported(drum.place_reset, drum.listening_point_reset)
+    drum.place_moved.connect(lambda *to: drum.set_place(to))
+    drum.set_listening_points(0.5, 0.7)
+    press_keys(drum, Key.Key_Right, Key.Key_Up, Key.Key_Left, Key.Key_Down)
+    assert places == [pytest.approx(to) for to in ((0.05, 0.0), (0.05, 0.05), (0.0, 0.05), (0.0, 0.0))]
+    press_keys(drum, Key.Key_Right, held=SHIFT)
+    press_keys(drum, Key.Key_Left, held=SHIFT | CONTROL)
+    assert marks == [("left", pytest.approx(0.51)), ("right", pytest.approx(0.69))]
+    press_keys(drum, Key.Key_Delete)
+    press_keys(drum, Key.Key_Delete, held=SHIFT)
+    assert resets == [(), "left", "right"]
+    drum.set_place((0.97, 0.0))
+    press_keys(drum, Key.Key_Right)
+    assert len(places) == 4, "the rim is not struck"
+
+
+def test_up_is_amber_down_is_blue_and_rest_is_the_panel(drum: DrumView) -> None:
+    columns = np.broadcast_to(np.linspace(-1, 1, 57), (57, 57))
+    for up in (1, -1):
+        drum.show_frame(HeadFrame({"model": (1e-3 * up * columns).astype(np.float32)}))
+        image = picture(drum)
+        amber, blue, middle = (colour_at(image, drum.axes.at(0, (x, 0.4))) for x in (0.8 * up, -0.8 * up, 0.0))
+        assert amber.red() > amber.blue() + 60
+        assert blue.blue() > blue.red() + 60
+        panel = QColor(theme.PANEL)
+        assert max(abs(middle.red() - panel.red()), abs(middle.blue() - panel.blue())) < 30
+    drum.show_frame(None)
+    assert colour_at(picture(drum), drum.axes.at(0, (0.8, 0.4))) == panel
+    drum.set_sources(DEFAULT_SOURCES)  # a picture each
+    up, down = np.full((57, 57), 1e-3, np.float32), np.full((57, 57), -1e-6, np.float32)
+    drum.show_frame(HeadFrame({"model": up, "truth": down}))
+    first, second = (colour_at(picture(drum), drum.axes.at(head, (0.5, 0.3))) for head in (0, 1))
+    assert first.red() > first.blue() and second.blue() > second.red(), "each has a scale of its own"
+
+
+def test_scales_are_round_and_stay_while_they_fit_and_colours_end_there() -> None:
+    for largest, top in ((0.8e-3, 1e-3), (1e-3, 1e-3), (1.1e-3, 1.5e-3), (8e-9, 1e-8)):
+        assert fitting_scale_m(largest) == pytest.approx(top)
+    for largest, top in ((1.2e-3, 2e-3), (0.9e-3, 1.5e-3), (4e-3, 5e-3)):
+        assert kept_scale_m(largest, 2e-3) == pytest.approx(top)
+    image = image_of(np.array([[-3.0, -1.0, 0.0, 1.0, 3.0]], np.float32) * 1e-3, 1e-3)
+    colours = [image.pixelColor(column, 0).name() for column in range(5)]
+    assert colours[0] == colours[1] != colours[3] == colours[4]
+    assert colours[2] == theme.PANEL
