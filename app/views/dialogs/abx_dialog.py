@@ -22,6 +22,7 @@ from app.analysis.abx.trials import AbxChoices, Identity, ListeningTest, Sound
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
+from app.views import theme
 from app.views.controls.parts import filled
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from app.views.dialogs.question import ask
@@ -66,7 +67,7 @@ class AbxDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
-        self.resize(680, 470)
+        self.resize(theme.px(680), theme.px(470))  # or the rows of the first page are squashed
         self._output = output
         self._material = material
         self._seed = seed

@@ -280,6 +280,13 @@ def test_all_have_names_tips_and_the_colours_of_the_theme(themes: None, qtbot: Q
 @pytest.mark.parametrize("size_percent", [150])
 def test_each_has_room_with_larger_text(view: QWidget) -> None:
     window = view.window()
+    QApplication.processEvents()
+    for text in view.findChildren(QLabel):
+        if text.wordWrap() and text.isVisible():
+            assert text.height() >= text.heightForWidth(text.width()), text.text()
+    for button in view.findChildren(QPushButton):
+        needed = min(button.minimumSizeHint().height(), button.maximumHeight())
+        assert not button.isVisible() or button.height() >= needed, button.text()
     window.adjustSize() if isinstance(view, QDialog) else window.resize(*SCREEN)
     QApplication.processEvents()
     assert window.width() <= SCREEN[0] or window.minimumSizeHint().width() > SCREEN[0]
@@ -290,7 +297,4 @@ def test_each_has_room_with_larger_text(view: QWidget) -> None:
         assert inside or view.rect().contains(area), name_of(each)
         if isinstance(each, QAbstractButton):
             assert each.height() >= min(each.fontMetrics().height(), each.sizeHint().height()), name_of(each)
-    for text in view.findChildren(QLabel):
-        if text.wordWrap() and text.isVisible():
-            assert text.height() >= text.heightForWidth(text.width()), text.text()
     assert not picture(view).isNull()
