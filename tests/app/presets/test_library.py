@@ -75,21 +75,17 @@ def test_a_preset_of_a_taken_name_gets_a_number(
     library: Library, small_preset: Path, own: Path, tmp_path: Path
 ) -> None:
     given = other_preset(small_preset, tmp_path / "first.safetensors")
-    present = [entry.path for entry in library.entries]
+    present, bad = [entry.path for entry in library.entries], tmp_path / "bad.safetensors"
+    for data in (b"", b"no preset", small_preset.read_bytes()[:-9]):
+        bad.write_bytes(data)
+        with pytest.raises(PresetError, match=r"bad\.safetensors: not a whole safetensors file"):
+            install_preset(bad, own, [])
+    assert not own.exists()
     path, was_there = install_preset(given, own, present)
     assert (path.name, was_there, path.read_bytes()) == ("first_2.safetensors", False, given.read_bytes())
     assert install_preset(given, own, [*present, path]) == (path, True)
     assert install_preset(small_preset, own, present)[1]
     assert files(own) == ["first_2.safetensors"]
-
-
-@pytest.mark.parametrize("data", [b"", b"no preset", None])
-def test_no_preset_leaves_nothing(small_preset: Path, own: Path, tmp_path: Path, data: bytes | None) -> None:
-    given = tmp_path / "bad.safetensors"
-    given.write_bytes(small_preset.read_bytes()[:-9] if data is None else data)
-    with pytest.raises(PresetError, match=r"bad\.safetensors: not a whole safetensors file"):
-        install_preset(given, own, [])
-    assert not own.exists()
 
 
 def test_a_dropped_preset_that_is_there_is_chosen(
