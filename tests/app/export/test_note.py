@@ -1,7 +1,12 @@
-"""A note through an instrument: the file is what a device is given, and its recipe renders it again."""
+"""A note as a file: it is what a device is given, whole or not at all, and its recipe renders it again."""
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import json
+import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,57 +14,242 @@ import numpy as np
 import pytest
 import soundfile
 
+from app.export import sound
 from app.export.choices import ExportChoices
-from app.export.note import HeardNote, NoteExport, musical_name
+from app.export.note import HeardNote, NoteExport, default_file_name, export_sounds, musical_name
 from app.export.recipe import SoundRecipe, read_recipe
-from app.export.sound import compared_sounds
-from app.export.wav import WavSettings
-from app.instruments.library import SHIPPED as INSTRUMENTS
-from app.instruments.library import read_instrument
+from app.export.sound import VOICES, Voices, check_sources, compared_sounds
+from app.export.wav import WavSettings, form_of
+from app.instruments.library import find_instrument
 from app.player.events import NoteOn, TimedEvent
 from app.player.offline import render_events
+from app.playing.ahead import AheadSamples
+from app.rendering.motion import ModelMotion
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
+from app.shared.vocabulary import FORMATS, Bits, Source
+from app.shared.worker import Cancelled
+from engine.kernels.limiter import AHEAD
+from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, load_preset
-from engine.sources import ModelSource
+from engine.presets import SHIPPED, PresetError, load_preset
+from engine.resonators.sine_transform import listening_weights, project
+from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
-from engine.voices import model_program, voice_blocks
-from tests.app.sounds import export_sound
+from engine.voices import Mixer, Voice, model_program, truth_program, voice_blocks
+from engine.voices.voice import ATTACK_S
+from engine.whole_file import WriteError
+from tests.app.sounds import export_sound, render_sound
 
-PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
-GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
+PLAIN = WavSettings("32f", fade_out_s=0)
+COMPILED = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+RENDERED = SHIPPED / "nylon_nonlinear_gaussian_16k_lru.safetensors"
+MANY = SHIPPED / "studio_any_string.safetensors"
+GUITAR = find_instrument("Classical guitar").instrument
 FIXED = ExportChoices(until_decayed=False, seconds=0.3, format="wav 32f", normalise=False)
+OF_COMPILED = NoteSound(COMPILED, Pluck(0.35, 4.0), 0.2, Ear((0.37,)))
 
 
-PLUCKED = NoteSound(PRESET, Pluck(0.35, 4.0), 0.2, Ear((0.37,)))
+@pytest.fixture
+def plucked(small_preset: Path) -> NoteSound:
+    return replace(OF_COMPILED, preset=small_preset)
 
 
-def write(sound: NoteSound, path: Path, choices: ExportChoices = FIXED, source: str = "model") -> np.ndarray:
-    NoteExport(sound, {source: path}, choices).run(lambda *_: None)  # type: ignore[dict-item]
-    return soundfile.read(path, dtype="float32", always_2d=True)[0]
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
+    plucked: NoteSound, kind: Source
+) -> None:
+    preset = plucked.load()
+    source = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
+    start_m = project(plucked.pluck.displacement(101), 10)
+    frames, _ = source.advance(source.start(start_m[None]), 799)
+    whole_m = np.concatenate([start_m[None], frames[0]]) @ listening_weights(np.array([0.37]), 101)[:, 0]
+    found = render_sound(plucked, kind)
+    assert len(found) == 800
+    attack = round(ATTACK_S * preset.info.rate_hz)
+    assert found[attack:] == pytest.approx(whole_m[attack:] / FULL_SCALE_M, abs=2e-5)
+    assert (np.abs(found[:attack]) < np.abs(whole_m[:attack]) / FULL_SCALE_M).all()
 
 
-@pytest.mark.parametrize("preset", [PRESET, SHIPPED / "nylon_nonlinear_gaussian_16k_lru.safetensors"])
+@pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
+@pytest.mark.parametrize("ear", [Ear((0.37,)), Ear((0.37, 0.6), "velocity")])
+def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
+    plucked: NoteSound, preset: str, kind: Source, ear: Ear, tmp_path: Path
+) -> None:
+    sound = replace(OF_COMPILED if preset == "compiled" else plucked, ear=ear)
+    loaded = sound.load()
+    info = loaded.info
+    export_sound(sound, tmp_path / "a.wav", kind, WavSettings("32f", 48_000, fade_out_s=0))
+    exported, _ = soundfile.read(tmp_path / "a.wav", dtype="float32", always_2d=True)
+    program = truth_program(info, 48_000) if kind == "truth" else model_program(loaded, 48_000)
+    assert program.rendered == (preset == "small")
+    initial_m = project(sound.pluck.displacement(101), info.modes)
+    voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
+    if program.rendered:
+        ahead = AheadSamples(voice, ModelMotion(ModelSource(loaded), initial_m, 0.4), "pluck")
+        while not ahead.finished:
+            ahead.render()
+    mixer = Mixer(48_000)
+    mixer.add(voice)
+    played = np.concatenate([mixer.render(frames) for frames in (256, 100, 7, 9237)])
+    assert (played[AHEAD:, : len(ear.points)] == exported[:-AHEAD]).all()  # the limiter looks ahead
+    assert not played[:AHEAD].any()
+
+
+@pytest.mark.parametrize("preset", [COMPILED, RENDERED])
 def test_what_is_compared_is_the_string_alone(preset: Path) -> None:
-    """Of a compiled voice, and of a model that is rendered."""
     loaded, ear = load_preset(preset), Ear((0.37, 0.6))
     model = model_program(loaded, 48_000)
     source = ModelSource(loaded) if model.rendered else None
-    found = compared_sounds(replace(PLUCKED, preset=preset, ear=replace(ear, solo=2)), 48_000)
+    found = compared_sounds(replace(OF_COMPILED, preset=preset, ear=replace(ear, solo=2)), 48_000)
     assert {name: samples.shape for name, samples in found.items()} == dict.fromkeys(("model", "truth"), (9_600, 2))
-    alone = np.concatenate([*voice_blocks(model, source, loaded.info, PLUCKED.pluck, ear, 0.2)])
+    alone = np.concatenate([*voice_blocks(model, source, loaded.info, OF_COMPILED.pluck, ear, 0.2)])
     assert (found["model"] == alone).all()
     assert 0 < np.abs(found["model"] - found["truth"]).max() < np.abs(found["truth"]).max()
 
 
-@pytest.mark.parametrize("source", ["model", "difference"])
-def test_the_recipe_renders_it_again(tmp_path: Path, source: str) -> None:
-    first, again = tmp_path / "a.wav", tmp_path / "b.wav"
-    export_sound(PLUCKED, first, source, FIXED.wav)  # type: ignore[arg-type]
-    recipe = read_recipe(first)
-    export_sound(recipe.sound(PRESET, first), again, recipe.source, recipe.settings)
-    assert first.read_bytes() == again.read_bytes()
+STEPS = {"16": ("PCM_16", 1.5 / 2**15), "24": ("PCM_24", 0.5 / 2**23), "32f": ("FLOAT", 1e-7)}
+
+
+@pytest.mark.parametrize(("ending", "bits"), [name.split() for name in FORMATS])
+def test_a_file_holds_the_sound_to_its_own_step_and_its_recipe(
+    plucked: NoteSound, ending: str, bits: Bits, tmp_path: Path
+) -> None:
+    path = tmp_path / f"a.{ending}"
+    settings = WavSettings(bits, fade_out_s=0)
+    report = export_sound(plucked, path, settings=settings)
+    expected = render_sound(plucked)
+    with soundfile.SoundFile(path) as file:
+        found = file.read(dtype="float64")
+        recipe = json.loads(file.comment)
+        assert (file.title, file.samplerate, file.format) == ("A small string", 4000, ending.upper())
+        assert file.software.startswith("Learned Strings ")
+        subtype, step = STEPS[bits]
+        assert file.subtype == subtype and np.abs(found - expected).max() <= step * (1 + 1e-9)
+    assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
+    assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
+    assert recipe == json.loads(SoundRecipe.of(plucked, plucked.load(), "model", settings).model_dump_json())
+    assert recipe["preset_sha256"] == hashlib.sha256(plucked.load().path.read_bytes()).hexdigest()
+    assert Pluck(**recipe["pluck"]) == plucked.pluck
+
+
+@pytest.mark.parametrize(("bits", "normalise"), [("16", True), ("24", False)])
+def test_flac_holds_the_very_samples_and_the_recipe_of_wav(
+    plucked: NoteSound, bits: Bits, normalise: bool, tmp_path: Path
+) -> None:
+    wav, flac = tmp_path / "a.wav", tmp_path / "a.flac"
+    for path in (wav, flac):
+        export_sound(plucked, path, settings=WavSettings(bits, normalise=normalise))
+    np.testing.assert_array_equal(*(soundfile.read(path, dtype="int32")[0] for path in (wav, flac)))
+    assert read_recipe(flac) == read_recipe(wav)
+
+
+def test_the_gain_of_files_is_one_which_does_not_depend_on_what_is_written_beside(
+    plucked: NoteSound, tmp_path: Path
+) -> None:
+    model, truth = (render_sound(plucked, source) for source in VOICES)
+    assert (render_sound(plucked, "both") == np.stack([model, truth], axis=1)).all()
+    difference, loud = (
+        render_sound(plucked, "difference", WavSettings(difference_gain_db=gain_db)) for gain_db in (0.0, 20.0)
+    )
+    assert (difference == model - truth).all() and loud == pytest.approx(10 * difference)
+    paths = {source: tmp_path / f"{source}.wav" for source in ("model", "truth", "difference")}
+    for gain_db in (80.0, 0.0):
+        settings = replace(PLAIN, normalise=True, difference_gain_db=gain_db)
+        reports = export_sounds(plucked, plucked.load(), paths, settings)  # type: ignore[arg-type]
+        for source, path in paths.items():
+            export_sound(plucked, tmp_path / "alone.wav", source, settings)  # type: ignore[arg-type]
+            assert (tmp_path / "alone.wav").read_bytes() == path.read_bytes()
+    assert [report.path for report in reports] == list(paths.values())
+    assert len({report.gain_db for report in reports}) == 1
+    m, t, d = (soundfile.read(path)[0] for path in paths.values())
+    assert d == pytest.approx(m - t, abs=1e-6)
+    assert max(np.abs(m).max(), np.abs(t).max()) == pytest.approx(10 ** (-1 / 20), rel=1e-6)
+
+
+def test_where_an_export_fails_what_was_there_stays(
+    plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, preset = tmp_path / "a.wav", plucked.load()
+    path.write_bytes(b"old")
+
+    def fail(*_: object, **__: object) -> None:
+        raise errors.pop()
+
+    def refused(error: type[Exception], words: str, preset=preset, progress: Callable = lambda *_: None) -> None:
+        with pytest.raises(error, match=words):
+            export_sounds(plucked, preset, {"model": path}, PLAIN, progress)
+        assert path.read_bytes() == b"old"
+        assert list(tmp_path.iterdir()) == [path]
+
+    errors = [OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), Cancelled()]
+    refused(Cancelled, "^$", progress=fail)
+    gone = replace(preset, path=tmp_path / "gone.safetensors")
+    refused(PresetError, r"gone\.safetensors: the preset cannot be read any more", gone)
+    with monkeypatch.context() as full:
+        full.setattr(Path, "replace", fail)
+        refused(WriteError, r"a\.wav: cannot be written .*; free some space")
+    broken = Voices({"model": np.array([[np.inf]])})
+    monkeypatch.setattr("app.export.note.render_voices", lambda *_, **__: broken)
+    refused(WriteError, r"a\.wav: .*not finite")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"points": (1.2,)}, "0 … 1, not 1.2"),
+        ({"seconds": 0.0}, "at most 600, not 0"),
+        ({"seconds": 601.0}, "at most 600, not 601"),
+        ({"seconds": float("nan")}, "not nan"),
+        ({"source": "all"}, "model, truth, difference, both"),
+        ({"source": "both", "points": (0.3, 0.5)}, "choose two files, or mono"),
+        ({"points": (0.3, -0.1)}, "right listening point must lie in 0 … 1"),
+        ({"pickup": "magnet"}, "displacement, velocity, bridge"),
+        ({"decay_db": 5.0}, "decay_db must lie in 10 … 120, not 5"),
+        ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
+        ({"bits": "8"}, "16, 24, 32f"),
+        ({"rate_hz": 999}, "1000 … 384000"),
+        ({"fade_out_s": -1}, "negative"),
+        ({"file": "b.flac", "bits": "32f"}, r"b\.flac: FLAC has no floating point"),
+        ({"file": "b.flac", "rate_hz": 96_001}, r"b\.flac: FLAC has .*rate of 96001 Hz"),
+    ],
+)
+def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, message: str) -> None:
+    wanted = {
+        "points": (0.3,),
+        "pickup": "displacement",
+        "seconds": 0.2,
+        "source": "model",
+        "file": "a.wav",
+        **change,
+    }
+    with pytest.raises(ValueError, match=message):
+        ear = Ear(wanted.pop("points"), wanted.pop("pickup"))
+        sound, file = replace(plucked, seconds=wanted.pop("seconds"), ear=ear), Path(wanted.pop("file"))
+        check_sources(sound, [wanted.pop("source")], 4_000)
+        form_of(file, WavSettings(**wanted).bits, wanted.get("rate_hz", 4_000))
+
+
+def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
+    rate_hz, rate = 1000, 10.0  # 1/s: 86.9 dB in a second
+    signal = np.exp(-rate * np.arange(3000) / rate_hz)[:, None]
+    assert sound.decayed_frames(signal, rate_hz, 60.0) / rate_hz == pytest.approx(6.9 / rate, abs=0.06)
+    assert sound.decayed_frames(signal[:200], rate_hz, 60.0) == 200
+    assert sound.decayed_frames(np.zeros((500, 1)), rate_hz, 60.0) == 50
+
+
+def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_reported(
+    plucked: NoteSound, tmp_path: Path
+) -> None:
+    decaying, settings = replace(plucked, seconds=8.0), WavSettings(decay_db=10.0)
+    model, truth = (export_sound(decaying, tmp_path / "a.wav", source, settings) for source in VOICES)
+    assert model.frames == truth.frames < 8 * 4000
+    assert model.decayed
+    assert truth.past_training_s == 0 < model.past_training_s
+    assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "a.wav", settings=settings).decayed
+
+
+# Recipes, names and keys
 
 
 RECIPES = {
@@ -82,31 +272,17 @@ RECIPES = {
 
 def test_recipes_of_earlier_files_are_read() -> None:
     """Texts that version 0.2.0 wrote."""
-    many = SHIPPED / "studio_any_string.safetensors"
     recipe = SoundRecipe.model_validate_json(RECIPES["string"])
-    sound = recipe.sound(many, Path("a.wav"))
+    sound = recipe.sound(MANY, Path("a.wav"))
     assert isinstance(sound.preset, StringOf) and sound.preset.string.tension_n == 72.592
     assert (sound.load().info.modes, sound.load().info.rate_hz) == (12, 48_000)
     assert (sound.pluck, sound.ear, sound.seconds) == (Pluck(0.3, 2.0, "rounded", 0.1), Ear((0.37,), "bridge"), 0.3)
     assert recipe.settings == WavSettings("24", 44_100, fade_out_s=0.01)
     recipe = SoundRecipe.model_validate_json(RECIPES["key"])
-    sound = recipe.sound(many, Path("a.wav"))
+    sound = recipe.sound(MANY, Path("a.wav"))
     assert sound.struck == Struck(GUITAR, NoteOn(52, 90, 16, string=1, pluck=Pluck(0.2, 2.0)))
-    assert (sound.preset, sound.ear, sound.seconds) == (many, Ear((0.1, 0.6), "velocity"), 9.0)
+    assert (sound.preset, sound.ear, sound.seconds) == (MANY, Ear((0.1, 0.6), "velocity"), 9.0)
     assert recipe.settings == WavSettings("16", 48_000, True, 0.05, 60.0, 20.0)
-
-
-def test_a_key_can_be_written_without_its_instrument(tmp_path: Path) -> None:
-    struck = Struck(GUITAR, NoteOn(52, 100))
-    sound = replace(PLUCKED, preset=SHIPPED / "studio_any_string.safetensors")
-    plain = write(sound, tmp_path / "a.wav")
-    alone = FIXED.model_copy(update={"alone": True})
-    assert (write(replace(sound, struck=struck), tmp_path / "b.wav", alone) == plain).all()
-    assert write(replace(sound, struck=struck), tmp_path / "c.wav").shape[1] == 2
-
-
-def heard(source: str = "model", another: bool = False, name: str = "") -> HeardNote:
-    return HeardNote(PLUCKED, source, another, 20.0, "", name, 4_000)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -120,37 +296,41 @@ def heard(source: str = "model", another: bool = False, name: str = "") -> Heard
 )
 def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitude_mm: float, name: str) -> None:
     assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
-    assert heard(name=name).file_name("model", ".wav") == f"{name}.wav"
-    assert heard(name=name).file_name("truth", ".wav") == f"{name} truth.wav"
+    heard = HeardNote(OF_COMPILED, "model", False, 20.0, "", name, 4_000)
+    assert [heard.file_name(source, ".wav") for source in VOICES] == [f"{name}.wav", f"{name} truth.wav"]
+
+
+def test_the_file_name_reports_what_is_in_it() -> None:
+    assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth", ".wav") == "nylon_x0.35_a4.0_48000_truth.wav"
+    assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both", ".wav") == "b_x0.1234_a0.25_4000_both.wav"
+
+
+def write(path: Path, struck: Struck | None, choices: ExportChoices = FIXED, source: Source = "model") -> np.ndarray:
+    sound = replace(OF_COMPILED, preset=MANY, struck=struck)
+    NoteExport(sound, {source: path}, choices).run(lambda *_: None)
+    return soundfile.read(path, dtype="float32", always_2d=True)[0]
+
+
+def test_a_key_can_be_written_without_its_instrument(tmp_path: Path) -> None:
+    struck = Struck(GUITAR, NoteOn(52, 100))
+    alone = FIXED.model_copy(update={"alone": True})
+    assert (write(tmp_path / "b.wav", struck, alone) == write(tmp_path / "a.wav", None)).all()
+    assert write(tmp_path / "c.wav", struck).shape[1] == 2
 
 
 def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) -> None:
     """It is as loud as those of the key's own model and truth: its gain is that of the whole instrument."""
-    electric = read_instrument(INSTRUMENTS / "electric_guitar_bridge_pick_up.json")
+    electric = find_instrument("Electric guitar, bridge pick-up").instrument
     assert electric.amp.drive_db > 0
-    event = NoteOn(52, 100)
-    preset = SHIPPED / "studio_any_string.safetensors"
-    sound = replace(PLUCKED, preset=preset, struck=Struck(electric, event))
-    found = write(sound, tmp_path / "a.wav", source="difference")
-    dry = {
-        source: np.concatenate(
-            list(
-                render_events(
-                    electric,
-                    load_preset(preset),
-                    [TimedEvent(0.0, event)],
-                    48_000,
-                    source,
-                    0.3,
-                    limited=False,
-                    varied=False,
-                    dry=True,
-                )
-            )
+    event, how = NoteOn(52, 100), {"limited": False, "varied": False, "dry": True}
+    found = write(tmp_path / "a.wav", Struck(electric, event), source="difference")
+    model, truth = (
+        np.concatenate(
+            [*render_events(electric, load_preset(MANY), [TimedEvent(0, event)], 48_000, voice, 0.3, **how)]
         )
-        for source in ("model", "truth")
-    }
+        for voice in VOICES
+    )
     until = len(found) - round(0.010 * 48_000)
-    expected = 10 ** (FIXED.difference_gain_db / 20) * (dry["model"].astype(np.float64) - dry["truth"])
+    expected = 10 ** (FIXED.difference_gain_db / 20) * (model.astype(np.float64) - truth)
     np.testing.assert_allclose(found[:until], expected[:until], atol=1e-9)
     assert np.abs(found).max() > 0

@@ -1,15 +1,20 @@
+"""Sounds become files of the same bytes in blocks of any size, of which memory holds one."""
+
 from __future__ import annotations
 
 import io
 import json
 import math
+import tracemalloc
 from collections.abc import Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
 
+from app.export import recording
+from app.export.recording import Recording, blocks
 from app.export.wav import (
     LONGEST_TAG_BYTES,
     NORMALISED_PEAK,
@@ -19,84 +24,79 @@ from app.export.wav import (
     quantised,
     write_wav,
 )
+from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import Bits
+from engine.pluck import Pluck
+from engine.values.ear import Ear
+from tests.app.sounds import export_sound
 
 RATE_HZ = 8000
-PLAIN = WavSettings(bits="32f", fade_out_s=0)
-
-
-def sine(frequency_hz: float, seconds: float = 0.5, peak: float = 0.5, rate_hz: int = RATE_HZ) -> np.ndarray:
-    return peak * np.sin(2 * np.pi * frequency_hz * np.arange(round(seconds * rate_hz)) / rate_hz)
-
-
-@dataclass(frozen=True)
-class Written:
-    """A WAV file in memory."""
-
-    data: bytes
-    level: WrittenSound
+PLAIN = WavSettings("32f", fade_out_s=0)
+SINE = np.sin(2 * np.pi * 440 * np.arange(4_000) / RATE_HZ)
 
 
 def written(
     samples: np.ndarray, settings: WavSettings, tags: dict[str, str] | None = None, beside: Sequence[np.ndarray] = ()
-) -> Written:
+) -> tuple[io.BytesIO, WrittenSound]:
+    """A file in memory, and its report."""
     file = io.BytesIO()
-    level = write_wav(file, samples, RATE_HZ, settings, tags or {}, beside)
-    return Written(file.getvalue(), level)
+    report = write_wav(file, samples, RATE_HZ, settings, tags or {}, beside)
+    file.seek(0)
+    return file, report
 
 
-def read(wav: Written) -> tuple[np.ndarray, int, str]:
-    with soundfile.SoundFile(io.BytesIO(wav.data)) as file:
-        return file.read(dtype="float64"), file.samplerate, file.subtype
+def samples_of(file: io.BytesIO) -> np.ndarray:
+    return soundfile.read(file)[0]
 
 
-@pytest.mark.parametrize(
-    ("bits", "subtype", "tolerance"),
-    [("16", "PCM_16", 1.5 / 2**15), ("24", "PCM_24", 0.5 / 2**23), ("32f", "FLOAT", 1e-7)],
-)
-def test_every_format_holds_the_samples_to_its_own_step(bits: Bits, subtype: str, tolerance: float) -> None:
-    samples = sine(440)
-    found, rate_hz, kind = read(written(samples, WavSettings(bits, fade_out_s=0)))
-    assert (kind, rate_hz, found.shape) == (subtype, RATE_HZ, samples.shape)
-    assert np.abs(found - samples).max() <= tolerance * (1 + 1e-9)
+def test_a_recording_is_what_was_appended() -> None:
+    samples = np.random.default_rng(0).normal(size=(1000, 2)).astype(np.float32)
+    made = Recording(2)
+    for part in np.split(samples, [1, 400, 401]):
+        made.append(part)
+    assert len(made) == 1000
+    np.testing.assert_array_equal(made[:], samples)
+    np.testing.assert_array_equal(made[399:403], samples[399:403])
+    np.testing.assert_array_equal(np.concatenate([block for _, block in blocks(made, 64)]), samples)
+    made.cut(10)
+    assert len(made) == len(made[:]) == 10 and made[5:5].shape == (0, 2)
 
 
 @pytest.mark.parametrize("bits", ["16", "24", "32f"])
-def test_the_same_sound_makes_the_same_bytes(bits: Bits, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = written(sine(440), WavSettings(bits), {"title": "a"})
-    monkeypatch.setattr("time.time", lambda: 0.0)
-    assert written(sine(440), WavSettings(bits), {"title": "a"}).data == first.data
-    peak = first.data.find(b"PEAK")
-    assert (peak > 0) == (bits == "32f")
-    assert bits != "32f" or first.data[peak + 12 : peak + 16] == bytes(4)
+@pytest.mark.parametrize("normalise", [False, True])
+def test_any_blocks_make_the_same_bytes_at_any_time(
+    bits: Bits, normalise: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = np.random.default_rng(0).normal(size=(1000, 2)) / 3
+    settings = WavSettings(bits, normalise=normalise)
+    whole, level = written(sound, settings, {"title": "a"}, [2 * sound])
+    monkeypatch.setattr(recording.blocks, "__defaults__", (7,))
+    again, same = written(sound, settings, {"title": "a"}, [2 * sound])
+    assert same == level and again.getvalue() == whole.getvalue()
+    assert (level.clipped > 0) == (bits != "32f" and not normalise)
+    _, chunk, behind = whole.getvalue().partition(b"PEAK")
+    assert bool(chunk) == (bits == "32f") and not any(behind[8:12] if chunk else b"")  # its time of writing
 
 
-def test_dither_at_16_bits_is_two_steps_wide_without_offset_and_absent_elsewhere() -> None:
-    silence = np.zeros(200_000)
-    steps = quantised(silence, "16")[0].astype(np.int64) >> 16
+def test_16_bits_have_dither_of_two_steps_without_offset_and_24_are_rounded_not_floored() -> None:
+    steps = quantised(np.zeros(200_000), "16")[0].astype(np.int64) >> 16
     assert set(np.unique(steps)) <= {-1, 0, 1}
     assert abs(steps.mean()) < 0.01
     assert steps.var() == pytest.approx(0.25, rel=0.05)  # triangular: 1/6 of the draw, 1/12 of the rounding
-    assert not quantised(silence, "24")[0].any()
+    stored, _ = quantised(np.array([0.0, 0.4, 0.6, -0.4, -0.6]) * 2.0**-23, "24")
+    assert (stored >> 8).tolist() == [0, 0, 1, 0, -1]
 
 
-def test_samples_are_rounded_not_floored() -> None:
-    step = 2.0**-23
-    stored, _ = quantised(np.array([0.4, 0.6, -0.4, -0.6]) * step, "24")
-    assert (stored >> 8).tolist() == [0, 1, 0, -1]
-
-
-def test_what_is_beyond_full_scale_is_clipped_and_counted() -> None:
+def test_what_is_beyond_full_scale_is_clipped_and_counted_and_silence_is_not_amplified() -> None:
     samples = np.array([0.0, 1.5, -1.5, -1.0, 0.5])
-    wav = written(samples, WavSettings("24", fade_out_s=0))
-    found, _, _ = read(wav)
-    assert wav.level.clipped == 2
-    assert wav.level.peak_db == pytest.approx(20 * math.log10(1.5))
-    assert found.tolist() == pytest.approx([0, 1 - 2**-23, -1, -1, 0.5])
-    floating = written(samples, PLAIN)
-    assert (floating.level.clipped, read(floating)[0].tolist()) == (0, samples.tolist())
-    silent = written(np.zeros(100), WavSettings("24", normalise=True)).level
-    assert (silent.peak_db, silent.gain_db) == (-math.inf, 0)  # silence is not amplified
+    file, level = written(samples, WavSettings("24", fade_out_s=0))
+    assert level.clipped == 2
+    assert level.peak_db == pytest.approx(20 * math.log10(1.5))
+    assert samples_of(file).tolist() == pytest.approx([0, 1 - 2**-23, -1, -1, 0.5])
+    file, level = written(samples, PLAIN)
+    assert (level.clipped, samples_of(file).tolist()) == (0, samples.tolist())
+    _, silent = written(np.zeros(100), WavSettings("24", normalise=True))
+    assert (silent.peak_db, silent.gain_db) == (-math.inf, 0)
 
 
 def test_the_end_fades_to_zero_and_the_rest_is_untouched() -> None:
@@ -109,20 +109,17 @@ def test_the_end_fades_to_zero_and_the_rest_is_untouched() -> None:
 
 def test_normalising_takes_one_gain_for_all_channels_and_companions() -> None:
     settings = WavSettings("32f", normalise=True, fade_out_s=0)
-    stereo = np.stack([sine(440, peak=0.2), sine(440, peak=0.1)], axis=1)
-    found, _, _ = read(written(stereo, settings))
-    assert np.abs(found).max(axis=0) == pytest.approx([NORMALISED_PEAK, NORMALISED_PEAK / 2], rel=1e-6)
-    alone, _, _ = read(written(stereo[:, 1], settings, beside=[stereo[:, 0]]))
-    assert np.abs(alone).max() == pytest.approx(NORMALISED_PEAK / 2, rel=1e-6)
+    both, _ = written(np.stack([0.2 * SINE, 0.1 * SINE], axis=1), settings)
+    alone, _ = written(0.1 * SINE, settings, beside=[0.2 * SINE])
+    peaks = [*np.abs(samples_of(both)).max(axis=0), np.abs(samples_of(alone)).max()]
+    assert peaks == pytest.approx([NORMALISED_PEAK, NORMALISED_PEAK / 2, NORMALISED_PEAK / 2], rel=1e-6)
 
 
-def test_tags_survive_up_to_the_longest() -> None:
-    comment = json.dumps({"long": "x" * (LONGEST_TAG_BYTES - 12)})
-    assert len(comment) == LONGEST_TAG_BYTES
-    for bits in ("16", "32f"):
-        wav = written(sine(440), WavSettings(bits), {"title": "Saite № 1", "comment": comment})
-        with soundfile.SoundFile(io.BytesIO(wav.data)) as file:
-            assert (file.title, file.comment) == ("Saite № 1", comment)
+@pytest.mark.parametrize("bits", ["16", "32f"])
+def test_tags_survive_up_to_the_longest(bits: Bits) -> None:
+    tags = {"title": "Saite № 1", "comment": json.dumps("x" * (LONGEST_TAG_BYTES - 2))}
+    with soundfile.SoundFile(written(SINE, WavSettings(bits), tags)[0]) as file:
+        assert {name: getattr(file, name) for name in tags} == tags
 
 
 @pytest.mark.parametrize(
@@ -138,10 +135,25 @@ def test_what_cannot_be_stored_is_refused(samples: np.ndarray, tags: dict[str, s
         written(samples, PLAIN, tags)
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [({"bits": "8"}, "16, 24, 32f"), ({"rate_hz": 999}, "1000 … 384000"), ({"fade_out_s": -1}, "negative")],
-)
-def test_settings_out_of_range_are_refused(settings: dict, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        WavSettings(**settings)
+def test_a_disk_that_becomes_full_is_reported() -> None:
+    class Full(io.BytesIO):
+        def write(self, data: object) -> int:  # type: ignore[override]
+            if self.tell() > 1000:
+                raise OSError(28, "No space left on device")
+            return super().write(data)  # type: ignore[arg-type]
+
+    with pytest.raises(OSError, match="No space left"):
+        write_wav(Full(), np.zeros(100_000), RATE_HZ, WavSettings(), {})
+
+
+def test_memory_does_not_grow_with_the_duration(small_preset: Path, tmp_path: Path) -> None:
+    settings = WavSettings("16", 192_000, normalise=True)
+    peaks = []
+    for seconds in (0.5, 1.0, 3.0):  # the first also pays what is loaded once
+        sound = NoteSound(small_preset, Pluck(), seconds, Ear((0.37, 0.6)))
+        tracemalloc.start()
+        report = export_sound(sound, tmp_path / "long.wav", "truth", settings)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert report.frames == seconds * 192_000
+    assert peaks[2] < peaks[1] + 2**20

@@ -1,11 +1,11 @@
-"""An instrument that is rendered without a model, decaying sines at its levels, and players of samples."""
+"""Instruments that are rendered without a model, as decaying sines at their own levels, and players of samples."""
 
 from __future__ import annotations
 
 import math
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
+from app.export.sampled.plan import SampledPlan
 from app.instruments.instrument import Fretted, Instrument
 from app.player.events import ControlChange, NoteOff, NoteOn, TimedEvent
 from app.player.midi_file import midi_bytes
@@ -21,47 +22,32 @@ from engine.values.string import StringParameters
 T60_S = 2.0
 RATE_HZ = 48_000
 BLOCK = 64
+STEREO = {"points": (0.2, 0.4)}
 
 Sound = NDArray[np.floating]
-Render = Callable[..., NDArray[np.float32]]
-InstrumentOf = Callable[..., Instrument]
 Events = Sequence[tuple[float, int, int]]  # time in s, key, velocity; 0 releases
-Play = Callable[[Path, Events, float], Sound]
 
 
-@pytest.fixture
-def instrument_of() -> InstrumentOf:
+def instrument_of(**fields: object) -> Instrument:
     """An instrument of keys 45 … 64; fields as given."""
-
-    def made(**fields: object) -> Instrument:
-        defaults = {"name": "Any string", "category": "guitar", "range": (45, 64)}
-        return Instrument.model_validate({**defaults, "strings": Fretted(string=StringParameters()), **fields})
-
-    return made
+    defaults = {"name": "Any string", "category": "guitar", "range": (45, 64)}
+    return Instrument.model_validate({**defaults, "strings": Fretted(string=StringParameters()), **fields})
 
 
-@pytest.fixture
-def instrument(instrument_of: InstrumentOf) -> Instrument:
-    return instrument_of()
+def small(instrument: Instrument | None = None, **choices: object) -> SampledPlan:
+    return SampledPlan(instrument or instrument_of(), **{"keys": (58, 61), "layers": 3, "seconds": 0.17, **choices})
 
 
-@pytest.fixture
-def render() -> Render:
+def render(
+    instrument: Instrument, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, **_: object
+) -> NDArray[np.float32]:
     """A sine of the key's pitch, and the softer the wider the pluck; a right channel is 6 dB softer."""
-
-    def rendered(
-        instrument: Instrument, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, **_: object
-    ) -> NDArray[np.float32]:
-        time_s = np.arange(round(seconds * rate_hz)) / rate_hz
-        decay = 10 ** (-3 * time_s / T60_S)
-        if held_s < seconds:
-            decay *= 10 ** (-3 * np.maximum(0, time_s - held_s) / instrument.damping.release_t60_s)
-        pluck = instrument.pluck.pluck(velocity)
-        level = pluck.amplitude_mm / 10 * 10 ** (instrument.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
-        sound = level * decay * np.sin(2 * math.pi * hz_of(key) * time_s)
-        return np.stack([sound / 2**side for side in range(len(instrument.pickup.points))], axis=1).astype(np.float32)
-
-    return rendered
+    time_s = np.arange(round(seconds * rate_hz)) / rate_hz
+    decay = 10 ** (-3 * time_s / T60_S - 3 * np.maximum(0, time_s - held_s) / instrument.damping.release_t60_s)
+    pluck = instrument.pluck.pluck(velocity)
+    level = pluck.amplitude_mm / 10 * 10 ** (instrument.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
+    sound = level * decay * np.sin(2 * math.pi * hz_of(key) * time_s)
+    return np.stack([sound / 2**side for side in range(len(instrument.pickup.points))], axis=1).astype(np.float32)
 
 
 def hz_of(key: float) -> float:
@@ -77,8 +63,9 @@ def strongest_hz(sound: Sound, rate_hz: int = RATE_HZ) -> float:
     return (peak + 0.5 * (below - above) / (below - 2 * top + above)) * rate_hz / bins
 
 
-def cents(hz: float, other_hz: float) -> float:
-    return float(1200 * np.log2(hz / other_hz))
+def cents(sound: Sound, hz: float) -> float:
+    """Of the strongest partial, above a frequency."""
+    return float(1200 * np.log2(strongest_hz(sound) / hz))
 
 
 def level_db(sound: Sound) -> float:
@@ -105,34 +92,27 @@ class Sfizz:
     """A player of SFZ."""
 
     def __init__(self, path: Path) -> None:
-        pysfizz = pytest.importorskip("pysfizz")
-        synth = pysfizz.Synth(RATE_HZ, BLOCK)
+        synth = pytest.importorskip("pysfizz").Synth(RATE_HZ, BLOCK)
         assert synth.load_sfz_file(path, quiet=False)
-        self.whole, self.synth = synth, vars(synth)["_synth"]  # the compiled player, which has its notes in real time
+        self._whole, self._synth = synth, vars(synth)["_synth"]  # the compiled one has its notes in real time
 
-    def press(self, key: int, velocity: int) -> None:
-        self.synth.note_on(0, key, velocity)
-
-    def release(self, key: int) -> None:
-        self.synth.note_off(0, key, 0)
-
+    @property
     def voices(self) -> int:
-        return int(self.synth.get_num_active_voices())
+        return int(self._synth.get_num_active_voices())
 
-    def play(self, seconds: float) -> NDArray[np.float32]:
-        """(2, frames)."""
-        blocks = round(seconds * RATE_HZ / BLOCK)
-        return np.concatenate([np.stack(self.synth.render_block()) for _ in range(blocks)], axis=1)
+    def play(self, events: Events, seconds: float) -> Sound:
+        """The next seconds, (2, frames)."""
+        parts, now = [np.zeros((2, 0), np.float32)], 0.0
+        for at, key, velocity in (*events, (seconds, 0, 0)):
+            blocks = round((at - now) * RATE_HZ / BLOCK)
+            parts += [np.stack(self._synth.render_block()) for _ in range(blocks)]
+            now = at
+            self._synth.note_on(0, key, velocity) if velocity else self._synth.note_off(0, key, 0)
+        return np.concatenate(parts, axis=1)
 
 
 def by_sfizz(path: Path, events: Events, seconds: float) -> Sound:
-    player, parts, now = Sfizz(path), [], 0.0
-    for at, key, velocity in events:
-        if at > now:
-            parts.append(player.play(at - now))
-            now = at
-        player.press(key, velocity) if velocity else player.release(key)
-    return np.concatenate([*parts, player.play(seconds - now)], axis=1)
+    return Sfizz(path).play(events, seconds)
 
 
-PLAYERS: dict[str, Play] = {"sfz": by_sfizz, "sf2": by_fluidsynth}
+PLAYERS = {"sfz": by_sfizz, "sf2": by_fluidsynth}

@@ -15,18 +15,11 @@ import pytest
 import soundfile
 
 from app.export.sampled.job import export_sampled, plain_stem, planned, sample_folder
-from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND
-from app.instruments.instrument import Instrument
-from tests.app.export.sampled.conftest import RATE_HZ, InstrumentOf, Render
+from tests.app.export.sampled.conftest import RATE_HZ, STEREO, instrument_of, render, small
 
 ROWS = {"phdr": 38, "pbag": 4, "pmod": 10, "pgen": 4, "inst": 22, "ibag": 4, "imod": 10, "igen": 4, "shdr": 46}
 KEY_RANGE, VEL_RANGE, SAMPLE_ID = 43, 44, 53
-STEREO = {"points": (0.2, 0.4)}
-
-
-def small(instrument: Instrument, **choices: object) -> SampledPlan:
-    return SampledPlan(instrument, **{"keys": (58, 61), "layers": 3, "seconds": 0.17, **choices})
 
 
 def lint(path: Path) -> str:
@@ -49,58 +42,20 @@ def opcodes(text: str, name: str) -> list[str]:
         ({"level_db": 20.0, "damping": {"release_t60_s": 60.0}, "description": "Loud."}, {"layers": 32}),
     ],
 )
-def test_sfzlint_accepts_it_and_every_sample_is_there(
-    fields: dict, choices: dict, instrument_of: InstrumentOf, render: Render, tmp_path: Path
-) -> None:
+def test_sfzlint_accepts_it_and_every_sample_is_there(fields: dict, choices: dict, tmp_path: Path) -> None:
     out, plan = tmp_path / "An instrument (2).sfz", small(instrument_of(**fields), **choices)
     export_sampled(plan, out, render)
     assert lint(out) == ""
     text = out.read_text("utf-8")
+    assert ("// A sample for every 3 keys" in text) == (plan.every == 3)
     (folder,) = opcodes(text, "default_path")
     names = opcodes(text, "sample")
     assert len(names) == len(set(names)) == len(plan.zones)
-    for name in names:
-        with soundfile.SoundFile(out.parent / folder / name) as file:
-            assert file.channels == len(plan.instrument.pickup.points)
+    assert {soundfile.info(out.parent / folder / name).channels for name in names} == {plan.channels}
     assert max(map(float, opcodes(text, "volume"))) <= 0
     if plan.instrument.damping.let_ring:  # a fault would be reported
         out.write_text(text.replace("note_selfmask=off", "note_selfmask=perhaps"))
         assert "note_selfmask" in lint(out)
-
-
-HOSTILE = (
-    "../../etc/passwd",
-    "/etc/passwd",
-    "C:\\Windows\\x",
-    "a\n<region> sample=/etc/passwd",
-    "..",
-    "$x #define",
-    "con\x00",
-    "é漢字",
-    "",
-    "x" * 10_000,
-    "a=b // c <global>",
-)
-
-
-def test_no_name_becomes_a_path_or_an_opcode(instrument: Instrument, render: Render, tmp_path: Path) -> None:
-    for place, name in enumerate(HOSTILE):
-        folder = tmp_path / str(place)
-        folder.mkdir()
-        assert re.fullmatch(r"[A-Za-z0-9+][A-Za-z0-9_.+-]{0,59}", plain_stem(name))
-        hostile = instrument.model_copy(update={"name": name, "description": f"{name}\n#include"})
-        plan = small(hostile, keys=(60, 60), layers=1)
-        fits = name.isprintable() and re.fullmatch(r"[^/\\:<>]{1,50}", name)
-        out = folder / (f"{name}.sfz" if fits else "a.sfz")
-        export_sampled(plan, out, render)
-        assert sorted(folder.iterdir()) == sorted([out, sample_folder(out)])
-        text = out.read_text("utf-8")
-        code = re.sub("//.*", "", text)
-        assert opcodes(code, "sample") == [f"{plan.zones[0].stem}.flac"]
-        assert re.findall(r"^<\w+>", text, re.M) == ["<control>", "<global>", "<group>", "<region>"]
-        assert "#include" not in code
-    assert plain_stem("a b=c$d<e>//f;g") == "a_b_c_d_e_f_g"
-    assert sample_folder(Path("x") / "My song.v2.sfz") == Path("x") / "My_song.v2_samples"
 
 
 def chunks(data: bytes) -> dict[str, bytes]:
@@ -125,32 +80,71 @@ class SoundFont:
         assert list(lists) == ["LISTINFO", "LISTsdta", "LISTpdta"]
         self.info = chunks(lists["LISTINFO"][4:])
         self.frames = np.frombuffer(chunks(lists["LISTsdta"][4:])["smpl"], "<i2")
-        tables = chunks(lists["LISTpdta"][4:])
-        assert list(tables) == list(ROWS)
-        self.rows = {
-            name: [table[at : at + ROWS[name]] for at in range(0, len(table), ROWS[name])]
-            for name, table in tables.items()
-        }
-        self.samples = [struct.unpack("<20sIIIIIBbHH", row) for row in self.rows["shdr"]]
+        self.tables = chunks(lists["LISTpdta"][4:])
+        assert list(self.tables) == list(ROWS)
+        assert not any(len(table) % ROWS[name] for name, table in self.tables.items())
+
+    def rows(self, name: str, form: str) -> list[tuple]:
+        assert struct.calcsize(form) == ROWS[name]
+        return list(struct.iter_unpack(form, self.tables[name]))
 
     def zones(self) -> list[list[tuple[int, int]]]:
         """Generators of each zone of the instrument, the global one first."""
-        bags = [struct.unpack("<HH", row) for row in self.rows["ibag"]]
-        generators = [struct.unpack("<HH", row) for row in self.rows["igen"]]
-        return [generators[first:last] for (first, _), (last, _) in pairwise(bags)]
+        generators = self.rows("igen", "<HH")
+        return [generators[first:last] for (first, _), (last, _) in pairwise(self.rows("ibag", "<HH"))]
 
 
-@pytest.mark.parametrize("points", [(0.2,), (0.2, 0.4)])
-def test_the_tables_are_as_the_specification_has_them(
-    points: tuple[float, ...], instrument_of: InstrumentOf, render: Render, tmp_path: Path
+HOSTILE = (
+    "../../etc/passwd",
+    "/etc/passwd",
+    "C:\\Windows\\x",
+    "a\n<region> sample=/etc/passwd",
+    "..",
+    "$x #define",
+    "con\x00",
+    "é漢字" * 5_000,
+    "",
+    "x" * 10_000,
+    "a=b // c <global>",
+)
+
+
+def test_no_name_becomes_a_path_or_an_opcode(tmp_path: Path) -> None:
+    for place, name in enumerate(HOSTILE):
+        folder = tmp_path / str(place)
+        folder.mkdir()
+        assert re.fullmatch(r"[A-Za-z0-9+][A-Za-z0-9_.+-]{0,59}", plain_stem(name))
+        hostile = instrument_of().model_copy(update={"name": name, "description": f"{name}\n#include"})
+        plan = small(hostile, keys=(60, 60), layers=1)
+        fits = name.isprintable() and re.fullmatch(r"[^/\\:<>]{1,50}", name)
+        out, font = folder / (f"{name}.sfz" if fits else "a.sfz"), folder / "a.sf2"
+        export_sampled(plan, out, render)
+        export_sampled(plan, font, render)
+        assert sorted(folder.iterdir()) == sorted([out, sample_folder(out), font])
+        text = out.read_text("utf-8")
+        code = re.sub("//.*", "", text)
+        assert opcodes(code, "sample") == [f"{plan.zones[0].stem}.flac"]
+        assert re.findall(r"^<\w+>", text, re.M) == ["<control>", "<global>", "<group>", "<region>"]
+        assert "#include" not in code
+        told = SoundFont(font)
+        assert len(told.info["INAM"]) <= 256 and told.info["INAM"].isascii()
+        assert told.tables["phdr"][19] == 0
+    assert plain_stem("a b=c$d<e>//f;g") == "a_b_c_d_e_f_g"
+    assert sample_folder(Path("x") / "My song.v2.sfz") == Path("x") / "My_song.v2_samples"
+
+
+@pytest.mark.parametrize(("points", "level_db"), [((0.2,), 20.0), ((0.2, 0.4), -30.0)])
+def test_the_tables_are_as_the_specification_has_them_and_the_whole_is_at_full_level(
+    points: tuple[float, ...], level_db: float, tmp_path: Path
 ) -> None:
-    plan = small(instrument_of(pickup={"points": points}, name="Häärp ñ 琴", description="Two lines."))
+    told = {"name": "Häärp ñ 琴", "description": "Two lines."}
+    plan = small(instrument_of(pickup={"points": points}, level_db=level_db, **told))
     export_sampled(plan, tmp_path / "a.sf2", render)
     font = SoundFont(tmp_path / "a.sf2")
     assert font.info["ifil"] == struct.pack("<HH", 2, 1)
     assert font.info["INAM"].rstrip(b"\0") == b"Haarp n _"
-    assert {name: len(row) for name, rows in font.rows.items() for row in rows} == ROWS
-    *samples, last = font.samples
+    assert 20 * np.log10(np.abs(font.frames.astype(int)).max() / 2**15) == pytest.approx(-1, abs=0.02)
+    *samples, last = font.rows("shdr", "<20sIIIIIBbHH")
     assert last[0].rstrip(b"\0") == b"EOS"
     assert len(samples) == len(plan.zones) * len(points)
     for number, (_, start, end, loop, loop_end, rate_hz, key, fine, link, kind) in enumerate(samples):
@@ -167,29 +161,10 @@ def test_the_tables_are_as_the_specification_has_them(
     assert [a[2] + ZEROS_BEHIND for a in samples] == [b[1] for b in samples[1:]] + [len(font.frames)]
     first, *zones = font.zones()
     assert not any(kind == SAMPLE_ID for kind, _ in first)
-    assert len(zones) == len(samples)
     for zone in zones:
         assert [zone[0][0], zone[1][0], zone[-1][0]] == [KEY_RANGE, VEL_RANGE, SAMPLE_ID]
-    assert {zone[-1][1] for zone in zones} == set(range(len(samples)))
-    sources = [struct.unpack("<HHhHH", row) for row in font.rows["imod"]]
-    assert (0x0502, 48, 0, 0, 0) in sources  # the default of velocity, of no amount
-
-
-@pytest.mark.parametrize("instrument_db", [-30.0, 20.0])
-def test_the_whole_of_a_soundfont_is_at_full_level_and_a_hostile_name_is_a_name(
-    instrument_db: float, instrument_of: InstrumentOf, render: Render, tmp_path: Path
-) -> None:
-    pluck, name = {"softest_mm": 1.0, "hardest_mm": 10.0}, "../\x00\n" + "é漢" * 5_000
-    instrument = instrument_of(level_db=instrument_db, pluck=pluck).model_copy(
-        update={"name": name, "description": name}
-    )
-    report = export_sampled(small(instrument), tmp_path / "a.sf2", render)
-    assert report.gain_db == pytest.approx(-1 - instrument_db, abs=0.5)  # the peak is estimated from quiet plucks
-    font = SoundFont(tmp_path / "a.sf2")
-    assert 20 * np.log10(np.abs(font.frames.astype(int)).max() / 2**15) == pytest.approx(-1, abs=0.02)
-    assert len(font.info["INAM"]) <= 256 and font.info["INAM"].isascii()
-    assert font.rows["phdr"][0][19] == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["a.sf2"]
+    assert sorted(zone[-1][1] for zone in zones) == list(range(len(samples)))
+    assert (0x0502, 48, 0, 0, 0) in font.rows("imod", "<HHhHH")  # the default of velocity, of no amount
 
 
 @pytest.mark.parametrize(
@@ -200,11 +175,10 @@ def test_the_whole_of_a_soundfont_is_at_full_level_and_a_hostile_name_is_a_name(
         ("a.wav", {}, r"a\.wav: must end with \.sfz or \.sf2"),
     ],
 )
-def test_plans_that_no_file_can_hold_are_reported_before(
-    name: str, choices: dict, reported: str, instrument_of: InstrumentOf
-) -> None:
-    plan = small(instrument_of(range=(0, 127)), **choices)
+def test_plans_that_no_file_can_hold_are_reported_before(name: str, choices: dict, reported: str) -> None:
+    whole = instrument_of(range=(0, 127))
+    plan = small(whole, **choices)
     with pytest.raises(ValueError, match=reported):
         planned(plan, Path(name))
     assert planned(plan, Path("a.sfz")) == plan
-    assert planned(small(instrument_of(range=(0, 127)), keys=(0, 127), layers=32), Path("a.sf2")).bits == "24"
+    assert planned(small(whole, keys=(0, 127), layers=32), Path("a.sf2")).bits == "24"
