@@ -1,21 +1,26 @@
-"""A note as a file: it is what a device is given, whole or not at all, and its recipe renders it again."""
+"""Notes as files: what a device is given, whole or not at all, rendered again by their recipes; also of models."""
 
 from __future__ import annotations
 
+import csv
 import errno
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import soundfile
+import torch
 
-from app.export import sound
+from app.export import compared, sound
 from app.export.choices import ExportChoices
+from app.export.compared import TABLE, ComparedExport, ComparedModels
 from app.export.note import HeardNote, NoteExport, default_file_name, export_sounds, musical_name
 from app.export.recipe import SoundRecipe, read_recipe
 from app.export.sound import VOICES, Voices, check_sources, compared_sounds
@@ -30,9 +35,9 @@ from app.rendering.subject import StringOf
 from app.shared.vocabulary import FORMATS, Bits, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
-from engine.levels import FULL_SCALE_M
+from engine.levels import FULL_SCALE_M, MATCHED_S
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, PresetError, load_preset
+from engine.presets import SHIPPED, PresetError, load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights, project
 from engine.sources import ModelSource, TruthSource
 from engine.values.ear import Ear
@@ -131,17 +136,10 @@ def test_a_file_holds_the_sound_to_its_own_step_and_its_recipe(
     assert recipe == json.loads(SoundRecipe.of(plucked, plucked.load(), "model", settings).model_dump_json())
     assert recipe["preset_sha256"] == hashlib.sha256(plucked.load().path.read_bytes()).hexdigest()
     assert Pluck(**recipe["pluck"]) == plucked.pluck
-
-
-@pytest.mark.parametrize(("bits", "normalise"), [("16", True), ("24", False)])
-def test_flac_holds_the_very_samples_and_the_recipe_of_wav(
-    plucked: NoteSound, bits: Bits, normalise: bool, tmp_path: Path
-) -> None:
-    wav, flac = tmp_path / "a.wav", tmp_path / "a.flac"
-    for path in (wav, flac):
-        export_sound(plucked, path, settings=WavSettings(bits, normalise=normalise))
-    np.testing.assert_array_equal(*(soundfile.read(path, dtype="int32")[0] for path in (wav, flac)))
-    assert read_recipe(flac) == read_recipe(wav)
+    if ending == "flac":  # it holds the very samples
+        wav = export_sound(plucked, tmp_path / "a.wav", settings=settings).path
+        np.testing.assert_array_equal(*(soundfile.read(each, dtype="int32")[0] for each in (path, wav)))
+        assert read_recipe(path) == read_recipe(wav)
 
 
 def test_the_gain_of_files_is_one_which_does_not_depend_on_what_is_written_beside(
@@ -230,17 +228,14 @@ def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, messa
         form_of(file, WavSettings(**wanted).bits, wanted.get("rate_hz", 4_000))
 
 
-def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
+def test_a_decay_ends_where_it_is_so_far_down_and_files_of_one_have_one_length(
+    plucked: NoteSound, tmp_path: Path
+) -> None:
     rate_hz, rate = 1000, 10.0  # 1/s: 86.9 dB in a second
     signal = np.exp(-rate * np.arange(3000) / rate_hz)[:, None]
     assert sound.decayed_frames(signal, rate_hz, 60.0) / rate_hz == pytest.approx(6.9 / rate, abs=0.06)
     assert sound.decayed_frames(signal[:200], rate_hz, 60.0) == 200
     assert sound.decayed_frames(np.zeros((500, 1)), rate_hz, 60.0) == 50
-
-
-def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_reported(
-    plucked: NoteSound, tmp_path: Path
-) -> None:
     decaying, settings = replace(plucked, seconds=8.0), WavSettings(decay_db=10.0)
     model, truth = (export_sound(decaying, tmp_path / "a.wav", source, settings) for source in VOICES)
     assert model.frames == truth.frames < 8 * 4000
@@ -298,9 +293,6 @@ def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitu
     assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
     heard = HeardNote(OF_COMPILED, "model", False, 20.0, "", name, 4_000)
     assert [heard.file_name(source, ".wav") for source in VOICES] == [f"{name}.wav", f"{name} truth.wav"]
-
-
-def test_the_file_name_reports_what_is_in_it() -> None:
     assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth", ".wav") == "nylon_x0.35_a4.0_48000_truth.wav"
     assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both", ".wav") == "b_x0.1234_a0.25_4000_both.wav"
 
@@ -334,3 +326,73 @@ def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) 
     expected = 10 ** (FIXED.difference_gain_db / 20) * (model.astype(np.float64) - truth)
     np.testing.assert_allclose(found[:until], expected[:until], atol=1e-9)
     assert np.abs(found).max() > 0
+
+
+# Models on one pluck as a folder
+
+
+@pytest.fixture
+def job(small_preset: Path, tmp_path: Path) -> ComparedExport:
+    """Three models: half as loud, as it is, and one that runs away."""
+    lines = []
+    for name, factor, offset in (("soft", 0.5, 0.0), ("small", 1.0, 0.0), ("wild", 1.0, 1e6)):
+        path = tmp_path / f"{name}.safetensors"
+        shutil.copy(small_preset, path)
+        preset = load_preset(path)
+        decoder: Any = preset.model.decoder  # type: ignore[union-attr]
+        with torch.no_grad():
+            decoder.weight.mul_(factor)
+            decoder.bias.add_(offset)
+        save_preset(path, preset.info, preset.model)
+        lines.append((NoteSound(path, Pluck(0.5, 4.0), 1.5, Ear((0.37, 0.6))), {"preset": "=1+1", "rel_mae": 0.5}))
+    return ComparedExport(ComparedModels("", "", lines), tmp_path / "out", PLAIN)
+
+
+@pytest.mark.parametrize("match", [False, True])
+def test_each_model_has_its_files_and_its_level_is_matched_where_it_is_chosen(
+    job: ComparedExport, tmp_path: Path, match: bool
+) -> None:
+    shares: list[float] = []
+    job = replace(job, settings=replace(job.settings, level_match=match))
+    said = job.run(lambda share, *_: shares.append(share))
+    assert "2 models" in said and "Ran away" in said and shares == sorted(shares)
+    with (job.file / TABLE).open(encoding="utf-8", newline="") as file:
+        table = list(csv.DictReader(file))
+    for line, factor in zip(table, (0.5, 1.0), strict=False):
+        sounds = [soundfile.read(job.file / line[f"{name}_file"])[0] for name in compared.SOURCES]
+        model, truth, difference = sounds
+        assert difference == pytest.approx(model - truth, abs=1e-6)
+        levels = [np.sqrt(np.square(sound[: round(MATCHED_S * 4000)]).mean()) for sound in (model, truth)]
+        assert levels[0] / levels[1] == pytest.approx(1.0 if match else factor, rel=1e-4 if match else 0.1)
+    assert [line["model_file"] for line in table[2:]] == [""], "the one that runs away has a line alone"
+    assert {line["preset"] for line in table} == {"'=1+1"}, "no formula for a spreadsheet"
+    listed = {line[f"{name}_file"] for line in table[:2] for name in compared.SOURCES}
+    assert {path.name for path in job.file.iterdir()} == listed | {TABLE} and len(listed) == 6
+    for source in compared.SOURCES:
+        first, again = job.file / table[0][f"{source}_file"], tmp_path / "again.wav"
+        recipe = read_recipe(first)
+        assert recipe.level_match == match
+        sound = recipe.sound(job.models.lines[0][0].preset, first)  # type: ignore[arg-type]
+        export_sound(sound, again, recipe.source, recipe.settings)
+        assert first.read_bytes() == again.read_bytes()
+
+
+def test_a_folder_that_is_there_stays_and_what_is_not_whole_is_not_left(
+    job: ComparedExport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cancel(share: float, *_: object) -> None:
+        if share > 0.4:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        job.run(cancel)
+    monkeypatch.setattr(compared, "Columns", lambda _: exec("raise OSError(errno.ENOSPC, 'full')", {"errno": errno}))
+    with pytest.raises(WriteError, match=r"out: cannot be written \(full\); free some space"):
+        job.run(lambda *_: None)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".safetensors"}
+    with pytest.raises(WriteError, match="none: no such folder"):
+        replace(job, file=tmp_path / "none" / "out").run(lambda *_: None)
+    job.file.mkdir()
+    with pytest.raises(WriteError, match="is there already"):
+        job.run(lambda *_: None)
+    assert list(job.file.iterdir()) == []

@@ -8,6 +8,7 @@ import math
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +16,7 @@ import soundfile
 
 from app.export import recording
 from app.export.recording import Recording, blocks
-from app.export.wav import (
-    LONGEST_TAG_BYTES,
-    NORMALISED_PEAK,
-    WavSettings,
-    WrittenSound,
-    faded_out,
-    quantised,
-    write_wav,
-)
+from app.export.wav import LONGEST_TAG_BYTES, NORMALISED_PEAK, WavSettings, faded_out, quantised, write_wav
 from app.rendering.note_sound import NoteSound
 from app.shared.vocabulary import Bits
 from engine.pluck import Pluck
@@ -37,7 +30,7 @@ SINE = np.sin(2 * np.pi * 440 * np.arange(4_000) / RATE_HZ)
 
 def written(
     samples: np.ndarray, settings: WavSettings, tags: dict[str, str] | None = None, beside: Sequence[np.ndarray] = ()
-) -> tuple[io.BytesIO, WrittenSound]:
+) -> tuple[io.BytesIO, Any]:
     """A file in memory, and its report."""
     file = io.BytesIO()
     report = write_wav(file, samples, RATE_HZ, settings, tags or {}, beside)
@@ -122,17 +115,14 @@ def test_tags_survive_up_to_the_longest(bits: Bits) -> None:
         assert {name: getattr(file, name) for name in tags} == tags
 
 
-@pytest.mark.parametrize(
-    ("samples", "tags", "message"),
-    [
-        (np.zeros(0), {}, "no samples"),
-        (np.array([0.0, np.nan]), {}, "not finite"),
-        (np.zeros(5), {"comment": "x" * 2001}, "comment is longer than 2000 bytes"),
-    ],
-)
-def test_what_cannot_be_stored_is_refused(samples: np.ndarray, tags: dict[str, str], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        written(samples, PLAIN, tags)
+def test_what_cannot_be_stored_is_refused() -> None:
+    for samples, tags, message in (
+        ([], {}, "no samples"),
+        ([0.0, np.nan], {}, "not finite"),
+        ([0.0] * 5, {"comment": "x" * 2001}, "comment is longer than 2000 bytes"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            written(np.array(samples), PLAIN, tags)
 
 
 def test_a_disk_that_becomes_full_is_reported() -> None:

@@ -1,11 +1,15 @@
-"""C structures from their declarations, for the hosts of these tests: as the formats' documents have them."""
+"""What the hosts of these tests share: C structures as the formats' documents have them, and pieces in blocks."""
 
 from __future__ import annotations
 
 import ctypes as c
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 P = c.c_void_p
 KINDS: dict[str, Any] = {
@@ -20,7 +24,9 @@ KINDS: dict[str, Any] = {
     **{f"{sign}{bits}": getattr(c, f"c_{name}{bits}") for sign, name in zip("iu", ("int", "uint"), strict=True)
        for bits in (8, 16, 32, 64)},
 }  # fmt: skip
-FIELD = re.compile(r"(\w+)(?:\[(\d+)\]|\(([\w, ]*)\))?\s+(\w+)")
+FIELD = re.compile(r"\s*(\w+)(?:\[(\d+)\]|\(([\w, ]*)\))?\s+(\w+)\s*")
+Sound = NDArray[np.float32]
+Events = Sequence[tuple[int, Any]]  # at a frame, three bytes of MIDI or what a format has beside it
 
 
 def function(result: str, *arguments: str) -> Any:
@@ -28,19 +34,20 @@ def function(result: str, *arguments: str) -> Any:
     return c.CFUNCTYPE(KINDS[result], *(KINDS[each] for each in arguments))
 
 
-def structure(declaration: str, **others: Any) -> Any:
-    """A structure of fields `kind name`, `kind[length] name` and `result(arguments) name`, with ; between them."""
-    kinds: dict[str, Any] = {}
-    for each in declaration.split(";"):
-        found = FIELD.fullmatch(each.strip())
-        assert found, each
-        kind, length, arguments, name = found.groups()
-        if arguments is not None:
-            kinds[name] = function(kind, *filter(None, arguments.split(", ")))
-        else:
-            one = others.get(kind) or KINDS[kind]
+def structures(declarations: str) -> SimpleNamespace:
+    """Structures `name { … }` of fields `kind name`, `kind[length] name` and `result(arguments) name`, with ;."""
+    made: dict[str, Any] = {}
+    for union, structure, fields in re.findall(r"(union )?(\w+) \{(.*?)\}", declarations, re.DOTALL):
+        kinds: dict[str, Any] = {}
+        for each in fields.split(";"):
+            kind, length, arguments, name = FIELD.fullmatch(each).groups()  # type: ignore[union-attr]
+            one = {**KINDS, **made}[kind]
+            if arguments is not None:
+                one = function(kind, *filter(None, arguments.split(", ")))
             kinds[name] = one * int(length) if length else one
-    return type("Declared", (c.Structure,), {"_fields_": list(kinds.items()), "kinds": kinds})
+        base = c.Union if union else c.Structure
+        made[structure] = type(structure, (base,), {"_fields_": list(kinds.items()), "kinds": kinds})
+    return SimpleNamespace(**made)
 
 
 def filled(kind: Any, **values: Callable[..., Any] | object) -> Any:
@@ -50,3 +57,25 @@ def filled(kind: Any, **values: Callable[..., Any] | object) -> Any:
         function = callable(value) and not isinstance(value, c.Structure)
         setattr(made, name, kind.kinds[name](value) if function else value)
     return made
+
+
+def cut_off(left: list[bytes], size: int) -> bytes:
+    """The next bytes of a state that is read: few at a time, as hosts may give them."""
+    part, left[0] = left[0][: min(size, 7)], left[0][min(size, 7) :]
+    return part
+
+
+class Playing:
+    """An instance of a format: `block` gives the next frames, (frames, 2), with events at frames of its own."""
+
+    frame = 0
+    block: Callable[[int, Events], Sound]
+
+    def render(self, frames: int, events: Events, block: int = 512) -> Sound:
+        """A piece, (frames, 2), in blocks; frames of events count from its beginning, which is now."""
+        first, parts = self.frame, []
+        ordered = sorted(((first + at, what) for at, what in events), key=lambda event: event[0])
+        while self.frame < first + frames:
+            begin, count = self.frame, min(block, first + frames - self.frame)
+            parts.append(self.block(count, [(at - begin, what) for at, what in ordered if 0 <= at - begin < count]))
+        return np.concatenate(parts)

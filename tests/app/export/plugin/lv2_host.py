@@ -9,48 +9,43 @@ from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.export.plugin.image import Control
-from tests.app.export.plugin.abi import filled, function, structure
+from tests.app.export.plugin.abi import Events, P, Playing, Sound, filled, function, structures
 
-P = c.c_void_p
 MAP = "http://lv2plug.in/ns/ext/urid#map"
 CHUNK, STATE = "http://lv2plug.in/ns/ext/atom#Chunk", "http://lv2plug.in/ns/ext/state#interface"
 POD, PORTABLE = 1, 2
 EVENTS, LEFT, RIGHT, LATENCY, FIRST = range(5)
 State = dict[str, bytes]  # a property's value by its key; each is a chunk
 
+lv2 = structures("""
+Descriptor { str uri; ptr(ptr, f64, str, ptr) instantiate; void(ptr, u32, ptr) connect_port; void(ptr) activate;
+    void(ptr, u32) run; void(ptr) deactivate; void(ptr) cleanup; ptr(str) extension_data }
+UridMap { ptr handle; u32(ptr, str) map }
+Feature { str uri; ptr data }
+StateInterface { i32(ptr, ptr, ptr, u32, ptr) save; i32(ptr, ptr, ptr, u32, ptr) restore }
+""")
 
-Descriptor = structure(
-    "str uri; ptr(ptr, f64, str, ptr) instantiate; void(ptr, u32, ptr) connect_port; void(ptr) activate;"
-    " void(ptr, u32) run; void(ptr) deactivate; void(ptr) cleanup; ptr(str) extension_data"
-)
-UridMap = structure("ptr handle; u32(ptr, str) map")
-Feature = structure("str uri; ptr data")
+
 Store = function("i32", "ptr", "u32", "ptr", "size", "u32", "u32")
 Retrieve = function("ptr", "ptr", "u32", "ptr", "ptr", "ptr")
-StateInterface = structure("i32(ptr, ptr, ptr, u32, ptr) save; i32(ptr, ptr, ptr, u32, ptr) restore")
 
 
 class Refused(Exception):
     """The plug-in makes no instance."""
 
 
-class Instance:
-    """A plug-in of a bundle; `values` are its control ports, in the order of `controls`.
+class Instance(Playing):
+    """A plug-in of a bundle, to be activated; `values` are its control ports."""
 
-    Args:
-        active: else the caller activates it.
-    """
+    latency = 96
 
-    def __init__(
-        self, bundle: Path, id: str, controls: Sequence[Control], rate_hz: float, active: bool = True
-    ) -> None:
+    def __init__(self, bundle: Path, id: str, controls: Sequence[Control], rate_hz: float) -> None:
         (binary,) = bundle.glob("*.so")
         find = c.CDLL(str(binary)).lv2_descriptor
         find.restype = P
-        described = map(Descriptor.from_address, takewhile(bool, map(find, range(1000))))
+        described = map(lv2.Descriptor.from_address, takewhile(bool, map(find, range(1000))))
         self._own = next(each for each in described if each.uri == f"urn:{id}".encode())
         self._uris = list[bytes]()
 
@@ -59,21 +54,28 @@ class Instance:
                 self._uris.append(uri)
             return 1 + self._uris.index(uri)
 
-        self._map = filled(UridMap, map=number)
-        self._feature = Feature(MAP.encode(), c.addressof(self._map))
+        self._map = filled(lv2.UridMap, map=number)
+        self._feature = lv2.Feature(MAP.encode(), c.addressof(self._map))
         features = (P * 2)(c.addressof(self._feature), None)
         self._midi = number(0, b"http://lv2plug.in/ns/ext/midi#MidiEvent")
         self._chunk = number(0, CHUNK.encode())
         self._at = self._own.instantiate(c.addressof(self._own), rate_hz, str(bundle).encode(), features)
         if not self._at:
             raise Refused
+        self.controls = {each.id: each for each in controls}
         self.values = np.array([each.standard for each in controls], np.float32)
         self._latency = np.zeros(1, np.float32)
         for place in range(len(controls)):
-            self._own.connect_port(self._at, FIRST + place, self.values[place:].ctypes.data)
-        self._own.connect_port(self._at, LATENCY, self._latency.ctypes.data)
-        if active:
-            self.activate()
+            self._connect(FIRST + place, self.values[place:])
+        self._connect(LATENCY, self._latency)
+
+    def _connect(self, port: int, memory: np.ndarray) -> None:
+        self._own.connect_port(self._at, port, memory.ctypes.data)
+
+    def move(self, id: str, value: float) -> None:
+        """A port, and a block."""
+        self.values[[*self.controls].index(id)] = value
+        self.block(64, [])
 
     def activate(self) -> None:
         self._own.activate(self._at)
@@ -95,7 +97,6 @@ class Instance:
         return state
 
     def restore(self, state: State, kind: str = CHUNK) -> bool:
-        """Whether it was accepted."""
         kept = {key: c.create_string_buffer(value, len(value)) for key, value in state.items()}
         known = self._map.map(None, kind.encode())
 
@@ -111,28 +112,22 @@ class Instance:
         return self._state.restore(self._at, c.cast(Retrieve(retrieve), P), None, 0, None) == 0
 
     @property
-    def _state(self) -> StateInterface:
+    def _state(self) -> lv2.StateInterface:
         at = self._own.extension_data(STATE.encode())
         assert at, "no state"
-        return StateInterface.from_address(at)
+        return lv2.StateInterface.from_address(at)
 
-    def render(self, frames: int, messages: Sequence[tuple[int, bytes]], block: int = 512) -> NDArray[np.float32]:
-        """(frames, 2), without the latency; `messages` are pairs of a frame, in order, and three bytes of MIDI."""
-        parts, done, total = [], 0, frames + 96
-        while done < total:
-            count = min(block, total - done)
-            due = [each for each in messages if done <= each[0] < done + count]
-            body = b"".join(struct.pack("<qII3s5x", at - done, 3, self._midi, data) for at, data in due)
-            events = c.create_string_buffer(struct.pack("<IIII", 8 + len(body), 0, 0, 0) + body)
-            out = np.zeros((2, count), np.float32)
-            self._own.connect_port(self._at, EVENTS, c.addressof(events))
-            self._own.connect_port(self._at, LEFT, out[0].ctypes.data)
-            self._own.connect_port(self._at, RIGHT, out[1].ctypes.data)
-            self._own.run(self._at, count)
-            parts.append(out.T)
-            done += count
-        assert self._latency[0] == 96
-        return np.concatenate(parts)[96:]
+    def block(self, frames: int, events: Events) -> Sound:
+        body = b"".join(struct.pack("<qII3s5x", at, 3, self._midi, data) for at, data in events)
+        sequence = c.create_string_buffer(struct.pack("<IIII", 8 + len(body), 0, 0, 0) + body)
+        out = np.zeros((2, frames), np.float32)
+        self._own.connect_port(self._at, EVENTS, c.addressof(sequence))
+        self._connect(LEFT, out[0])
+        self._connect(RIGHT, out[1])
+        self._own.run(self._at, frames)
+        assert self._latency[0] == self.latency
+        self.frame += frames
+        return out.T.copy()
 
     def destroy(self) -> None:
         self._own.deactivate(self._at)

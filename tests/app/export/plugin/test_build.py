@@ -1,13 +1,12 @@
-"""Building plug-ins: names, files that are kept, faults of the disk, and what a killed build leaves."""
+"""Building plug-ins: identifiers, files that are kept, faults of the disk, and what a killed build leaves."""
 
 from __future__ import annotations
 
 import os
 import re
 import shutil
-import signal
 import subprocess
-from importlib.util import find_spec
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -15,36 +14,18 @@ import pytest
 from app.export.plugin import build, texts
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
-from app.export.plugin.identity import held_in
+from app.export.plugin.identity import MOST_BYTES, check_kept, held_in, identifier, lost_with
 from app.export.plugin.image import Image, image_of
 from app.export.plugin.objects import ObjectError, digest, objects_of
+from app.instruments.library import SHIPPED, list_instruments
 from engine.kernels import cache as kernel_cache
-from engine.python_process import python_command, python_environment
 from engine.whole_file import WriteError
 from tests.app.export.plugin import lv2_host
-from tests.app.export.plugin.host import Browser, Library
+from tests.app.export.plugin.host import Library, presets
 from tests.app.export.plugin.pieces import LEARNED, instrument_of, preset_of
 
-pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
-
 LARGEST_BYTES = 2_000_000  # the code has 0.8 MB more
-
-
-def test_process_calls_nothing_but_arithmetic(objects: Path) -> None:
-    if shutil.which("nm") is None:
-        pytest.skip("needs nm")
-    paths = objects_of("linux-x64", objects)
-    listed = subprocess.run(["nm", "-u", *paths], capture_output=True, text=True, check=True).stdout.split()
-    assert not {"malloc", "free", "calloc", "fopen", "pthread_mutex_lock"} & set(listed)
-
-
-def lv2_listed(folder: Path) -> list[str] | None:
-    """Identifiers that lilv finds in a folder; none where its program is not here."""
-    if not shutil.which("lv2ls"):
-        return None
-    environment = {**os.environ, "LV2_PATH": str(folder)}
-    done = subprocess.run(["lv2ls"], env=environment, capture_output=True, text=True, check=True)
-    return sorted(done.stdout.splitlines())
+HERE = this_target()
 
 
 def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid(
@@ -53,17 +34,22 @@ def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid
     names = ("é" * 60, "古琴" * 18, "古琴" * 18 + "!", "🎸" * 60, "My bass!", "my bass-", "My bass", "عود", "!!!")
     harp, preset = instrument_of("concert_harp"), preset_of("concert_harp")
     made = [image_of(harp.model_copy(update={"name": name}), preset) for name in names]
-    library = Library(build_plugin(made, "clap", this_target(), tmp_path / "bank", objects))
+    library = Library(build_plugin(made, "clap", HERE, tmp_path / "bank", objects))
     assert list(library.plugins) == [image.id for image in made]
     assert all(library.create(id).save() for id in library.plugins)
     library.destroy_instances()
-    bundle = build_plugin(made, "lv2", this_target(), tmp_path / "bank", objects)
+    bundle = build_plugin(made, "lv2", HERE, tmp_path / "bank", objects)
     for image in made:
-        lv2_host.Instance(bundle, image.id, image.parameters, 48_000).destroy()
-    assert lv2_listed(tmp_path) in (None, sorted(f"urn:{image.id}" for image in made))
+        instance = lv2_host.Instance(bundle, image.id, image.parameters, 48_000)
+        instance.activate()
+        instance.destroy()
     described = (bundle / "instruments.ttl").read_text(encoding="utf-8")
     assert re.search(r"lv2:minorVersion [1-9]\d* ; lv2:microVersion \d+ ;", described)
     assert "lv2:extensionData state:interface ;" in described
+    if shutil.which("lv2ls"):
+        environment = {**os.environ, "LV2_PATH": str(tmp_path)}
+        done = subprocess.run(["lv2ls"], env=environment, capture_output=True, text=True, check=True)
+        assert sorted(done.stdout.splitlines()) == sorted(f"urn:{image.id}" for image in made)
     if shutil.which("lv2_validate") and shutil.which("sord_validate"):  # which the first calls
         files = [each.name for each in bundle.glob("*.ttl")]  # it skips paths that have a space
         done = subprocess.run(["lv2_validate", *files], cwd=bundle, capture_output=True, text=True, check=False)
@@ -74,18 +60,17 @@ def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid
 def test_instruments_are_small_and_one_that_cannot_sound_is_refused() -> None:
     for name in ("concert_toms", "frame_drum", "slow_water"):  # the most drums or modes, the longest room
         assert image_of(instrument_of(name), preset_of(name)).bytes < LARGEST_BYTES
-    sitar = instrument_of("sitar")
-    assert sitar.pickup.kind == "bridge"  # whose force a recording does not give
+    assert instrument_of("sitar").pickup.kind == "bridge"  # whose force a recording does not give
     with pytest.raises(ValueError, match="no key sounds"):
-        image_of(sitar, preset_of(LEARNED))
+        image_of(instrument_of("sitar"), preset_of(LEARNED))
 
 
 def test_any_other_kernel_makes_other_object_files_and_an_unknown_target_is_refused(
-    objects: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where the user chooses the folder of compiled code, it is the same for every version."""
     with pytest.raises(ValueError, match="linux-x64, linux-arm64, windows-x64"):
-        objects_of("amiga", objects)
+        objects_of("amiga", tmp_path)
     assert set(TARGETS) == {"linux-x64", "linux-arm64", "windows-x64", "macos-x64", "macos-arm64"}
     read, usual = set[Path](), Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda path: read.add(path) or usual(path))
@@ -99,76 +84,121 @@ def contents(path: Path) -> dict[Path, bytes]:
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
-    images: list[Image], objects: Path, tmp_path: Path, form: str
+    images: dict[str, Image], objects: Path, tmp_path: Path, form: str
 ) -> None:
-    place, target = tmp_path / "bank", this_target()
-    path = build_plugin(images[:2], form, target, place, objects)
-    assert held_in(path) == {image.id for image in images[:2]}
+    place, (one, two, three, *_) = tmp_path / "bank", images.values()
+    path = build_plugin([one, two], form, HERE, place, objects)
+    assert held_in(path) == {one.id, two.id}
     before = contents(path)
     with pytest.raises(PluginError, match=r"another instrument, .*--replace"):
-        build_plugin(images[1:3], form, target, place, objects)
-    with pytest.raises(PluginError, match=f"two instruments are named {images[0].name}"):
-        build_plugin([*images[:2], images[0]], form, target, place, objects)
+        build_plugin([two, three], form, HERE, place, objects)
+    with pytest.raises(PluginError, match=f"two instruments are named {one.name}"):
+        build_plugin([one, two, one], form, HERE, place, objects)
     assert contents(path) == before
-    build_plugin(images[:1], form, target, place, objects, replace=True)
-    assert held_in(path) == {images[0].id}
+    build_plugin([one], form, HERE, place, objects, replace=True)
+    assert held_in(path) == {one.id}
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     if form == "clap":
         library = Library(path)
-        browser = Browser(library)
-        assert browser.ids == [f"{images[0].id}.presets"]
-        assert [(preset.name, preset.key) for preset in browser.read()[1]] == [(images[0].name, images[0].id)]
-        assert library.create(images[0].id).load_preset(images[0].id)
+        id, *_, shown = presets(library)
+        assert id == f"{one.id}.presets".encode()
+        assert [what for word, what in shown if word == "begin"] == [(one.name, one.id)]
+        assert library.create(one.id).load_preset(one.id)
         library.destroy_instances()
 
 
 def test_faults_of_disk_and_compiler_are_named_and_leave_nothing(
-    images: list[Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    images: dict[str, Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for said in ("error: NoSpaceLeft", "LLVM ERROR: IO failure on output stream: No space left on device"):
-        monkeypatch.setattr(build, "run_waiting", lambda *_, said=said: (1, said))
-        with pytest.raises(WriteError, match=r"No space left on device.*free some space"):
-            build_plugin(images[:1], "clap", this_target(), tmp_path / "bank", objects)
+    def refused(error: type[Exception], words: str, folder: Path = tmp_path) -> None:
+        with pytest.raises(error, match=words):
+            build_plugin([*images.values()][:1], "clap", HERE, folder / "bank", objects)
         assert not list(tmp_path.iterdir())
-    monkeypatch.undo()
-    with monkeypatch.context() as lacking, pytest.raises(PluginError, match=r"linking for \S+ failed: .*error:"):
+
+    for said in ("error: NoSpaceLeft", "LLVM ERROR: IO failure on output stream: No space left on device"):
+        with monkeypatch.context() as full:
+            full.setattr(build, "run_waiting", lambda *_, said=said: (1, said))
+            refused(WriteError, r"No space left on device.*free some space")
+    with monkeypatch.context() as lacking:
         lacking.setattr(build, "objects_of", lambda *_: (tmp_path / "none.o",))
-        build_plugin(images[:1], "clap", this_target(), tmp_path / "bank", objects)
-    with monkeypatch.context() as unknown, pytest.raises(ObjectError, match="compiled: KeyError: 'no part'"):
-        unknown.setattr(texts, "PARTS", ("no part",))
-        objects_of(this_target(), tmp_path)
-    assert [path for path in tmp_path.iterdir() if path.suffix != ".lock"] == []
+        refused(PluginError, r"linking for \S+ failed: .*error:")
     monkeypatch.setattr(build, "objects_of", lambda *_: pytest.fail("it was compiled"))
-    (tmp_path / "file").touch()
-    for folder in (tmp_path / "file", Path("/dev/null/there"), Path("/proc/there")):
-        with pytest.raises(WriteError, match=f"^{folder}.*: cannot be written .*; "):
-            build_plugin(images[:1], "clap", this_target(), folder / "bank", objects)
+    for folder in (Path(__file__), Path("/dev/null/there"), Path("/proc/there")):
+        refused(WriteError, f"^{folder}.*: cannot be written .*; ", folder)
+    monkeypatch.setattr(texts, "PARTS", ("no part",))
+    with pytest.raises(ObjectError, match="compiled: KeyError: 'no part'"):
+        objects_of(HERE, tmp_path)
+    assert [path for path in tmp_path.iterdir() if path.suffix != ".lock"] == []
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from app.export.plugin import build, texts
-from app.export.plugin.formats import this_target
-from app.export.plugin.image import Image
-build.objects_of = lambda *_: ()
-build.run_waiting = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
-image = Image("org.learned-strings.a", "A", b"", (), ())
-build.build_plugin([image], "lv2", this_target(), Path(sys.argv[1]), Path())
-"""
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a kill that nothing can catch")
 def test_what_a_killed_build_left_goes_with_the_next(
-    images: list[Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    images: dict[str, Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    aside, out = tmp_path / "temporary", tmp_path / "out"
+    def die(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    aside, out, one = tmp_path / "temporary", tmp_path / "out", [*images.values()][:1]
     aside.mkdir()
-    command = python_command("-c", KILLED, str(out / "a"))
-    subprocess.run(command, env={**python_environment(), "TMPDIR": str(aside)}, check=False)
+    monkeypatch.setattr("tempfile.tempdir", str(aside))
+    with monkeypatch.context() as killed, pytest.raises(KeyboardInterrupt):
+        killed.setattr("engine.whole_file.os.getpid", lambda: 999_999_999)
+        killed.setattr("engine.whole_file.shutil.rmtree", lambda *_, **__: None)
+        killed.setattr(build, "run_waiting", die)
+        build_plugin(one, "lv2", HERE, out / "a", objects)
     (left,) = aside.iterdir()
     assert (left / "images.c").exists()
-    monkeypatch.setattr("tempfile.tempdir", str(aside))
-    build_plugin(images[:1], "lv2", this_target(), out / "b", objects)
+    build_plugin(one, "lv2", HERE, out / "b", objects)
     assert not list(aside.iterdir())
     assert [each.name for each in out.iterdir()] == ["b.lv2"]
+
+
+# Identifiers: one for each name, the same in every build, and short enough for every host
+
+PREFIX = "org.learned-strings."
+FACTORY = [entry.instrument.name for entry in list_instruments(SHIPPED)[0]]
+# Names that fold to one another; those of the factory differ from the last two.
+FOLDING = "My bass!|my bass-|My bass|my bass|MY BASS|My-bass|My  bass|My bass -|Bäss|ﬁddle|Fiddle"
+MORE = "Straße|STRASSE|İstanbul|istanbul|Ⅷ|²|2|!!!|???|---|| |عود|عود!|\u202eعود|Twelve string guitar|Ukulele  low G"
+LONG = ("古琴" * 18, "古琴" * 18 + "!", "é" * 60, "é" * 59 + "è", "🎸" * 300, "🎸" * 299, "a" * 300, "A" + "a" * 299)
+NAMES = (*FOLDING.split("|"), *MORE.split("|"), *LONG, unicodedata.normalize("NFD", "Bäss"))
+
+
+def respellings(name: str) -> list[str]:
+    """Other spellings: of case, of normalisation, of marks between letters, and the words of its identifier."""
+    own = identifier(name).removeprefix(PREFIX)
+    words = own.replace("-", " ")
+    forms = [unicodedata.normalize(form, name) for form in ("NFC", "NFD", "NFKC", "NFKD")]
+    others = [name.lower(), name.upper(), name.title(), name.swapcase(), name.capitalize(), name + "!", own, words]
+    marks = [re.sub(r"\W", mark, name) for mark in " -_.!"]
+    return [*forms, *others, *marks, words[:1].upper() + words[1:], f"{name} ", f" {name}"]
+
+
+def test_names_that_fold_alike_differ_and_plain_ones_keep_theirs() -> None:
+    names = {each for name in (*NAMES, *FACTORY) for each in (name, *respellings(name))}
+    ids = {identifier(name) for name in names}
+    assert len(ids) == len(names)
+    fits = re.compile(r"[^\x00-\x20<>\"{}|^`\\]+")  # in an IRI of LV2 in Turtle
+    assert all(len(id.encode()) <= MOST_BYTES and fits.fullmatch(id) for id in ids)
+    for name in FACTORY:
+        assert identifier(name) == PREFIX + "".join(c if c.isalnum() else "-" for c in name.lower())
+    for name, wanted in (("My bass", "my-bass"), ("Bäss 2", "bäss-2"), ("古琴", "古琴")):
+        assert identifier(name) == PREFIX + wanted
+    assert identifier("My bass!") == f"{PREFIX}my-bass--b3dcc31a205f"  # songs find it by this
+
+
+def test_what_a_plug_in_holds_is_read_from_it_and_what_is_none_is_never_replaced(tmp_path: Path) -> None:
+    ids = {identifier(name) for name in NAMES}
+    file, manifest = tmp_path / "bank.clap", tmp_path / "bank.lv2" / "manifest.ttl"
+    noise = bytes(range(256)) * 50
+    file.write_bytes(noise.join([b"", *(id.encode().ljust(128, b"\0") for id in sorted(ids)), b""]))
+    manifest.parent.mkdir()
+    manifest.write_text("\n".join(f"<urn:{id}> a lv2:Plugin ." for id in sorted(ids)), "utf-8")
+    for path, inside in ((file, file), (manifest.parent, manifest)):
+        assert held_in(path) == ids
+        check_kept(path, ids)
+        with pytest.raises(PluginError, match=r"holds 2 other instruments, as .*--replace"):
+            check_kept(path, sorted(ids)[2:])
+        inside.write_text("<urn:org.others> a lv2:Plugin .", encoding="utf-8")
+        with pytest.raises(PluginError, match="no plug-in of this program"):
+            lost_with(path, ids)
+    assert lost_with(tmp_path / "none", ids) == frozenset()

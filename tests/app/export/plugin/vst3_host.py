@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import ctypes as c
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tests.app.export.plugin.abi import structure
+from tests.app.export.plugin.abi import Events, P, Playing, Sound, cut_off, filled, structures
 
-P, I32, U32, F64 = c.c_void_p, c.c_int32, c.c_uint32, c.c_double
+I32, U32, F64 = c.c_int32, c.c_uint32, c.c_double
 OK, NO_INTERFACE = 0, -1
 COMPONENT = uuid.UUID("E831FF31-F2D5-4301-928E-BBEE25697802").bytes
 PROCESSOR = uuid.UUID("42043F99-B7DA-453C-A569-E79D9AAEC33D").bytes
@@ -22,38 +21,34 @@ MIDI_MAPPING = uuid.UUID("DF0FF9F7-49B7-4669-B63A-B7327ADBF5E5").bytes
 EXPRESSIONS = uuid.UUID("B7F8F859-4123-4872-9116-95814F3721A3").bytes
 FACTORY_3 = uuid.UUID("4555A2AB-C123-4E57-9B12-291036878931").bytes
 NOTE_ON, NOTE_OFF, EXPRESSION = 0, 1, 4
-TUNING = 2
+TUNING, BEND = 2, 129
 AUDIO, EVENTS, INPUT, OUTPUT = 0, 1, 0, 1
 
-
-Class3 = structure(
-    "u8[16] id; i32 cardinality; char[32] category; u16[64] name; u32 flags; char[128] subcategories;"
-    " u16[64] vendor; u16[64] version; u16[64] sdk"
-)
-Parameter = structure(
-    "u32 id; u16[128] title; u16[128] short_title; u16[128] units; i32 steps; f64 standard; i32 unit; i32 flags"
-)
-Note = structure("i16 channel; i16 key; f32 cents; f32 velocity; i32 length; i32 id")
-NoteOff = structure("i16 channel; i16 key; f32 velocity; i32 id; f32 cents")
-Expressed = structure("u32 type; i32 note; f64 value")
-
-
-class Content(c.Union):
-    _fields_ = (("on", Note), ("off", NoteOff), ("expressed", Expressed))
-
-
-Event = structure("i32 bus; i32 frame; f64 quarter; u16 flags; u16 type; Content content", Content=Content)
-Setup = structure("i32 mode; i32 sample_size; i32 most_frames; f64 rate_hz")
-Buffers = structure("i32 channels; u64 silence; ptr data")
-Process = structure(
-    "i32 mode; i32 sample_size; i32 frames; i32 inputs_count; i32 outputs_count; ptr inputs; ptr outputs;"
-    " ptr changes; ptr changes_out; ptr events; ptr events_out; ptr context"
-)
+vst3 = structures("""
+Class3 { u8[16] id; i32 cardinality; char[32] category; u16[64] name; u32 flags; char[128] subcategories;
+    u16[64] vendor; u16[64] version; u16[64] sdk }
+Parameter { u32 id; u16[128] title; u16[128] short_title; u16[128] units; i32 steps; f64 standard; i32 unit;
+    i32 flags }
+Note { i16 channel; i16 key; f32 cents; f32 velocity; i32 length; i32 id }
+NoteOff { i16 channel; i16 key; f32 velocity; i32 id; f32 cents }
+Expressed { u32 type; i32 note; f64 value }
+union Content { Note on; NoteOff off; Expressed expressed }
+Event { i32 bus; i32 frame; f64 quarter; u16 flags; u16 type; Content content }
+Setup { i32 mode; i32 sample_size; i32 most_frames; f64 rate_hz }
+Buffers { i32 channels; u64 silence; ptr data }
+Process { i32 mode; i32 sample_size; i32 frames; i32 inputs_count; i32 outputs_count; ptr inputs; ptr outputs;
+    ptr changes; ptr changes_out; ptr events; ptr events_out; ptr context }
+Stream { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr, ptr, i32, ptr) read;
+    i32(ptr, ptr, i32, ptr) write }
+EventList { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr) count; i32(ptr, i32, ptr) event }
+Queue { i32(ptr) query; i32(ptr) hold; i32(ptr) release; u32(ptr) id; i32(ptr) count; i32(ptr, i32, ptr, ptr) point;
+    i32(ptr, i32, f64, ptr) add }
+Changes { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr) count; ptr(ptr, i32) queue;
+    ptr(ptr, ptr, ptr) add }
+""")
 
 
 class Interface:
-    """A pointer that a plug-in gave."""
-
     def __init__(self, at: int) -> None:
         self.at = at
 
@@ -74,41 +69,29 @@ class Interface:
 
 
 class Given:
-    """An object of the host's: a table of Python functions."""
+    """An object of the host's: a table of Python functions, which get the object first."""
 
-    def __init__(self, *functions: tuple[Any, Sequence[Any], Callable[..., Any]]) -> None:
-        none = (I32, (), lambda: NO_INTERFACE)
-        self._kept = [
-            c.CFUNCTYPE(kind, P, *kinds)(_without_self(of)) for kind, kinds, of in (none, none, none, *functions)
-        ]
-        self._table = (P * len(self._kept))(*(c.cast(each, P).value for each in self._kept))
+    def __init__(self, kind: Any, **functions: Callable[..., Any]) -> None:
+        unknown = dict.fromkeys(("query", "hold", "release"), lambda *_: NO_INTERFACE)
+        self._table = filled(kind, **unknown, **functions)
         self._object = P(c.addressof(self._table))
         self.at = c.addressof(self._object)
-
-
-def _without_self(of: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda _self, *arguments: of(*arguments)
 
 
 def text(units: Any) -> str:
     return "".join(map(chr, units)).partition("\0")[0]
 
 
-def note_on(key: int, velocity: float, channel: int = 0, id: int = -1, cents: float = 0.0) -> Event:
-    return Event(type=NOTE_ON, content=Content(on=Note(channel, key, cents, velocity / 127, 0, id)))
+def note_on(key: int, velocity: float, channel: int = 0, id: int = -1, cents: float = 0.0) -> vst3.Event:
+    return vst3.Event(type=NOTE_ON, content=vst3.Content(on=vst3.Note(channel, key, cents, velocity / 127, 0, id)))
 
 
-def note_off(key: int, channel: int = 0) -> Event:
-    return Event(type=NOTE_OFF, content=Content(off=NoteOff(channel, key, 0.0, -1, 0.0)))
-
-
-def tuned(id: int, semitones: float) -> Event:
-    return Event(type=EXPRESSION, content=Content(expressed=Expressed(TUNING, id, 0.5 + semitones / 240)))
+def tuned(id: int, semitones: float) -> vst3.Event:
+    expressed = vst3.Expressed(TUNING, id, 0.5 + semitones / 240)
+    return vst3.Event(type=EXPRESSION, content=vst3.Content(expressed=expressed))
 
 
 class Library:
-    """A bundle's library."""
-
     def __init__(self, path: Path) -> None:
         self._library = c.CDLL(str(path))
         assert self._library.ModuleEntry(P(1))
@@ -119,22 +102,21 @@ class Library:
 
     @property
     def plugins(self) -> dict[str, bytes]:
-        """Ids by name."""
         found = {}
         for index in range(self.factory.call(4, I32)):
-            info = Class3()
+            info = vst3.Class3()
             assert self.factory.call(8, I32, I32(index), c.pointer(info)) == OK
             assert info.category == b"Audio Module Class"
             found[text(info.name)] = bytes(info.id)
         return found
 
-    def create(self, name: str) -> Instance:
+    def create_named(self, name: str) -> Instance:
         found = P()
         assert self.factory.call(6, I32, self.plugins[name], COMPONENT, c.pointer(found)) == OK
         return Instance(Interface(found.value or 0))
 
 
-class Instance:
+class Instance(Playing):
     """A plug-in of a library: component, processor and controller."""
 
     def __init__(self, component: Interface) -> None:
@@ -145,11 +127,10 @@ class Instance:
         assert component.call(3, I32, P()) == OK
         assert component.call(7, I32, I32(AUDIO), I32(OUTPUT)) == component.call(7, I32, I32(EVENTS), I32(INPUT)) == 1
         assert component.call(7, I32, I32(AUDIO), I32(INPUT)) == 0
-        self.frame = 0
         self.moved: dict[int, float] = {}  # parameters that the plug-in has moved
 
     def accepts(self, rate_hz: float, most: int = 4096) -> bool:
-        setup = Setup(0, 0, most, rate_hz)
+        setup = vst3.Setup(0, 0, most, rate_hz)
         return bool(self.processor.call(7, I32, c.pointer(setup)) == OK)
 
     def activate(self, rate_hz: float) -> None:
@@ -172,10 +153,10 @@ class Instance:
         return int(self.processor.call(6, U32))
 
     @property
-    def parameters(self) -> dict[str, Parameter]:
+    def parameters(self) -> dict[str, vst3.Parameter]:
         found = {}
         for index in range(self.controller.call(8, I32)):
-            info = Parameter()
+            info = vst3.Parameter()
             assert self.controller.call(9, I32, I32(index), c.pointer(info)) == OK
             found[text(info.title)] = info
         return found
@@ -184,7 +165,6 @@ class Instance:
         return float(self.controller.call(14, F64, U32(id)))
 
     def set_value(self, id: int, value: float) -> bool:
-        """In the controller."""
         return bool(self.controller.call(15, I32, U32(id), F64(value)) == OK)
 
     def shown(self, id: int, value: float) -> str:
@@ -193,7 +173,6 @@ class Instance:
         return text(found)
 
     def assigned(self, channel: int, number: int) -> int | None:
-        """The parameter of a controller."""
         found = U32()
         result = self.mapping.call(3, I32, I32(0), c.c_int16(channel), c.c_int16(number), c.pointer(found))
         return found.value if result == OK else None
@@ -201,12 +180,12 @@ class Instance:
     def save(self) -> bytes:
         kept = bytearray()
 
-        def write(data: int, size: int, done: Any) -> int:
+        def write(_stream: int, data: int, size: int, done: int) -> int:
             kept.extend(c.string_at(data, size))
-            c.cast(done, c.POINTER(I32))[0] = size
+            I32.from_address(done).value = size
             return OK
 
-        stream = Given((I32, (P, I32, P), lambda *_: 1), (I32, (P, I32, P), write))
+        stream = Given(vst3.Stream, write=write)
         assert self.component.call(13, I32, P(stream.at)) == OK
         return bytes(kept)
 
@@ -214,64 +193,64 @@ class Instance:
         """Into the component, then into the controller, as hosts do."""
         left = [content]
 
-        def read(data: int, size: int, done: Any) -> int:
-            part, left[0] = left[0][: min(size, 7)], left[0][min(size, 7) :]
+        def read(_stream: int, data: int, size: int, done: int) -> int:
+            part = cut_off(left, size)
             c.memmove(data, part, len(part))
-            c.cast(done, c.POINTER(I32))[0] = len(part)
+            I32.from_address(done).value = len(part)
             return OK
 
-        stream = Given((I32, (P, I32, P), read), (I32, (P, I32, P), lambda *_: 1))
+        stream = Given(vst3.Stream, read=read)
         found = self.component.call(12, I32, P(stream.at)) == OK
         left[0] = content
         return (self.controller.call(5, I32, P(stream.at)) == OK) == found and found
 
-    def block(
-        self, frames: int, events: Sequence[tuple[int, Event]], changes: Sequence[tuple[int, int, float]] = ()
-    ) -> NDArray[np.float32]:
-        """The next frames, (frames, 2); events and changes (frame, id, value) are of frames of the whole piece."""
+    def _of_midi(self, kind: int, first: int, second: int) -> vst3.Event | tuple[int, float]:
+        """Notes as events; other messages as the change of a parameter, its identifier and its value."""
+        channel = kind & 15
+        if kind & 0xF0 == 0x90:
+            return note_on(first, second, channel)
+        if kind & 0xF0 == 0x80:
+            return vst3.Event(type=NOTE_OFF, content=vst3.Content(off=vst3.NoteOff(channel, first, 0.0, -1, 0.0)))
+        if kind & 0xF0 == 0xE0:
+            return self.assigned(channel, BEND) or 0, (first + 128 * second) / 16383
+        return self.assigned(channel, first) or 0, second / 127
+
+    def block(self, frames: int, events: Events) -> Sound:
         out = np.zeros((2, frames), np.float32)
         rows = (P * 2)(*(row.ctypes.data for row in out))
-        buffers = Buffers(2, 0, c.addressof(rows))
+        buffers = vst3.Buffers(2, 0, c.addressof(rows))
+        due = [(at, self._of_midi(*what) if isinstance(what, bytes) else what) for at, what in events]
+        notes = [(at, what) for at, what in due if isinstance(what, vst3.Event)]
 
-        def event(index: int, to: int) -> int:
-            frame, content = events[index]
-            content.frame = frame - self.frame
-            c.memmove(to, c.addressof(content), c.sizeof(Event))
+        def event(_list: int, index: int, to: int) -> int:
+            notes[index][1].frame = notes[index][0]
+            c.memmove(to, c.addressof(notes[index][1]), c.sizeof(vst3.Event))
             return OK
 
-        def point(change: tuple[int, int, float], frame: Any, value: Any) -> int:
-            c.cast(frame, c.POINTER(I32))[0] = change[0] - self.frame
-            c.cast(value, c.POINTER(F64))[0] = change[2]
-            return OK
+        def queue(at: int, id: int, value: float) -> Given:
+            def point(_queue: int, _index: int, frame: int, to: int) -> int:
+                I32.from_address(frame).value, F64.from_address(to).value = at, value
+                return OK
 
-        queues = [
-            Given(
-                (U32, (), lambda each=each: each[1]),
-                (I32, (), lambda: 1),
-                (I32, (I32, P, P), lambda _index, frame, value, each=each: point(each, frame, value)),
-            )
-            for each in changes
-        ]
-        listed = Given((I32, (), lambda: len(events)), (I32, (I32, P), event))
-        changed = Given((I32, (), lambda: len(queues)), (P, (I32,), lambda index: queues[index].at))
-        kept: list[Given] = []
+            return Given(vst3.Queue, id=lambda _: id, count=lambda _: 1, point=point)
 
-        def add(id: Any, _index: int) -> int:
-            number = c.cast(id, c.POINTER(U32))[0]
+        def moved(_changes: int, id: int, _index: int) -> int:
+            number = U32.from_address(id).value
 
-            def hear(_frame: int, value: float, _index: int) -> int:
+            def hear(_queue: int, _frame: int, value: float, _index: int) -> int:
                 self.moved[number] = value
                 return OK
 
-            none = (I32, (), lambda: 0)
-            kept.append(Given(none, none, none, (I32, (I32, F64, P), hear)))
+            kept.append(Given(vst3.Queue, add=hear))
             return kept[-1].at
 
-        none = (I32, (), lambda: 0)
-        answered = Given(none, none, (P, (P, P), add))
-        process = Process(
-            0, 0, frames, 0, 1, None, c.addressof(buffers), changed.at, answered.at, listed.at, None, None
-        )
+        kept = list[Given]()
+        queues = [queue(at, *what) for at, what in due if not isinstance(what, vst3.Event)]
+        listed = Given(vst3.EventList, count=lambda _: len(notes), event=event)
+        changed = Given(vst3.Changes, count=lambda _: len(queues), queue=lambda _, index: queues[index].at)
+        answered = Given(vst3.Changes, add=moved)
+        lists = changed.at, answered.at, listed.at
+        process = vst3.Process(0, 0, frames, 0, 1, None, c.addressof(buffers), *lists, None, None)
         assert self.processor.call(9, I32, c.pointer(process)) == OK
         self.frame += frames
         return out.T.copy()

@@ -69,7 +69,6 @@ def cents(sound: Sound, hz: float) -> float:
 
 
 def level_db(sound: Sound) -> float:
-    """Root mean square in dB."""
     return float(10 * np.log10(np.mean(np.square(sound.astype(np.float64)))))
 
 
@@ -89,8 +88,6 @@ def by_fluidsynth(path: Path, events: Events, seconds: float) -> Sound:
 
 
 class Sfizz:
-    """A player of SFZ."""
-
     def __init__(self, path: Path) -> None:
         synth = pytest.importorskip("pysfizz").Synth(RATE_HZ, BLOCK)
         assert synth.load_sfz_file(path, quiet=False)
@@ -101,7 +98,6 @@ class Sfizz:
         return int(self._synth.get_num_active_voices())
 
     def play(self, events: Events, seconds: float) -> Sound:
-        """The next seconds, (2, frames)."""
         parts, now = [np.zeros((2, 0), np.float32)], 0.0
         for at, key, velocity in (*events, (seconds, 0, 0)):
             blocks = round((at - now) * RATE_HZ / BLOCK)
@@ -111,8 +107,4 @@ class Sfizz:
         return np.concatenate(parts, axis=1)
 
 
-def by_sfizz(path: Path, events: Events, seconds: float) -> Sound:
-    return Sfizz(path).play(events, seconds)
-
-
-PLAYERS = {"sfz": by_sfizz, "sf2": by_fluidsynth}
+PLAYERS = {"sfz": lambda path, *played: Sfizz(path).play(*played), "sf2": by_fluidsynth}

@@ -24,16 +24,6 @@ KINDS = pytest.mark.parametrize("kind", ["sfz", "sf2"])
 small = partial(of_layers, keys=(50, 54), layers=2, seconds=0.3)
 
 
-def cancelled(when: Callable[[], bool]) -> Callable[..., None]:
-    """Progress that cancels once `when` is so."""
-
-    def progress(*_: object) -> None:
-        if when():
-            raise Cancelled
-
-    return progress
-
-
 def failing(error: BaseException) -> Callable[..., Any]:
     def fail(*_: object, **__: object) -> None:
         raise error
@@ -42,7 +32,6 @@ def failing(error: BaseException) -> Callable[..., Any]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Of all files below."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
@@ -86,8 +75,7 @@ def test_what_a_killed_export_left_goes_with_the_next(
 def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reached_s: list[float] = []
-    written: list[object] = []
+    reached_s, written, cancel = list[float](), list[int](), failing(Cancelled())
 
     def slow(*note: object, advanced: Callable[[float], None]) -> np.ndarray:
         for block in range(1, 31):
@@ -96,11 +84,11 @@ def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leave
         return render(*note)
 
     with pytest.raises(Cancelled):
-        export_sampled(small(), tmp_path / "a.sfz", slow, progress=cancelled(lambda: len(reached_s) == 35))
+        export_sampled(small(), tmp_path / "a.sfz", slow, progress=lambda *_: len(reached_s) == 35 and cancel())
     assert reached_s[-1] == 0.05  # of the second note
     monkeypatch.setattr(sf2, "quantised", lambda *words: written.append(1) or quantised(*words))
     with pytest.raises(Cancelled):
-        export_sampled(small(), tmp_path / "a.sf2", render, progress=cancelled(lambda: len(written) == 2))
+        export_sampled(small(), tmp_path / "a.sf2", render, progress=lambda *_: len(written) == 2 and cancel())
     assert list(tmp_path.iterdir()) == []
 
 
