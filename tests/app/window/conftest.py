@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +14,86 @@ from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
+from app.export.choices import ExportChoices
+from app.export.sampled.choices import SampledChoices
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import read_instrument
+from app.player.events import Event, NoteOn
+from app.player.midi_file import message_of
 from app.playing.midi_port import MidiInput
 from app.session.choices import Choices
 from app.views import theme
+from app.views.dialogs.midi_dialog import MidiDialog
 from app.window import midi_control
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets.finding import SHIPPED
 from tests.app.conftest import make_sound
-from tests.app.window.driver import Window
-from tests.app.window.midi import FakeBackend
+from tests.app.places import files_in
+from tests.app.window.driver import CONTROL, KEY, Window
 
 Open = Callable[..., Window]
 SPEAKERS = AudioDevice("Speakers", "Test API", 48_000)
+INPUTS = KEYBOARD, PADS = "Keys:Keys 20:0", "Pads:Pads 24:0"
+BRIEFLY = ExportChoices(until_decayed=False, seconds=0.3, normalise=False)
+
+
+class FakeBackend:
+    """A MIDI system of two inputs; `send` speaks in a thread of its own, as the system's does."""
+
+    def __init__(self) -> None:
+        self.names = list(INPUTS)
+        self.busy = False
+        self.open_name = ""
+        self.callback: Callable[[Sequence[int]], None] | None = None
+
+    def get_input_names(self) -> list[str]:
+        return self.names
+
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> FakeBackend:
+        if self.busy:
+            raise OSError("resource busy")
+        self.open_name, self.callback = name, callback
+        return self
+
+    def close(self) -> None:
+        self.open_name, self.callback = "", None
+
+    def connected(self) -> bool:
+        return self.open_name in self.names
+
+    def send(self, *events: Event | Sequence[int]) -> None:
+        """Send events, or the bytes of a message."""
+        assert self.callback is not None
+        for event in events:
+            message = event if isinstance(event, bytes) else message_of(event)  # type: ignore[arg-type]
+            thread = threading.Thread(target=self.callback, args=(message,))
+            thread.start()
+            thread.join()
+
+    def play(self, w: Window, notes: str, *events: NoteOn) -> None:
+        """Choose an input in the window's dialog, and what notes do; then send some."""
+        w.key(KEY.Key_M, CONTROL)
+        (dialog,) = w.window.findChildren(MidiDialog)
+        dialog.port_chosen.emit(PADS)
+        dialog.notes_chosen.emit(notes)
+        self.send(*events)
+
+
+@pytest.fixture
+def backend(monkeypatch: pytest.MonkeyPatch) -> FakeBackend:
+    """The MIDI system of every window."""
+    made = FakeBackend()
+    made_with = lambda receive, load, release: MidiInput(receive, lambda: made, release)  # noqa: E731
+    monkeypatch.setattr(midi_control, "MidiInput", made_with)
+    return made
 
 
 @pytest.fixture
 def opened(
     qtbot: QtBot,
+    backend: FakeBackend,
     preset_folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -41,10 +101,13 @@ def opened(
 ) -> Iterator[Open]:
     """Opens windows with the presets `first` and `second` and these shipped ones; none leaves a thread.
 
-    `settings`: fields of `Settings`; the other words are `choices`.
+    `settings`: fields of `Settings`; the other words are `choices`. Exports are short, and go to `tmp_path`.
     """
     monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path / "unsaved recordings"))
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    sampled = SampledChoices(keys=(60, 61), layers=1, seconds=0.2)
+    usual = {"instrument": InstrumentChoice(shown=True), "export": BRIEFLY, "sampled": sampled}
+    usual["files"] = files_in(tmp_path)  # type: ignore[assignment]
     windows: list[Window] = []
 
     def made(
@@ -54,8 +117,7 @@ def opened(
             shutil.copy(SHIPPED / f"{name}.safetensors", preset_folder)
         window = MainWindow()
         qtbot.addWidget(window, before_close_func=lambda closed: setattr(closed, "may_close", lambda: True))
-        fields = {"instrument": InstrumentChoice(shown=True), **(settings or {})}
-        chosen = Settings(choices=Choices(**{"seconds": 0.5, **choices}), **fields)
+        chosen = Settings(choices=Choices(**{"seconds": 0.5, **choices}), **{**usual, **(settings or {})})
         windows.append(Window(qtbot, Controller(window, chosen, tmp_path / "settings.json", sound)))
         with qtbot.waitExposed(window):
             window.show()
@@ -83,24 +145,9 @@ def guitar(opened: Open) -> Window:
 
 
 @pytest.fixture
-def devices() -> list[AudioDevice]:
-    """The sound devices; the last is there."""
-    return [SPEAKERS]
-
-
-@pytest.fixture
-def speakers(devices: list[AudioDevice], numb_output: Any) -> Callable[[Any], Sound]:
+def speakers(numb_output: Any) -> Callable[[Any], Sound]:
     """A sound with a device that takes frames at the pace of time and makes none."""
-    return lambda on_problem: Sound(on_problem, look_up=lambda *_: devices[-1], open_output=numb_output)
-
-
-@pytest.fixture
-def backend(monkeypatch: pytest.MonkeyPatch) -> FakeBackend:
-    """The MIDI system of windows that are opened afterwards."""
-    made = FakeBackend()
-    made_with = lambda receive, load, release: MidiInput(receive, lambda: made, release)  # noqa: E731
-    monkeypatch.setattr(midi_control, "MidiInput", made_with)
-    return made
+    return lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output)
 
 
 @pytest.fixture

@@ -50,6 +50,29 @@ def choose(box: QComboBox, data: object) -> None:
     box.activated.emit(row)
 
 
+def tab_stops(within: QWidget) -> list[QWidget]:
+    """What the Tab key can reach, as far as it can be seen; in a group of buttons it is the checked one."""
+    return [
+        each
+        for each in (within, *within.findChildren(QWidget))
+        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and each.focusProxy() is None
+        and each.isEnabled()
+        and each.isVisible()
+        and each.window() is within.window()
+    ]
+
+
+def by_arrows(control: QWidget) -> bool:
+    """Return True if arrow keys lead to it from the one of its group that is checked."""
+    return isinstance(control, QAbstractButton) and control.group() is not None and not control.isChecked()
+
+
+def fits(window: QWidget) -> bool:
+    """Return True if the window is no smaller than its parts need."""
+    return window.centralWidget().minimumSizeHint().expandedTo(window.size()) == window.size()  # type: ignore[attr-defined]
+
+
 class Window:
     """A window and its user.
 
@@ -93,15 +116,6 @@ class Window:
 
     def wait(self, condition: Callable[[], object]) -> None:
         self.qtbot.waitUntil(lambda: bool(condition()))
-
-    def wait_for(self, value: Callable[[], object], expected: object) -> None:
-        """Wait until a value is the expected one; the error of a value that stays another shows it."""
-
-        def check() -> None:
-            found = value()
-            assert found == expected, f"it is {found!r}"
-
-        self.qtbot.waitUntil(check)
 
     def wait_for_take(self) -> None:
         """Return when what is chosen is rendered; the words alone may be of the pluck before."""

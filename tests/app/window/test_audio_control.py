@@ -20,9 +20,9 @@ from app.window import audio_control
 from app.window.audio_control import FREQUENT_GAPS, AudioControl
 from app.window.main_window import MainWindow
 from engine.voices import Gap
+from tests.app.window.conftest import SPEAKERS
 from tests.app.window.driver import press
 
-SPEAKERS = AudioDevice("Speakers", "ALSA", 48_000)
 GAPS = tuple(Gap(0.5 * number, "device", 2.0) for number in range(4))
 WISH = (DeviceChoice(name="Loud", host_api="JACK"), SoundChoice(rate_hz=96_000, buffer=256))
 
@@ -34,36 +34,28 @@ class Desk:
         self.opened: list[tuple[Any, ...]] = []
         self.tones: list[str] = []
         self.present = SoundStatus(device=SPEAKERS, gaps=GAPS)
-        self.forgotten = 0
         self.notices = window.notices
-        self.control = AudioControl(window, lambda report: self, None, SoundChoice())  # type: ignore[arg-type]
+        output = SimpleNamespace(
+            open=lambda *given: self.opened.append(given),
+            sound_tone=self.tones.append,
+            status=lambda: self.present,
+        )
+        self.control = AudioControl(window, lambda report: output, None, SoundChoice())  # type: ignore[arg-type, return-value]
         self.control.open()
         self.control.show_dialog()
         (self.dialog,) = window.findChildren(AudioDialog)
 
-    def open(self, *arguments: Any) -> None:
-        self.opened.append(arguments)
-
-    def sound_tone(self, side: str) -> None:
-        self.tones.append(side)
-
-    def status(self) -> SoundStatus:
-        return self.present
-
-    def forget_latencies(self) -> None:
-        self.forgotten += 1
-
-    def show(self, latencies_s: tuple[float, ...] = (), **status: Any) -> None:
+    def show(self, **status: Any) -> None:
         """Tell the control the state of the output, as the window does ten times a second."""
-        notes = SimpleNamespace(latencies_s=latencies_s, forget_latencies=self.forget_latencies)
+        notes = SimpleNamespace(latencies_s=(), forget_latencies=lambda: None)
         self.control.show(SoundStatus(**{"device": SPEAKERS, **status}), notes, None)  # type: ignore[arg-type]
 
     @property
     def saved(self) -> tuple[DeviceChoice | None, SoundChoice]:
         return self.control.device, self.control.sound
 
-    def says(self, words: str) -> bool:
-        return any(words in label.text() for label in self.dialog.findChildren(QLabel))
+    def words(self) -> list[str]:
+        return [label.text() for label in self.dialog.findChildren(QLabel)]
 
 
 @pytest.fixture
@@ -76,29 +68,20 @@ def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     made.dialog.close()
 
 
-def test_a_choice_is_opened_and_saved_once_it_plays(desk: Desk) -> None:
+def test_a_choice_is_saved_once_it_plays_and_reported_where_it_is_refused(desk: Desk) -> None:
     assert desk.opened == [(None, SoundChoice(), False)]
     desk.dialog.choice_made.emit(*WISH)
     assert desk.opened[-1] == (*WISH, False)
-    desk.show(changes_done=1)
-    assert desk.saved == (None, SoundChoice())
-    desk.show(device=AudioDevice("Loud", "JACK", 96_000), changes_done=2)
-    assert desk.saved == WISH
-    press(desk.dialog, "Rescan")
-    assert desk.opened[-1] == (*desk.opened[-2][:-1], True)
-    press(desk.dialog, "Left")
-    assert desk.tones == ["left"]
-
-
-def test_a_refused_choice_is_reported_until_sound_is_back_and_not_saved(desk: Desk) -> None:
-    desk.dialog.choice_made.emit(*WISH)
     desk.present = SoundStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
     desk.control.report(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
     desk.show(changes_done=2, problem="It refuses 96000 Hz.")
     assert "Playback continues on “Speakers”" in desk.notices.text and desk.notices.notices[-1].details == "code"
-    assert desk.saved == (None, SoundChoice()) and desk.says("It refuses 96000 Hz.")
-    desk.show(changes_done=3)
-    assert desk.notices.text == ""
+    assert desk.saved == (None, SoundChoice()) and any("It refuses 96000 Hz." in each for each in desk.words())
+    desk.dialog.choice_made.emit(*WISH)
+    desk.show(changes_done=2)
+    assert desk.saved == (None, SoundChoice()), "it does not play yet"
+    desk.show(device=AudioDevice("Loud", "JACK", 96_000), changes_done=3)
+    assert desk.saved == WISH and desk.notices.text == ""
     desk.control.report(problem(ProblemKind.STALLED, "Speakers"))
     assert "keeps trying" in desk.notices.text and "Playback continues on" not in desk.notices.text
     desk.show()
@@ -107,20 +90,20 @@ def test_a_refused_choice_is_reported_until_sound_is_back_and_not_saved(desk: De
     desk.show()
     assert "internal error" in desk.notices.text and "Playback continues." in desk.notices.text, "to be reported"
     assert desk.notices.notices[-1].details == "Traceback"
+    press(desk.dialog, "Rescan")
+    assert desk.opened[-1] == (*desk.opened[-2][:-1], True)
+    press(desk.dialog, "Left")
+    assert desk.tones == ["left"]
 
 
 def test_gaps_count_from_the_reset_and_frequent_ones_are_reported_once_for_a_buffer(desk: Desk) -> None:
-    assert desk.says("4, the last at 1.5 s: device")
+    assert any("4, the last at 1.5 s: device" in each for each in desk.words())
     press(desk.dialog, "Reset")
     late = Gap(7.25, "rendering", 0.0)
-    for gaps, words in (
-        (GAPS, "0"),
-        ((*GAPS, late), "1, the last at 7.2 s: rendering"),
-        ((GAPS[-1], late), "1, the last at 7.2 s: rendering"),  # only so many are remembered
-        ((late,), "1, the last at 7.2 s: rendering"),
-    ):
+    one = "1, the last at 7.2 s: rendering"
+    for gaps, words in ((GAPS, "0"), ((*GAPS, late), one), ((late,), one)):  # only so many are remembered
         desk.show(gaps=gaps)
-        assert words in [label.text() for label in desk.dialog.findChildren(QLabel)]
+        assert words in desk.words()
     desk.dialog.choice_made.emit(None, SoundChoice())
     desk.notices.withdraw(FREQUENT_GAPS)
     close = tuple(Gap(time_s, "the sound device was late", 5.0) for time_s in (20.0, 21.0, 22.0))

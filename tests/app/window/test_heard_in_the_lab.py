@@ -5,17 +5,16 @@ No instrument has any part in it, whichever was played before.
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import soundfile
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QPushButton
-from pytestqt.qtbot import QtBot
+from PySide6.QtWidgets import QPushButton, QWidget
 
+from app.analysis.abx.trials import AbxChoices
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
@@ -23,25 +22,28 @@ from app.export.choices import ExportChoices
 from app.export.wav import WavSettings
 from app.instruments.instrument import Instrument
 from app.instruments.library import list_instruments
-from app.player.events import NoteOn
+from app.player import events
+from app.player.events import NoteOn, PluckAt
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering.note_sound import NoteSound
 from app.rendering.subject import StringOf, path_of
-from app.session.choices import Choices
 from app.shared.vocabulary import Source
+from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import AbxDialog
-from app.window.controller import LOOK_MS, Controller
-from app.window.main_window import MainWindow
-from app.window.settings import Settings
+from app.views.file_places import FileChoices
+from app.window.controller import LOOK_MS
+from app.window.settings import load_settings
+from engine.kernels import midi
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.kernels.voice_records import ATTACK_S
+from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
-from tests.app.places import files_in
 from tests.app.sounds import render_sound
-from tests.app.window.driver import find, press
+from tests.app.window.conftest import Open
+from tests.app.window.driver import CONTROL, KEY, Window, find, press
 
 RATE_HZ = 48_000
 SECONDS = 0.5  # of a pluck; the last part of it fades out
@@ -78,78 +80,74 @@ class HeldOutput(Output):
 
 
 @pytest.fixture
-def lab(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Controller]:
-    """The window with a preset of each kind, the instruments, and an output that stands until frames are taken."""
-    folder = tmp_path / "presets"
-    folder.mkdir()
-    for name in (*KINDS.values(), "studio_any_string"):
-        shutil.copy(SHIPPED / f"{name}.safetensors", folder)
-    monkeypatch.setattr("app.presets.library.SHIPPED", folder)
-    window = MainWindow()
-    qtbot.addWidget(window)
-    choices = Choices(seconds=SECONDS, face="lab", volume_db=0.0, level_match=False, amplitude_mm=2.0)
-    exported = ExportChoices(until_decayed=False, seconds=SECONDS, normalise=False, format="wav 32f")
-    settings = Settings(choices=choices, export=exported, files=files_in(tmp_path))
-    device = HeldOutput.device
-    make_sound = lambda report: Sound(report, look_up=lambda *_: device, open_output=HeldOutput)  # noqa: E731
-    made = Controller(window, settings, tmp_path / "settings.json", make_sound)
-    window.show()
-    qtbot.waitUntil(lambda: made.sound.status().device is not None)
-    yield made
-    window.may_close = lambda: True
-    window.close()
+def held(opened: Open) -> Window:
+    """The Lab with a preset of each kind, the instruments, and an output that stands until frames are taken."""
+    made = opened(
+        *KINDS.values(),
+        "studio_any_string",
+        sound=lambda report: Sound(report, look_up=lambda *_: HeldOutput.device, open_output=HeldOutput),
+        settings={"export": ExportChoices(until_decayed=False, seconds=SECONDS, normalise=False, format="wav 32f")},
+        face="lab",
+        seconds=SECONDS,
+        volume_db=0.0,
+        level_match=False,
+        amplitude_mm=2.0,
+    )
+    made.wait(lambda: made.controller.sound.status().device is not None)
+    return made
 
 
-def take(lab: Controller, seconds: float) -> Samples:
+def take(w: Window, seconds: float) -> Samples:
     """The next frames of the output, (frames, 2), in whole quanta: so what is played begins with the first."""
-    return lab.sound.mixer.render(round(seconds * RATE_HZ) // QUANTUM * QUANTUM).astype(np.float64)
+    mixer = w.controller.sound.mixer
+    return mixer.render(round(seconds * RATE_HZ) // QUANTUM * QUANTUM).astype(np.float64)
 
 
-def play_instrument(qtbot: QtBot, lab: Controller, instrument: Instrument) -> None:
+def play_instrument(w: Window, instrument: Instrument) -> None:
     """Plays a key of an instrument, which rings on."""
-    lab.session.update(played=instrument)
-    keys = lab.performance.notes.keys
-    qtbot.waitUntil(lambda: keys.player is not None and keys.player.instrument.name == instrument.name)
-    lab.inputs.play(NoteOn(sum(instrument.range) // 2, 100))
-    take(lab, 0.05)
-    qtbot.waitUntil(lambda: isinstance(lab.session.stage.note, KeyNote) and lab.session.stage.known)
+    w.change(played=instrument)
+    w.wait(lambda: w.keys.player is not None and w.keys.player.instrument.name == instrument.name)
+    w.controller.inputs.play(NoteOn(sum(instrument.range) // 2, 100))
+    take(w, 0.05)
+    w.wait(lambda: isinstance(w.session.stage.note, KeyNote) and w.session.stage.known)
 
 
-def choose(qtbot: QtBot, lab: Controller, preset: str) -> None:
+def fall_silent(w: Window) -> None:
+    w.wait(lambda: w.performance.at_hand)
+    assert any(np.abs(take(w, 0.1)).max() < 1e-8 for _ in range(100)), "it rings on"
+
+
+def choose(w: Window, preset: str) -> None:
     """Chooses a preset while the instrument rings, and waits until that has ended."""
-    lab.session.update(preset=preset, amplitude_mm=2.0, position=0.3)
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    for _ in range(100):
-        if np.abs(take(lab, 0.1)).max() < 1e-8:
-            return
-    raise AssertionError("it rings on")
+    w.change(preset=preset, amplitude_mm=2.0, position=0.3)
+    fall_silent(w)
 
 
-def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
+def heard(w: Window, slot: str) -> Samples:
     """The sound of a pluck from slot A or B, from its beginning on."""
-    lab.session.update(heard=slot)
-    lab.pluck()
-    note = lab.performance.notes.latest
+    w.change(heard=slot)
+    note = w.pluck()
     assert isinstance(note, PluckVoices)
-    qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
-    sound = take(lab, SECONDS)
-    lab.performance.stop()
-    take(lab, 0.05)
+    w.wait(lambda: not note.pending and all(each.finished for each in note.ahead))
+    sound = take(w, SECONDS)
+    w.performance.stop()
+    take(w, 0.05)
     return sound[AHEAD:]
 
 
-def drawn(qtbot: QtBot, lab: Controller, source: Source) -> tuple[Samples, int]:
+def drawn(w: Window, source: Source) -> tuple[Samples, int]:
     """The signal that the Lab draws of the chosen pluck, of full scale, and the preset's own rate in Hz."""
-    qtbot.waitUntil(lambda: lab.performance.ready and lab.performance.settled)
-    shown = lab.performance.take
+    w.wait(lambda: w.performance.ready and w.performance.settled)
+    shown = w.performance.take
     assert shown is not None
     return shown.listened.signals[source].read() / np.float64(shown.full_scale), shown.rate_hz
 
 
-def rendered(lab: Controller, source: Source, rate_hz: int = RATE_HZ) -> Samples:
+def rendered(w: Window, source: Source, rate_hz: int = RATE_HZ) -> Samples:
     """What the command `render` would write of the chosen pluck, (frames, channels)."""
-    choices = lab.session.choices
-    sound = NoteSound(SHIPPED / f"{choices.preset}.safetensors", choices.pluck, SECONDS, choices.ear)
+    choices, preset = w.choices, SHIPPED / f"{w.choices.preset}.safetensors"
+    subject = preset if choices.string is None else StringOf(preset, choices.string)
+    sound = NoteSound(subject, choices.pluck, SECONDS, choices.ear)
     return render_sound(sound, source, WavSettings(rate_hz=rate_hz)).reshape(round(SECONDS * rate_hz), -1)
 
 
@@ -166,174 +164,187 @@ def assert_same(
     assert not gain_counts or abs(level_db) <= LEVEL_DB, f"{words}: {level_db:.2f} dB"
 
 
-def blind(qtbot: QtBot, lab: Controller) -> dict[str, Samples]:
+def assert_heard_as_rendered(w: Window, words: str) -> None:
+    for slot, source in SOURCES.items():
+        assert_same(heard(w, slot), rendered(w, source), f"{slot} {words}")
+
+
+def blind(w: Window) -> dict[str, Samples]:
     """The sound of A and B in the listening test."""
-    lab.listening_test()
-    dialog = find(lab.window, AbxDialog)
-    qtbot.waitUntil(find(dialog, QPushButton, "Start the test").isEnabled)
+    w.controller.listening_test()
+    dialog = w.find(AbxDialog)
+    w.wait(find(dialog, QPushButton, "Start the test").isEnabled)
     found = {}
     for slot, name in (("a", "▶  Hear A"), ("b", "Hear B")):
         press(dialog, name)
-        found[slot] = take(lab, 0.3)[AHEAD:]
+        found[slot] = take(w, 0.3)[AHEAD:]
         press(dialog, "Start the test")  # which ends what sounds
-        take(lab, 0.05)
+        take(w, 0.05)
     dialog.abandon()
     return found
 
 
-def exported(lab: Controller) -> Samples:
+def exported(w: Window) -> Samples:
     """What the export dialog writes as it opens."""
-    lab.exports.open("note")
-    assert lab.exports.dialog is not None
-    page = lab.exports.dialog.note
-    assert page.through_words.text() == "None: the string alone, as it is heard"
-    (path,) = page.paths().values()
-    page.job().run(lambda *_: None)
-    lab.exports.dialog.reject()
+    w.controller.exports.open("note")
+    dialog = w.controller.exports.dialog
+    assert dialog is not None and dialog.note.through_words.text() == "None: the string alone, as it is heard"
+    (path,) = dialog.note.paths().values()
+    dialog.note.job().run(lambda *_: None)
+    dialog.reject()
     return soundfile.read(path, always_2d=True)[0]
 
 
-def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(
-    qtbot: QtBot, lab: Controller
-) -> None:
+def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(held: Window) -> None:
     """A model of each kind and its truth, in A, in B and blind, after all instruments with sympathy or an amplifier.
 
     By default files have that too; of the slowest kinds, which are rendered as others are, none is written here.
     """
     for name, (kind, preset) in zip([EFFECTIVE, *SYMPATHETIC], KINDS.items(), strict=False):
-        play_instrument(qtbot, lab, PLAYED[name])
-        choose(qtbot, lab, preset)
-        expected = {slot: rendered(lab, source) for slot, source in SOURCES.items()}
+        play_instrument(held, PLAYED[name])
+        choose(held, preset)
+        expected = {slot: rendered(held, source) for slot, source in SOURCES.items()}
         for slot, source in SOURCES.items():
-            assert_same(heard(qtbot, lab, slot), expected[slot], f"{preset}, {slot}, after {name}")
-            signal, own_hz = drawn(qtbot, lab, source)
+            assert_same(heard(held, slot), expected[slot], f"{preset}, {slot}, after {name}")
+            signal, own_hz = drawn(held, source)
             attack = round(ATTACK_S * own_hz)  # a file fades in
-            same = rendered(lab, source, own_hz)
+            same = rendered(held, source, own_hz)
             assert_same(signal[attack:], same[attack:], f"{preset}, {slot}, drawn", rate_hz=own_hz)
             if kind not in ("fgru", "frnn"):
-                assert_same(exported(lab), expected[slot], f"{preset}, {slot}, exported after {name}")
-        for slot, sound in blind(qtbot, lab).items():
+                assert_same(exported(held), expected[slot], f"{preset}, {slot}, exported after {name}")
+        for slot, sound in blind(held).items():
             assert_same(sound, expected[slot], f"{preset}, {slot} of the blind test, after {name}", False)
     for name in SYMPATHETIC[len(KINDS) - 1 :]:
-        play_instrument(qtbot, lab, PLAYED[name])
-        choose(qtbot, lab, KINDS["koopman_var"])
-        for slot, source in SOURCES.items():
-            assert_same(heard(qtbot, lab, slot), rendered(lab, source), f"{slot} after {name}")
+        play_instrument(held, PLAYED[name])
+        choose(held, KINDS["koopman_var"])
+        assert_same(heard(held, "a"), rendered(held, "model"), f"after {name}")
 
 
-@pytest.mark.parametrize("kind", ["lru", "koopman_var"])
-def test_each_pick_up_is_heard_as_it_is_rendered(qtbot: QtBot, lab: Controller, kind: str) -> None:
+def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rendered(held: Window) -> None:
     """Also from the same points, where a model that is rendered ahead was heard through another pick-up before."""
-    lab.session.update(preset=KINDS[kind], amplitude_mm=2.0, position=0.3)
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    for pickup in (*PICKUPS, *PICKUPS[::-1]):
-        lab.session.update(pickup=pickup)
-        assert_same(heard(qtbot, lab, "a"), rendered(lab, "model"), f"{kind}, {pickup}")
+    for kind in ("lru", "koopman_var"):
+        choose(held, KINDS[kind])
+        for pickup in (*PICKUPS, *PICKUPS[::-1]):
+            held.change(pickup=pickup)
+            assert_same(heard(held, "a"), rendered(held, "model"), f"{kind}, {pickup}")
+    play_instrument(held, PLAYED["brass_strung_harp"])
+    held.controller.inputs.play(NoteOn(60, 100))  # as in the milliseconds before the window's next look
+    late = held.struck[-1]
+    assert np.abs(take(held, 0.1)).max() > 1e-3
+    held.change(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
+    held.wait(lambda: not held.controller.sound.mixer.effects.rings)  # it ends with its room
+    take(held, 0.1)
+    held.wait(lambda: isinstance(late, KeyNote) and late.known)
+    held.qtbot.wait(3 * LOOK_MS)
+    assert held.choices.string is None and held.choices.position == 0.3, "a late key is not what is plucked"
+    assert_heard_as_rendered(held, "right after a chord")
+    play_instrument(held, PLAYED["tanpura_drone"])
+    held.wait(lambda: held.choices.string is not None)
+    held.session.play_string()  # of the key that was played last, without the instrument's level
+    assert held.choices.string is not None and held.choices.single == "studio_any_string"
+    held.performance.stop()
+    fall_silent(held)
+    assert_heard_as_rendered(held, "of a single string")
 
 
-def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(
-    qtbot: QtBot, lab: Controller
-) -> None:
-    """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
-    play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
-    lab.inputs.play(NoteOn(60, 100))
-    late = lab.performance.notes.latest
-    lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
-    take(lab, 0.1)
-    qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known)
-    qtbot.wait(3 * LOOK_MS)
-    assert lab.session.choices.string is None and lab.session.choices.position == 0.3
-    choose(qtbot, lab, KINDS["koopman_var"])
-    for slot, source in SOURCES.items():
-        assert_same(heard(qtbot, lab, slot), rendered(lab, source), f"{slot} after a late key")
-
-
-def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it(
-    qtbot: QtBot, lab: Controller
-) -> None:
-    """The string of the key that was played last, as a single string."""
-    play_instrument(qtbot, lab, PLAYED["tanpura_drone"])
-    qtbot.waitUntil(lambda: lab.session.choices.string is not None)
-    lab.session.play_string()
-    string = lab.session.choices.string
-    assert string is not None and lab.session.choices.single == "studio_any_string"
-    lab.performance.stop()
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    while np.abs(take(lab, 0.1)).max() > 1e-8:
-        pass
-    subject, choices = StringOf(SHIPPED / "studio_any_string.safetensors", string), lab.session.choices
-    for slot, source in SOURCES.items():
-        sound = NoteSound(subject, choices.pluck, SECONDS, choices.ear)
-        expected = render_sound(sound, source, WavSettings(rate_hz=RATE_HZ)).reshape(round(SECONDS * RATE_HZ), -1)
-        assert_same(heard(qtbot, lab, slot), expected, slot)
-
-
-def test_the_level_match_shown_is_of_what_is_chosen(qtbot: QtBot, lab: Controller) -> None:
-    """Not of the preset before, until the next pluck."""
-    lab.session.update(level_match=True, preset=KINDS["lru"])
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    lab.pluck()
-    qtbot.waitUntil(lambda: lab.performance.match is not None)
-    first = lab.performance.match
-    lab.session.update(preset=KINDS["s5"])
-    assert lab.performance.match is None
-    lab.session.update(preset=KINDS["lru"])
-    assert lab.performance.match == first
-    lab.session.update(position=0.45)
-    assert lab.performance.match is None
-
-
-def test_an_instrument_that_rings_ends_where_a_preset_is_chosen(qtbot: QtBot, lab: Controller) -> None:
-    """With its room; so a pluck right after a chord is heard by itself."""
-    lab.session.update(preset=KINDS["koopman_var"])
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
-    assert np.abs(take(lab, 0.1)).max() > 1e-3
-    lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
-    qtbot.waitUntil(lambda: not lab.sound.mixer.effects.rings)
-    take(lab, 0.1)
-    for slot, source in SOURCES.items():
-        assert_same(heard(qtbot, lab, slot), rendered(lab, source), f"{slot} right after a chord")
-
-
-def test_the_lab_names_the_instrument_that_keys_sound_through(qtbot: QtBot, lab: Controller) -> None:
-    label = lab.window.through_label
-    play_instrument(qtbot, lab, PLAYED["kora"])
-    assert label.text() == "heard through Kora: body, room, sympathetic strings and level"
-    lab.session.update(b="difference", heard="b")
-    assert label.text() == "heard through Kora without amplifier, body and room"
-    lab.session.update(b=f"preset:{KINDS['s5']}")
-    assert label.text() == "keys are heard through Kora, a string plucked by hand alone"
-    lab.session.update(preset=KINDS["lru"])
-    assert not label.text() and not label.isVisible()
-
-
-def test_a_key_is_exported_with_its_instrument_also_where_a_slot_holds_another_preset(
-    qtbot: QtBot, lab: Controller
-) -> None:
-    """For keys sound through their instrument then too; a pluck by hand is the other preset's string alone."""
-    lab.session.update(a=f"preset:{KINDS['koopman_var']}")
-    play_instrument(qtbot, lab, PLAYED["kora"])
-    lab.exports.open("note")
-    assert lab.exports.dialog is not None
-    page = lab.exports.dialog.note
-    assert page.through_words.text() == "Kora with body, room, sympathetic strings and level, as it is heard"
-    qtbot.waitUntil(lambda: lab.performance.at_hand)
-    lab.pluck()
-    qtbot.waitUntil(lambda: page.through_words.text() == "None: the string alone, as it is heard")
-    assert path_of(page.job().sound.preset).stem == KINDS["koopman_var"]
-    lab.exports.dialog.reject()
-
-
-def test_a_pluck_outside_the_training_is_red_only_where_its_error_is_large(
-    qtbot: QtBot, lab: Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    label, view, warned = lab.window.outside_label, lab.string.view, [("", False)]
+def test_the_lab_says_what_is_heard_and_how_far_it_was_trained(held: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A match and an error are of what is chosen, not of the preset before."""
+    label, outside, warned = held.window.through_label, held.window.outside_label, [("", False)]
+    view = held.controller.string.view
     monkeypatch.setattr(view, "set_warning", lambda text, grave=True: warned.append((text, grave)))
-    play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
-    qtbot.waitUntil(lambda: label.text().startswith("accurate, although decay time near 3 kHz"))
-    assert label.objectName() == "faint" and not warned[-1][1]
-    lab.session.update(preset=KINDS["lru"], shape="rounded", position=0.1)
+    play_instrument(held, PLAYED["brass_strung_harp"])
+    held.wait(lambda: outside.text().startswith("accurate, although decay time near 3 kHz"))
+    assert outside.objectName() == "faint" and not warned[-1][1]
+    for changes, words in (
+        ({}, "heard through Brass-strung harp: body, room, sympathetic strings and level"),
+        ({"b": "difference", "heard": "b"}, "heard through Brass-strung harp without amplifier, body and room"),
+        ({"b": f"preset:{KINDS['s5']}"}, "keys are heard through Brass-strung harp, a string plucked by hand alone"),
+    ):
+        held.change(**changes)
+        assert label.text() == words
+    held.pluck()
+    held.controller.exports.open("note")
+    dialog = held.controller.exports.dialog
+    assert dialog is not None
+    held.wait(lambda: dialog.note.through_words.text() == "None: the string alone, as it is heard")
+    assert path_of(dialog.note.job().sound.preset).stem == KINDS["s5"]  # type: ignore[union-attr]
+    dialog.reject()
+    held.change(heard="a", preset=KINDS["lru"], shape="rounded", position=0.1, level_match=True)
+    assert not label.text() and not label.isVisible()
     assert not warned[-1][1], "not measured yet"
-    qtbot.waitUntil(lambda: warned[-1][1])
+    held.wait(lambda: warned[-1][1])
     assert warned[-1][0].startswith("inaccurate: ")
+    held.pluck()
+    held.wait(lambda: held.performance.match is not None)
+    held.change(position=0.45)
+    assert held.performance.match is None
+
+
+@pytest.fixture
+def paired(opened: Open, speakers: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+    """A window whose pluck is rendered, with a device that makes no sound."""
+    monkeypatch.setattr("app.views.dialogs.abx_dialog.default_folder", lambda: tmp_path / "records")
+    made = opened(sound=speakers, settings={"abx": AbxChoices(trials=2), "files": FileChoices()}, volume_db=-6)
+    made.wait_for_take()
+    return made
+
+
+def open_test(w: Window) -> AbxDialog:
+    """The dialog, once its sounds are rendered."""
+    w.window.activateWindow()
+    w.wait(w.window.isActiveWindow)
+    w.key(KEY.Key_T, CONTROL)
+    dialog = next(each for each in w.window.findChildren(AbxDialog) if each.isVisible())
+    w.wait(find(dialog, QPushButton, "Start the test").isEnabled)
+    return dialog
+
+
+def sounds(w: Window) -> bool:
+    """Return True if the mixer has a voice that is not silent."""
+    return any(voice.sounding for voice in w.controller.sound.mixer.voices)
+
+
+def test_the_test_has_the_sound_for_itself(paired: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keys are silent meanwhile; a pedal that is lifted then is up afterwards, a fader moves the sound afterwards."""
+    levels, taken, handle = list[tuple[float, bool]](), list[object](), paired.notes.handle
+    monkeypatch.setattr(paired.window.transport.meter, "show_level", lambda *level: levels.append(level))
+    monkeypatch.setattr(paired.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
+
+    def volume_is(level_db: float) -> bool:
+        return bool(paired.controller.sound.mixer.record["wanted_volume"] == pytest.approx(10 ** (level_db / 20)))
+
+    paired.pluck()
+    paired.wait(lambda: sounds(paired) and levels and levels[-1][0] > -60)
+    dialog = open_test(paired)
+    assert dialog.isModal() and not paired.performance.playing
+    paired.wait(lambda: not sounds(paired))
+    before, count = paired.choices, len(paired.struck)
+    del taken[:]
+    released = [events.NoteOff(52), events.ControlChange(midi.SUSTAIN, 0)]
+    for event in (PluckAt(Pluck(0.6, 8.0)), events.NoteOn(60, 90), *released):
+        paired.controller.inputs.play(event)  # a MIDI keyboard
+    paired.key(KEY.Key_Space)
+    assert taken == released and paired.choices == before and len(paired.struck) == count and not sounds(paired)
+    paired.controller.inputs.midi.performed.emit({"volume_db": 12.0})
+    assert paired.choices.volume_db == 12.0 and volume_is(-6)
+    press(dialog, "▶  Hear B")
+    paired.wait(lambda: sounds(paired))
+    find(dialog, CountBox, "Number of trials").setValue(25)
+    paired.key(KEY.Key_Escape, on=dialog)
+    paired.wait(lambda: not sounds(paired) and volume_is(12))
+    paired.pluck()
+    paired.wait(lambda: paired.performance.position_s > 0.3)
+    dialog = open_test(paired)
+    press(dialog, "Start the test")
+    trial = find(dialog, QWidget, "Trial")
+    for key in (KEY.Key_X, KEY.Key_A, KEY.Key_B):
+        paired.key(key, on=trial)
+        paired.wait(lambda: sounds(paired))
+        del levels[:]
+        paired.wait(lambda: len(levels) > 1)
+        assert set(levels) == {(-float("inf"), False)}, "nothing gives X away"
+    paired.key(KEY.Key_1, on=trial)
+    paired.close()
+    (path,) = (tmp_path / "records").iterdir()
+    assert '"p_value": null' in path.read_text()
+    assert load_settings(tmp_path / "settings.json")[0].abx.trials == 25

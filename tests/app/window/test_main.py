@@ -9,13 +9,15 @@ import subprocess
 import sys
 import threading
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.export.journal import left_journals
+from app.export.journal import Journal, left_journals
 from app.instruments.library import SHIPPED as INSTRUMENTS
+from app.instruments.library import read_instrument
 from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, TimedEvent
 from app.player.midi_file import midi_bytes
 from app.shared.log import FILE_VARIABLE, LARGEST_BYTES, OLDER_KEPT, faults_logged, log_fault
@@ -44,7 +46,7 @@ def often(parent, step):
 """
 OPENING = """
 def watch(controller):
-    notes, struck = controller.performance.notes, []
+    notes, struck, asked = controller.performance.notes, [], []
     handle = notes.handle
 
     def noted(event, due=None):
@@ -54,8 +56,11 @@ def watch(controller):
         return made
 
     def close_when_played():
-        if len(struck) == 2 and controller.performance.ready:
-            print(json.dumps({"struck": struck, "instrument": controller.session.choices.played.name}))
+        if isinstance(box := QApplication.activeModalWidget(), QMessageBox):
+            asked.append(box.windowTitle())
+            QTest.keyClick(box, Qt.Key.Key_Escape)
+        elif asked and len(struck) == 2 and controller.performance.ready:
+            print(json.dumps([struck, controller.session.choices.played.name, asked]))
             controller.window.close()
 
     notes.handle = noted
@@ -88,25 +93,6 @@ def watch(controller):
             return True
 
     often(controller.window, step)
-
-raise SystemExit(main.run(alive=watch))
-"""
-RECOVERING = """
-def watch(controller):
-    asked, key = [], sys.argv[1]
-
-    def look():
-        box = QApplication.activeModalWidget()
-        if isinstance(box, QMessageBox):
-            asked.append(box.text())
-            QTest.keyClick(box, Qt.Key[key])
-        elif asked and (controller.exports.dialog is not None or key == "Key_Escape"):
-            latest = controller.instruments.recordings.offered
-            print(json.dumps([each.time_s for each in latest.played.events] if latest else None), flush=True)
-            controller.window.may_close = lambda: True
-            return controller.window.close()
-
-    often(controller.window, look)
 
 raise SystemExit(main.run(alive=watch))
 """
@@ -170,38 +156,34 @@ def ended(program: str, folder: Path, *words: object, **environment: str) -> tup
 
 
 def test_files_are_taken_at_the_start_no_note_of_a_song_is_lost_and_no_thread_stays(tmp_path: Path) -> None:
-    song = tmp_path / "song.mid"
+    """And what an earlier run left is offered."""
+    song, left = tmp_path / "song.mid", tmp_path / "left"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.1, NoteOn(57, 90))]))
+    journal, instrument = Journal.begun(left, datetime.now(UTC)), read_instrument(INSTRUMENTS / "mandolin.json")
+    journal.write([TimedEvent(0.0, InstrumentTurned(instrument)), TimedEvent(0.0, NoteOn(60, 100))])
+    journal.close()
     (tmp_path / "settings.json").write_text('{"choices": {"seconds": 0.5, "preset": "a preset that is gone"}}')
     status, lines, errors = ended(START + OPENING, tmp_path, INSTRUMENTS / "concert_harp.json", song)
     assert status == 0, errors
-    assert json.loads(lines[-2]) == {"struck": [[50, True], [57, True]], "instrument": "Concert harp"}
-    assert lines[-1] == "[]"
+    assert json.loads(lines[-2]) == [[[50, True], [57, True]], "Concert harp", ["Recover what was played?"]]
+    assert lines[-1] == "[]" and len(left_journals(left)) == 1
     assert json.loads((tmp_path / "settings.json").read_text())["window_geometry"]
 
 
-def recorded(folder: Path, end: signal.Signals) -> list[float]:
-    """Records in a process that gets a signal while it does; the times of the events that it recorded."""
-    with begun(START + RECORDING, folder) as child:
+@posix
+@pytest.mark.parametrize("end", [KILL, signal.SIGTERM])
+def test_what_is_recorded_while_the_process_ends_is_left_whole(tmp_path: Path, end: signal.Signals) -> None:
+    with begun(START + RECORDING, tmp_path) as child:
         try:
             assert child.stdout is not None
             times_s: list[float] = json.loads(child.stdout.readline())
             if end == KILL:
                 time.sleep(WRITTEN_S)
-                assert left_journals(folder / "left") == []  # another window does not take what is being recorded
+                assert left_journals(tmp_path / "left") == []  # another window does not take what is being recorded
             child.send_signal(end)
             assert child.wait(60) == (-end if end == KILL else 0)
         finally:
             child.kill()
-    return times_s
-
-
-@posix
-@pytest.mark.parametrize("end", [KILL, signal.SIGTERM])
-def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
-    tmp_path: Path, end: signal.Signals
-) -> None:
-    times_s = recorded(tmp_path, end)
     if end != KILL:
         assert json.loads((tmp_path / "settings.json").read_text())["choices"]["instrument"]["level_db"] == -7.5
     (journal,) = left_journals(tmp_path / "left")
@@ -221,14 +203,8 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
     ] == -7.5
     first_s = times_s[kinds.index(NoteOn)]
     wanted = [max(0.0, time_s - first_s) for time_s in sorted(times_s)]
-    found = [each.time_s for each in played.events]
-    assert found[: len(wanted)] == wanted
+    assert [each.time_s for each in played.events][: len(wanted)] == wanted
     assert {type(each.event) for each in played.events[len(wanted) :]} <= {NoteOff, ControlChange}  # what was down
-    if end == KILL:
-        for key, kept in (("Key_Escape", None), ("Key_Return", found)):
-            status, lines, errors = ended(START + RECOVERING, tmp_path, key)
-            assert (status, json.loads(lines[0])) == (0, kept), errors
-        assert len(left_journals(tmp_path / "left")) == 1  # it is not saved yet
 
 
 @posix
@@ -241,9 +217,7 @@ def test_each_signal_that_asks_to_end_is_taken_by_the_event_loop(qtbot: QtBot, n
     assert asked == [before], "a second one has its usual effect"
 
 
-def test_a_fault_of_any_thread_is_written_and_reported_also_without_a_place_for_the_log(
-    qtbot: QtBot, log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_of_any_thread_is_logged(qtbot: QtBot, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "excepthook", lambda *fault: None)  # the runner's own would take it for the test's
     monkeypatch.setattr(threading, "excepthook", lambda fault: None)
     notices, before = NoticeBar(), sys.excepthook
@@ -255,17 +229,14 @@ def test_a_fault_of_any_thread_is_written_and_reported_also_without_a_place_for_
             thread = threading.Thread(target=lambda: 1 / 0, name="unlucky")
             thread.start()
             thread.join()
-            error = LookupError(f"in a slot of {place}")
-            sys.excepthook(LookupError, error, None)
+            sys.excepthook(LookupError, LookupError(f"in a slot of {place}"), None)
         qtbot.waitUntil(lambda: notices.text == f"Unexpected. LookupError: in a slot of {place}")  # noqa: B023
     assert sys.excepthook is before
-    text, reported = log.read_text("utf-8"), "".join(notice.details for notice in notices.notices)
+    text, said = log.read_text("utf-8"), "".join(notice.details for notice in notices.notices)
     for words in ("ZeroDivisionError", "unlucky", "LookupError: in a slot", "Traceback"):
-        assert words in text and words in reported
+        assert words in text and words in said
     assert "Python" in text.splitlines()[0]
-
-
-def test_the_log_stays_small(log: Path) -> None:
+    monkeypatch.setenv(FILE_VARIABLE, str(log))
     with faults_logged(lambda text: None):
         for _ in range(40):
             log_fault(RuntimeError("x" * 200_000), "here")

@@ -25,6 +25,7 @@ from app.views.file_places import FileChoices
 from app.views.look import Look
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
+from tests.app.gestures import reported
 
 
 def load(path: Path, text: str | bytes) -> tuple[Settings, str]:
@@ -32,9 +33,7 @@ def load(path: Path, text: str | bytes) -> tuple[Settings, str]:
     return load_settings(path)
 
 
-def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_settings_survive_a_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "new folder" / "settings.json"
     monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(path))
     assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
@@ -58,7 +57,6 @@ def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
     ("text", "expected"),
     [
         ('{"version": 1, "choices": {"position": 0.6}}', Settings(choices=Choices(position=0.6))),  # without MIDI
-        ('{"version": 1, "choices": {"loop": true}, "device": null}', Settings(choices=Choices(loop=True))),
         ('{"choices": {"heard": "truth"}}', Settings(choices=Choices(heard="b"))),  # from before the slots
         ('{"sampled": {"folder": "/music"}, "abx": {"folder": ""}}', Settings()),  # from before `files`
         ('{"look": {"face": "light"}}', Settings(look=Look(theme="light"))),  # of version 0.1
@@ -89,9 +87,7 @@ def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path: Path, tex
     ],
     ids=lambda text: repr(text[:24]),
 )
-def test_a_broken_file_is_set_aside_and_reported_and_lets_the_app_start(
-    tmp_path: Path, text: str | bytes, names: str
-) -> None:
+def test_a_broken_file_is_set_aside(tmp_path: Path, text: str | bytes, names: str) -> None:
     path = tmp_path / "settings.json"
     settings, notice = load(path, text)
     assert names in notice and notice.isprintable() and len(notice) <= 500
@@ -124,48 +120,41 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
         assert "choices.string" in notice or not is_there
 
 
-class Desk:
-    """What is to be remembered of one instance; the test says when it looks."""
+def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(qtbot: QtBot, tmp_path: Path) -> None:
+    """The test says when the saver looks."""
+    owner, now = QObject(), Settings()
 
-    def __init__(self, qtbot: QtBot, path: Path, owner: QObject) -> None:
-        self.qtbot = qtbot
-        self.now, self.failed = load_settings(path)[0], list[str]()
-        self.keeper = SettingsSaver(path, self.now, lambda: self.now, owner)
-        self.keeper.failed.connect(self.failed.append)
+    def saver(path: Path) -> SettingsSaver:
+        return SettingsSaver(path, load_settings(path)[0], lambda: now, owner)
 
-    def place(self, position: float) -> None:
-        choices = Choices.model_validate({**self.now.choices.model_dump(), "position": position})
-        self.now = self.now.model_copy(update={"choices": choices})
+    def look(keeper: SettingsSaver) -> None:
+        keeper.look()
+        (background,) = keeper.findChildren(Background)
+        qtbot.waitUntil(lambda: not background.busy)
 
-    def look(self) -> None:
-        self.keeper.look()
-        (background,) = self.keeper.findChildren(Background)
-        self.qtbot.waitUntil(lambda: not background.busy)
+    def place(position: float) -> Settings:
+        return Settings(choices=Choices(position=position))
 
-
-def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(
-    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    owner, path, folder = QObject(), tmp_path / "settings.json", tmp_path / "folder"
-    desk = Desk(qtbot, path, owner)
-    desk.place(0.41)
+    path, folder = tmp_path / "settings.json", tmp_path / "folder"
+    keeper, now = saver(path), place(0.41)
     for written in (False, True):  # it may be under way
-        desk.look()
+        look(keeper)
         assert path.exists() == written
-    assert load_settings(path)[0].choices.position == 0.41
+    assert load_settings(path)[0] == now
     before = path.stat().st_mtime_ns
-    desk.look()
-    desk.keeper.close()
+    look(keeper)
+    keeper.close()
     assert path.stat().st_mtime_ns == before, "nothing new, nothing written"
     folder.write_text("in the way, as a full disk is for a moment")
-    desk = Desk(qtbot, folder / "settings.json", owner)
+    keeper = saver(folder / "settings.json")
+    failed = reported(keeper.failed)
     for position in (0.42, 0.43):
-        desk.place(position)
-        desk.look()
-        desk.look()
-    qtbot.waitUntil(lambda: len(desk.failed) == 1 and "cannot be written" in desk.failed[0])  # once
+        now = place(position)
+        look(keeper)
+        look(keeper)
+    qtbot.waitUntil(lambda: len(failed) == 1 and "cannot be written" in failed[0])  # once
     folder.unlink()
-    desk.keeper.close()
+    keeper.close()
     assert load_settings(folder / "settings.json")[0].choices.position == 0.43
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from threading import Event
-from typing import Any
 
 import pytest
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QAbstractButton, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -20,30 +19,13 @@ from app.stage.session import Session
 from app.window.panels import Moment, Panel, StringPanel, base
 from app.window.panels.drum import DrumPanel
 from app.window.panels.rack import LEFT, RIGHT
-from tests.app.window.driver import KEY, Window
+from tests.app.gestures import reported
+from tests.app.window.driver import KEY, Window, by_arrows, fits, tab_stops
 from tests.app.window.panels.conftest import Make
 
 DECKS = (*LEFT, *RIGHT)
 EVERY = (StringPanel, DrumPanel, *DECKS)
 KEYS = (KEY.Key_Left, KEY.Key_Up, KEY.Key_Plus, KEY.Key_Minus, KEY.Key_Home, KEY.Key_Return, KEY.Key_Escape)
-
-
-def focusable(panel: QWidget) -> list[QWidget]:
-    """What has the keyboard by the Tab key."""
-    inside = [panel, *panel.findChildren(QWidget)]
-    return [
-        each
-        for each in inside
-        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
-        and each.focusProxy() is None
-        and each.isEnabled()
-        and each.isVisible()
-    ]
-
-
-def by_arrows(control: QWidget) -> bool:
-    """Return True if arrow keys lead to it from the one of its group that is checked."""
-    return isinstance(control, QAbstractButton) and control.group() is not None and not control.isChecked()
 
 
 def lightness(panel: QWidget) -> float:
@@ -77,13 +59,16 @@ def test_a_panel_is_named_and_themed_empty_and_with_a_take_and_leaves_no_thread(
                 panel.show_moment(Moment(take, position_s, True, 0.016))
         panel.take_finished(take)
         panel.show_moment(Moment(take, 0.5, False, 0.016))
-        for control in focusable(panel):
+        for control in tab_stops(panel):
             assert control.accessibleName(), control
             assert control.toolTip() or isinstance(control, QTabBar), control.accessibleName()
 
 
-def test_every_panel_of_the_decks_is_reached_and_operated_by_the_keyboard_alone(lab: Window) -> None:
+def test_every_panel_fits_and_is_operated_by_the_keyboard_alone(lab: Window, themed: Callable[..., None]) -> None:
     """From the deck's names by arrows to the panel, and by Tab to each of its controls and out again."""
+    themed("dark", 150)
+    lab.window.show_keys(False)
+    lab.window.resize(1280, 720)
     lab.wait_for_take()
     for deck, kinds in ((lab.window.left, LEFT), (lab.window.right, RIGHT)):
         (names,) = deck.findChildren(QTabBar)
@@ -94,8 +79,12 @@ def test_every_panel_of_the_decks_is_reached_and_operated_by_the_keyboard_alone(
         for kind in kinds:
             panel = deck.currentWidget()
             assert isinstance(panel, kind) and panel.isVisible()
-            lab.wait(lambda: not panel.background.busy)  # noqa: B023 - what is computed may bring or bar a control
-            controls = [each for each in focusable(panel) if not by_arrows(each)]
+            lab.wait(lambda: fits(lab.window) and not panel.background.busy)  # noqa: B023 - it may bring or bar a control
+            assert panel.height() >= panel.minimumSizeHint().height() > 0
+            controls = [each for each in tab_stops(panel) if not by_arrows(each)]
+            for control in controls:
+                place = QRect(control.mapTo(panel, control.rect().topLeft()), control.size())
+                assert panel.rect().contains(place), (kind.key, control.accessibleName())
             met = set[QWidget]()
             while not met or panel.isAncestorOf(lab.window.focusWidget()):
                 lab.key(KEY.Key_Tab, on=lab.window.focusWidget())
@@ -111,58 +100,30 @@ def test_every_panel_of_the_decks_is_reached_and_operated_by_the_keyboard_alone(
     assert lab.said == []
 
 
-def test_every_panel_fits_the_window_of_a_small_laptop_with_text_of_150_percent(
-    lab: Window, themed: Callable[..., None]
-) -> None:
-    themed("dark", 150)
-    lab.window.show_keys(False)
-    lab.window.resize(1280, 720)
-    for kind in DECKS:
-        panel = lab.panel(kind.key)
-        lab.wait(
-            lambda: lab.window.centralWidget().minimumSizeHint().expandedTo(lab.window.size()) == lab.window.size()
-        )
-        assert panel.isVisible() and panel.height() >= panel.minimumSizeHint().height() > 0
-        for control in focusable(panel):
-            place = QRect(control.mapTo(panel, control.rect().topLeft()), control.size())
-            assert panel.rect().contains(place), (kind.key, control.accessibleName())
-
-
 class AnyPanel(Panel):
     key = "any"
-
-
-@pytest.fixture
-def panel(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Panel]:
-    monkeypatch.setattr(base, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
-    made = AnyPanel(Session(), Library([]))
-    yield made
-    made.end()
 
 
 class Growing:
     """A take that grows with each look at it, until it has grown so often."""
 
-    complete = False
+    complete, looks = False, 0
 
-    def __init__(self, looks: float) -> None:
-        self.ready_frames_seen, self.looks = 0, looks
+    def __init__(self, most: int) -> None:
+        self.most = most
 
     @property
     def ready_frames(self) -> int:
-        if self.looks == 0:
-            return 100
-        self.ready_frames_seen += 1
-        self.complete = self.ready_frames_seen >= self.looks
-        return self.ready_frames_seen
+        self.looks = min(self.looks + 1, self.most)
+        self.complete = self.looks == self.most > 0
+        return self.looks
 
 
 @pytest.mark.parametrize(("looks", "complete"), [(5, True), (0, False)], ids=["rendered", "abandoned"])
-def test_a_job_rests_while_a_pluck_is_rendered_and_not_for_one_that_no_longer_grows(
-    qtbot: QtBot, panel: Panel, looks: int, complete: bool
-) -> None:
-    take: Any = Growing(looks)
-    panel.take_started(take)
+def test_a_job_rests(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, looks: int, complete: bool) -> None:
+    monkeypatch.setattr(base, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
+    panel, take, resting = AnyPanel(Session(), Library([])), Growing(looks), Event()
+    panel.take_started(take)  # type: ignore[arg-type]
 
     def work(job: Job) -> bool:
         job.report(0.5)
@@ -171,22 +132,18 @@ def test_a_job_rests_while_a_pluck_is_rendered_and_not_for_one_that_no_longer_gr
     with qtbot.waitSignal(panel.background.finished) as finished:
         panel.compute(work)
     assert finished.args == [complete]
-
-
-def test_a_job_rests_while_nobody_looks(qtbot: QtBot, panel: Panel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(base, "UNSEEN_S", 0.2)
-    shares, ended, resting = list[float](), list[object](), Event()
-    panel.background.finished.connect(ended.append)
-    panel.background.progressed.connect(lambda share: shares.append(share))
+    shares, ended = reported(panel.background.progressed), reported(panel.background.finished)
 
-    def work(job: Job) -> None:
+    def work_on(job: Job) -> None:
         time.sleep(base.UNSEEN_S + 0.05)
         resting.set()
         job.report(0.5, so_far="half")
 
-    panel.compute(work)
+    panel.compute(work_on)
     assert resting.wait(60)
     qtbot.wait(50)
     assert shares == []
     qtbot.waitUntil(lambda: panel.look() or bool(ended))  # again and again: each look holds for UNSEEN_S
-    assert shares == [0.5]
+    assert len(shares) == 1
+    panel.end()

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -19,9 +17,7 @@ from app.analysis import error_plane
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
 from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
-from app.window.panels import compare as compare_module
 from engine.pluck import Pluck
-from tests.app.places import choose_files
 from tests.app.window.driver import KEY, LEFT, Window, choose, find, press
 from tests.app.window.panels.conftest import at, items
 
@@ -38,7 +34,7 @@ def words_of(panel: Any) -> str:
     return panel.findChild(ElidedLabel).text()
 
 
-def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: Window, themed: Any) -> None:
+def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: Window) -> None:
     panel = lab.panel("eigenvalues")
     plane = panel.plane
     lab.wait(lambda: len(points(plane, LEARNED)) > 0)
@@ -58,26 +54,19 @@ def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: W
     plane.setFocus()
     lab.key(KEY.Key_Escape, on=plane)
     lab.qtbot.mouseMove(plane.viewport(), QPoint(1, 1))
-    lab.key(KEY.Key_Right, on=plane)
-    assert "mode 1" in panel.words.lower()
-    lab.key(KEY.Key_Return, on=plane)
-    assert lab.choices.solo == 1 and "Mode 1 is soloed" in panel.words
-    lab.key(KEY.Key_Escape, on=plane)
-    assert lab.choices.solo == 0
+    for key, solo, words in (
+        (KEY.Key_Right, 0, "ode 1"),
+        (KEY.Key_Return, 1, "Mode 1 is soloed"),
+        (KEY.Key_Escape, 0, ""),
+    ):
+        lab.key(key, on=plane)
+        assert lab.choices.solo == solo and words in panel.words
     count = len(points(plane, LEARNED))
     choose(find(panel, QComboBox, "Axes"), "complex")
     shown = np.concatenate([points(plane, LEARNED), points(plane, STRING)])
     assert len(points(plane, LEARNED)) == count and (np.hypot(*shown.T) <= 1).all()
     (left, right), (bottom, top) = plane.getPlotItem().viewRange()
     assert ((left, bottom) <= shown).all() and (shown <= (right, top)).all()
-    for name in ("light", "dark"):
-        themed(name)
-        learned, string = (
-            next(each for each in items(plane, pg.ScatterPlotItem) if each.opts["size"] == size)
-            for size in (LEARNED, STRING)
-        )
-        assert learned.points()[0].pen().color().name() == theme.MODEL.lower()
-        assert string.points()[0].brush().color().name() == theme.TRUTH.lower()
 
 
 def test_partials_of_a_pluck_are_measured_greyed_and_heard_alone(lab: Window) -> None:
@@ -124,9 +113,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Pluck]:
     return plucks
 
 
-def test_the_map_of_errors_is_computed_once_a_shape_pointed_at_and_plucked_in(
-    asked: list[Pluck], lab: Window
-) -> None:
+def test_the_map_of_errors_is_computed_once_and_plucked_in(asked: list[Pluck], lab: Window) -> None:
     panel = lab.panel("error_plane")
     plane, count = panel.map, len(POSITIONS) * len(AMPLITUDES_MM)
 
@@ -150,14 +137,12 @@ def test_the_map_of_errors_is_computed_once_a_shape_pointed_at_and_plucked_in(
     plane.hovered.emit(math.nan, math.nan)  # the pointer has left
     assert plane.cursor is None
     lab.qtbot.mouseClick(plane.viewport(), LEFT, pos=point(0.6, 8.0))
-    assert "error as trained about 5 %" in panel.words
     assert lab.choices.position == pytest.approx(0.6, abs=0.01) == round(lab.choices.position, 3)
     assert lab.choices.amplitude_mm == pytest.approx(8, rel=0.05)
     lab.wait(lambda: lab.performance.playing)
     here = [lab.choices.position, math.log10(lab.choices.amplitude_mm)]
     lab.wait(lambda: points(plane, PLUCK)[0].tolist() == pytest.approx(here))
     lab.key(KEY.Key_Escape, on=plane)
-    assert plane.cursor is None
     before, (x, y) = lab.choices, error_plane.nearest_cell(lab.choices.position, lab.choices.amplitude_mm)
     for key in (KEY.Key_Left, KEY.Key_Down, KEY.Key_Down):
         lab.key(key, on=plane)
@@ -173,18 +158,9 @@ def test_the_map_of_errors_is_computed_once_a_shape_pointed_at_and_plucked_in(
     for again in ({"shape": "gaussian"}, {"preset": "second"}):  # the same file under another name
         lab.change(**again)
         computed(2)
-
-
-def test_trained_amplitudes_of_the_map_may_have_any_range_and_depend_on_the_place(lab: Window) -> None:
-    """As where plucks were scaled to a rise of tension, which one near an end reaches with less."""
-    plane = lab.panel("error_plane").map
-    for trained_mm in ((0.0, 20.0), (1e-9, 1e9), (0.0, 0.0)):
-        plane.set_trained((0.1, 0.9), lambda _, trained_mm=trained_mm: trained_mm)
-    assert not plane.is_trained(0.5, 3.0)
-    plane.set_trained((0.1, 0.9), lambda place: (0.0, 20 * place))
+    plane.set_trained((0.1, 0.9), lambda place: (0.0, 20 * place))  # as where a rise of tension was trained
     assert plane.is_trained(0.5, 9.9) and plane.is_trained(0.5, 1e-3) and not plane.is_trained(0.2, 9.9)
-    (outline,) = items(plane, pg.PlotDataItem)
-    places, levels = outline.getData()
+    places, levels = items(plane, pg.PlotDataItem)[0].getData()
     for place, highest_mm in ((0.1, 2.0), (0.5, 10.0)):
         assert 10 ** max(levels[places == place]) == pytest.approx(highest_mm)
 
@@ -202,8 +178,10 @@ def menu_of(panel: Any) -> list[QAction]:
     return find(panel, QToolButton, "Presets to compare").menu().actions()
 
 
-def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Window, preset_folder: Path) -> None:
+def test_presets_are_compared_and_exported(lab: Window, tmp_path: Path) -> None:
+    lab.window.action["models"].trigger()
     panel, both = lab.panel("compare"), {"first", "second"}
+    assert lab.choices.right_view == "compare" and panel.table.hasFocus()
     lab.wait(lambda: panel.background.busy)
     press(panel, "Stop comparing")
     assert panel.progress.share is None and not panel.background.busy
@@ -213,13 +191,23 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     assert before["first"][1] == before["second"][1]
     assert [row.key for row in panel.table.rows if row.bold] == ["first"]
     assert words_of(panel) == "2 presets on this pluck, 0.5 s"
-    (second,) = (row for row in panel.table.rows if row.key == "second")
-    title, file, heard = second.tip.splitlines()
-    assert (title, file) == (second.values[0], "second.safetensors") and "dB apart over 0.5 s" in heard
+    export = find(panel, QToolButton, "Export the models")
+    export.click()
+    dialog = lab.controller.exports.dialog
+    assert dialog is not None and "2 models" in dialog.models.what.text()
+    for name in ("", "out"):
+        dialog.models.file.edit.setText(str(tmp_path / name))
+        dialog.models.file.edit.textEdited.emit("")
+        lab.wait(lambda name=name: dialog.save.isEnabled() == bool(name))
+    dialog.save.click()
+    lab.wait(lambda: "Saved" in dialog.state.text())
+    assert len(list((tmp_path / "out").glob("*.wav"))) == 6 and (tmp_path / "out" / "models.csv").is_file()
+    assert Path(dialog.models.file.edit.text()).name == "out" and not dialog.save.isEnabled(), "a given name stays"
+    dialog.accept()
     order: list[str] = []
     panel.background.progressed.connect(lambda share, text, row: order.append(row.name) if row else None)
     lab.change(preset="second", position=0.6)
-    lab.wait(lambda: all(row.grey for row in panel.table.rows))
+    lab.wait(lambda: all(row.grey for row in panel.table.rows) and not export.isEnabled())
     assert words_of(panel) == "0 of 2 presets on this pluck, 0.5 s; grey: an earlier pluck"
     lab.wait(lambda: computed(panel) == both)
     assert order == ["second", "first"], "the preset on the screen first"
@@ -228,86 +216,14 @@ def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Wi
     for left in (["second"], ["second", "first"]):
         first.trigger()
         assert set(figures(panel)) == set(left)
-    panel.table.choose("second")
-    lab.key(KEY.Key_Delete, on=panel.table)
-    assert list(figures(panel)) == ["first"]
     menu_of(panel)[1].trigger()  # all
     panel.table.setFocus()
     panel.table.choose("first")
     lab.change(a="difference", b="truth", position=0.1)  # outside the training
-    before = lab.choices.pluck
+    pluck = lab.choices.pluck
     lab.key(KEY.Key_Return, on=panel.table)
-    assert (lab.choices.preset, lab.choices.source_heard, lab.choices.pluck) == ("first", "model", before)
-    assert lab.struck[-1].request.pluck == before
+    assert (lab.choices.preset, lab.choices.source_heard, lab.choices.pluck) == ("first", "model", pluck)
+    assert lab.struck[-1].request.pluck == pluck
     place = panel.table.visualItemRect(panel.table.item(1, 0)).center()
     lab.qtbot.mouseClick(panel.table.viewport(), LEFT, pos=place)
     assert (lab.choices.preset, len(lab.struck)) == ("second", 2)
-    lab.change(preset="first")
-    lab.wait(lambda: [row.key for row in panel.table.rows if row.bold] == ["first"])
-    shutil.copy(preset_folder / "first.safetensors", preset_folder / "third.safetensors")
-    lab.controller.library.refresh()
-    assert sum(each.isCheckable() for each in menu_of(panel)) == 3
-    damaged = preset_folder / "damaged"
-    damaged.write_bytes(b"damaged")
-    damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
-    lab.change(amplitude_mm=lab.choices.amplitude_mm + 0.5)  # or have read it
-    lab.wait(lambda: "second.safetensors" in figures(panel)["second"][-1])
-
-
-def test_all_models_are_exported_from_their_table(
-    lab: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lab.window.action["models"].trigger()
-    panel = lab.panel("compare")
-    assert lab.choices.right_view == "compare" and panel.table.hasFocus()
-    export = find(panel, QToolButton, "Export the models")
-    lab.wait(lambda: computed(panel) == {"first", "second"})
-    assert figures(panel)["first"][3].distance_db == figures(panel)["second"][3].distance_db
-    export.click()
-    dialog = lab.controller.exports.dialog
-    assert dialog.windowTitle() == "Export the models" and "2 models" in dialog.models.what.text()
-    for name in ("", "out"):
-        dialog.models.file.edit.setText(str(tmp_path / name))
-        dialog.models.file.edit.textEdited.emit("")
-        dialog.models["level_match"].setChecked(True)
-        lab.wait(lambda name=name: dialog.save.isEnabled() == bool(name))
-    choose_files(monkeypatch, tmp_path)
-    find(dialog.models, QToolButton, "Browse").click()
-    assert dialog.models.file.path == tmp_path / "out", "its place is chosen, and its name stays"
-    assert dialog.choices()[0].level_match
-    dialog.save.click()
-    lab.wait(lambda: "Saved" in dialog.state.text())
-    assert len(list((tmp_path / "out").glob("*.wav"))) == 6 and (tmp_path / "out" / "models.csv").is_file()
-    shown = Path(dialog.models.file.edit.text())
-    assert shown.name == "out" and not dialog.save.isEnabled(), "a name that was given stays"
-    dialog.accept()
-    for name in ("2 models, place 0.35, 4.0 mm", "2 models, place 0.35, 4.0 mm (2)"):
-        (tmp_path / name).mkdir()
-    export.click()
-    dialog = lab.controller.exports.dialog
-    dialog.show_subjects({"models": lab.controller.exports.models})
-    assert Path(dialog.models.file.edit.text()).name == "2 models, place 0.35, 4.0 mm (3)"
-    lab.change(amplitude_mm=3.0)
-    lab.wait(lambda: not export.isEnabled())  # of this pluck nothing is computed yet
-
-
-def test_a_pluck_that_comes_back_while_it_is_compared_is_computed(
-    lab: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    panel = lab.panel("compare")
-    lab.wait(lambda: computed(panel) == {"first", "second"})
-    begun, held, compare = list[object](), Event(), compare_module.compare
-
-    def slow(missing: Any, job: Any) -> object:
-        begun.append(missing)
-        while not held.wait(0.01):
-            job.check()
-        return compare(missing, job)
-
-    monkeypatch.setattr(compare_module, "compare", slow)
-    lab.change(position=0.6)
-    lab.wait(lambda: len(begun) == 1)
-    for position in (0.61, 0.6):
-        lab.change(position=position)
-    held.set()
-    lab.wait(lambda: computed(panel) == {"first", "second"})
