@@ -270,7 +270,7 @@ class Macro(Value):
 
 
 class Instrument(Value):
-    """The whole instrument.
+    """An instrument: strings or drums, the model that plays them, pluck, pick-up, knobs, body and room.
 
     Attributes:
         preset: the model that plays it, by the name of a preset of many strings; never a path.

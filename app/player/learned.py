@@ -1,4 +1,4 @@
-"""Instruments made from recordings: preset, body and instrument in the user's folders.
+"""Learning an instrument from recordings: its own file, its preset and its body, in the user's folders.
 
 `learn_files` and `keep` are what the command calls, and what a dialog of the window calls in a worker's thread.
 """

@@ -1,4 +1,4 @@
-"""An instrument's table: the instrument as the compiled player reads it, prepared off the audio thread."""
+"""The table that the compiled player reads of an instrument, prepared off the audio thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The computer's keyboard as an instrument: keys are pitches as on a piano, or one row plucks at ten places.
+"""The computer's keyboard as a musical one: keys are pitches as on a piano, or one row plucks at ten places.
 
 Keys are known by where they are: the row begins right of Caps lock, whatever is printed on it. No widget here.
 """

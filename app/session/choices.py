@@ -123,9 +123,9 @@ OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
     """The fields of these choices, read from those of earlier versions.
 
-    The last version called `instrument` `patch`. Before there were slots, `heard` named the source itself. Without
-    `single`, `instrument` was a preset alone, too, with the instrument beside it as `kept`. Before that, `keys_play`
-    said if `patch` was played or the string of `preset`.
+    Before there were slots, `heard` named the source itself. In the last version `instrument` had the name `patch`.
+    Before there was `single`, `instrument` could be a preset alone: what is `instrument` today was then in `kept`.
+    Still earlier, `keys_play` said if `patch` was played or the string of `preset`.
     """
     data = dict(data)
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
@@ -158,8 +158,8 @@ def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
     saved, recorded and exported as it is heard.
 
     Args:
-        asked: the fields that were asked to change. Of these the instrument counts before listening points and
-            pick-up, which otherwise become those of the instrument.
+        asked: the fields that were asked to change. Listening points and pick-up become those of the instrument;
+            where they were asked to change and the instrument was not, it takes them.
 
     Raises:
         ValueError: the instrument cannot be heard so.

@@ -102,7 +102,7 @@ class Session:
             self.update(single=None)
 
     def play_string(self) -> None:
-        """Make the string that is shown the instrument: keys are places along it."""
+        """Play the string that is shown by itself: keys are places along it."""
         self.update(single=self.choices.preset, string=self.choices.string)
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:

@@ -1,4 +1,4 @@
-"""Parts that an instrument is played and turned with: keys, a neck, string knobs, bar and browser of instruments.
+"""Widgets that play and change an instrument: keys, a neck, string knobs, its bar, and the browser to choose it.
 
 Gestures emit signals; setters show what became of them. `panel` holds all but the browser in one strip.
 """
