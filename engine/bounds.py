@@ -129,9 +129,9 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
 
 
 def check_all(value: Any, limits: Mapping[str, tuple[float, float]], of: str = "") -> None:
-    """Raise ValueError as `check`, for fields of a dataclass that have limits; `of` precedes names.
+    """Raise ValueError where `check` does, for the fields of a dataclass that have limits.
 
-    None passes where it is the default.
+    None passes where it is the default. `of` stands before the field's name in messages.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(value)}
     for name, low_high in limits.items():

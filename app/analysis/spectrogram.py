@@ -18,11 +18,11 @@ COLUMNS_AT_A_TIME = 32
 
 
 class Spectrogram:
-    """Model, truth and error in dB; a sine at the pick-up's full scale is 0 dB. A `Growing`.
+    """Spectrograms of model, truth and error in dB, a few columns at a time. A `Growing`.
 
-    Column k is of the window centred at k·hop_s; the last one ends with the take. Before its start the take is
-    mirrored, as the motion of a string released from rest would be. A drum or a velocity has the other sign. A
-    sudden start would show as a click that is not heard.
+    A sine at the pick-up's full scale is 0 dB. Column k is of the window centred at k·hop_s; the last one ends with
+    the take. Before its start the take is mirrored, as the motion of a string released from rest would be. A drum or
+    a velocity has the other sign. A sudden start would show as a click that is not heard.
 
     Attributes:
         ready: columns so far.
@@ -36,7 +36,7 @@ class Spectrogram:
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
         self.ready = 0
-        self._odd = take.pickup in ("velocity", "pressure")  # about the start
+        self._mirror_sign = -1 if take.pickup in ("velocity", "pressure") else 1  # of what is mirrored at the start
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
         self._window *= np.float32(2 / self._window.sum() / take.full_scale)
         self.columns = self._columns_of(self._heard["truth"].frames)
@@ -80,9 +80,7 @@ class Spectrogram:
         source_signal = self._heard[source]
         signal = source_signal.read(max(first, 0), last)
         if first < 0:
-            mirror = source_signal.read(1, 1 - first)[::-1]
-            if self._odd:
-                mirror = -mirror
+            mirror = self._mirror_sign * source_signal.read(1, 1 - first)[::-1]
             signal = np.concatenate([mirror, signal])
         windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]
         return np.fft.rfft(windows * self._window, axis=1)

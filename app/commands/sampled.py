@@ -83,7 +83,7 @@ def sampled(
     say(f"{words}; {pitch}")
     with progress("sampled") as report:
         written = export_sampled(plan, out, note_renderer(load_preset(preset_path), source), progress=report)
-    for note in notes(plan, written, "--dry leaves"):
+    for note in notes(plan, written, "--dry"):
         say(f"note: {note}")
     print(f"{one_line(str(out))}: {written.samples} samples, {megabytes(written.size_bytes)}; {pitch}")
 

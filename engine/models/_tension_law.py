@@ -161,17 +161,23 @@ class TensionLaw:
         self,
         state: KoopmanTensionState,
         step: Step,
-        frames: Values,
+        wanted: Values,
         steps: int,
         readout: Values,
     ) -> tuple[Values, KoopmanTensionState]:
+        """The motion of the next `steps` frames, and the state after them; in blocks, to bound the memory.
+
+        Args:
+            wanted: numbers of the frames to keep, ascending, of 1 … steps; None: all.
+            readout: see `advance`; None: the grid.
+        """
         to_points = self.shapes if readout is None else self.shapes @ in_double(readout)
         blocks, done = [], 0
         while done < steps:
             count = min(FRAMES_AT_ONCE, steps - done)
             amplitudes, state = (self._compiled if _compiles(state.x) else self._plain)(state, step, count)
-            if frames is not None:
-                amplitudes = amplitudes[:, frames[(frames > done) & (frames <= done + count)] - done - 1]
+            if wanted is not None:
+                amplitudes = amplitudes[:, wanted[(wanted > done) & (wanted <= done + count)] - done - 1]
             blocks.append(amplitudes @ to_points)
             done += count
         return library_of(state.x).concatenate(blocks, 1), state

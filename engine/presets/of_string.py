@@ -1,4 +1,7 @@
-"""A preset of many strings, of one that is given: by its physical parameters, at any rate, with any modes."""
+"""A preset for one string, from a preset of many: by its physical parameters, at any rate, with any modes.
+
+The TOML files that hold these parameters, of strings and of drums, are read here too.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,8 @@ def read_described_string(path: Path) -> tuple[StringParameters, str]:
     return _read_described(StringParameters, path, "a string")
 
 
-def _read_described(kind: type[T], path: Path, what: str) -> tuple[T, str]:
+def _read_described(kind: type[T], path: Path, noun: str) -> tuple[T, str]:
+    """Read parameters of which none may be missing, and their description. `noun`: what they are, in messages."""
     data = read_toml(path)
     description = data.pop("description", "")
     if not isinstance(description, str):
@@ -52,7 +56,7 @@ def _read_described(kind: type[T], path: Path, what: str) -> tuple[T, str]:
     if missing := [name for name in names if name not in data]:
         raise SchemaError(
             f"{path}: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; "
-            f"{what}'s file gives all of {', '.join(names)}"
+            f"{noun}'s file gives all of {', '.join(names)}"
         )
     return value, " ".join(description.split())
 

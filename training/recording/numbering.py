@@ -266,7 +266,7 @@ def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Arr
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> PartialSeries | None:
     """The series of a note, from spectra of two lengths; the shorter serves notes that end soon or glide."""
     best: PartialSeries | None = None
-    for begin, length in ((0.06, SPECTRUM_S), (0.03, 0.25)):
+    for begin, length in ((0.06, SPECTRUM_S), (0.03, 0.25)):  # s after the onset
         length = min(length, 0.9 * (note.seconds - begin))
         if length < 0.05:
             continue

@@ -199,5 +199,5 @@ class SampledExport:
         alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_REPORTED_DB else ""
         level = f"peak {report.peak_db:.1f} dBFS{alike}"
         lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
-        lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]
+        lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry")]
         return "\n".join(lines)

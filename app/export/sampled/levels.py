@@ -22,7 +22,7 @@ def by_key(samples: Mapping[Zone, StoredSample]) -> Iterator[tuple[list[Zone], l
 
 
 def velocity_levels(instrument: Instrument, layers: list[Zone], stored: list[StoredSample]) -> Levels:
-    """The levels of one key; outside the rendered velocities with the slope between the nearest two.
+    """The levels of one key in dB; beyond the rendered velocities they follow the slope between the nearest two.
 
     Where a layer is silent, or there is only one, they follow the amplitudes of the plucks.
     """

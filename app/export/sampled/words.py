@@ -59,11 +59,11 @@ def megabytes(size: int) -> str:
     return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e6:.1f} MB"
 
 
-def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
-    """Notes for a musician on what was written. `dry`: what takes the room out, as in "--dry leaves"."""
+def notes(plan: SampledPlan, report: SampledReport, dry_option: str) -> list[str]:
+    """Notes for a musician on what was written. `dry_option`: the name of the choice that takes the room out."""
     lines = []
     if plan.instrument.room.mix > 0 and not plan.instrument.damping.let_ring:
-        lines.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
+        lines.append(f"a released key ends the room's tail as well; {dry_option} leaves the room to the sampler")
     if report.cut:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
         lines.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))

@@ -45,7 +45,7 @@ class UprightLabel:
 
 
 class UprightTicks:
-    """The numbers of a vertical axis: of a given list as many as there is room for, its ends before the others."""
+    """The numbers of a vertical axis: as many of a given list as there is room for, the ends of the list first."""
 
     def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
         self._axis, self._box = axis, box

@@ -55,7 +55,7 @@ class TableRow:
 
 
 class FiguresTable(QTableWidget):
-    """A value of None is written as "–" and sorted last in either order."""
+    """A table of records, one a row. A value of None is written as "–" and sorted last in either order."""
 
     row_clicked = Signal(object)  # its key
     row_double_clicked = Signal(object)
