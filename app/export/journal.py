@@ -128,12 +128,9 @@ class Journal:
     def _line(self, entry: TimedEvent) -> dict[str, Any]:
         event, line = entry.event, {"t": entry.time_s}
         if isinstance(event, InstrumentTurned):
-            before, self._instrument = self._instrument, event.instrument.model_dump(mode="json")
-            change = (
-                {"instrument": self._instrument}
-                if before is None
-                else {"turned": list(_changes(before, self._instrument))}
-            )
+            before, now = self._instrument, event.instrument.model_dump(mode="json")
+            self._instrument = now
+            change = {"instrument": now} if before is None else {"turned": list(_changes(before, now))}
             return {**line, **change}
         return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
 
@@ -245,9 +242,8 @@ class _Read:
         """The recording, with what is down at its end released."""
         if self.recorded is None:
             raise ValueError(f"{self.where}: no recording of this program (it is empty)")
-        instrument = next(
-            (entry.event.instrument for entry in self.events if isinstance(entry.event, InstrumentTurned)), None
-        )
+        turned = (entry.event for entry in self.events if isinstance(entry.event, InstrumentTurned))
+        instrument = next((event.instrument for event in turned), None)
         last_s = max((entry.time_s for entry in self.events), default=0.0)
         events = played_from(self.events, last_s if self.end_s is None else self.end_s, self.meter is not None)
         if instrument is None or not events:

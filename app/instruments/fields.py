@@ -63,9 +63,8 @@ def parameter(id: str) -> Any:
 
 
 Name = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(filled), AfterValidator(_safe_name)]
-Reference = Annotated[
-    str, Field(max_length=LONGEST_NAME), AfterValidator(_safe_name)
-]  # a name elsewhere, "" for none
+# the name of something else, "" for none
+Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe_name)]
 Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(plain)]
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, ranged(0, HIGHEST_KEY)]

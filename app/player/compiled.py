@@ -255,10 +255,8 @@ class InstrumentPlayer:
 
     def _check(self, event: NoteOn) -> None:
         """Raise ValueError: no string on which an event may play its key is possible."""
-        string = event.channel if event.string is None else event.string
-        if event.string is not None or string < strings_of(
-            self.instrument
-        ):  # its own, or that of its channel, if any
+        string = event.channel if event.string is None else event.string  # its own, or that of its channel, if any
+        if event.string is not None or string < strings_of(self.instrument):
             with contextlib.suppress(ValueError):
                 self.keys.of_key(event.key, string)
                 return

@@ -71,13 +71,11 @@ def _drum_glides(instrument: Instrument) -> NDArray[np.float64]:
     """Compute the glides as `glides_cents`, by the mean tension of a blow's first swing."""
     keys = DrumKeys(instrument, Ear(tuple(instrument.pickup.points)))
     glides = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
-    low, high = instrument.range
+    (low, high), curve = instrument.range, instrument.pluck.curve
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
             if (drum := keys.of_key(key)) is not None:
-                glides[key] = [
-                    drum.drop_cents(velocity, instrument.pluck.curve) for velocity in range(len(glides[key]))
-                ]
+                glides[key] = [drum.drop_cents(velocity, curve) for velocity in range(len(glides[key]))]
     glides.setflags(write=False)
     return glides
 

@@ -320,11 +320,8 @@ def _with_ranges(timed: Sequence[TimedEvent], instrument: Instrument) -> list[Ti
         if isinstance(event, InstrumentTurned):
             if is_another(event.instrument, instrument):
                 with_own_range.clear()
-            range_changed = (event.instrument.bend_semitones, event.instrument.mode) != (
-                instrument.bend_semitones,
-                instrument.mode,
-            )
-            instrument = event.instrument
+            before, instrument = instrument, event.instrument
+            range_changed = (before.bend_semitones, before.mode) != (instrument.bend_semitones, instrument.mode)
             set_ranges(time_s, [channel for channel in channels if range_changed and channel not in with_own_range])
         elif isinstance(event, ControlChange) and event.number in SETS_PARAMETER:
             with_own_range.add(event.channel)

@@ -136,9 +136,8 @@ class StringKeys(Strings):
         super().__init__(instrument)
         self.ear = ear
         self.recorded = preset.recorded
-        self.polarisations = (
-            instrument.polarisations if preset.recorded is None else None
-        )  # else as the recording says
+        # a recorded string moves as its recording says
+        self.polarisations = instrument.polarisations if preset.recorded is None else None
         self.body: Array | None = body_curves(instrument) if near is None else near.body
 
     def of_key(self, key: int, string: int | None = None) -> KeyString | None:

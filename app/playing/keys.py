@@ -378,7 +378,6 @@ def _can_play(player: InstrumentPlayer, instrument: Instrument) -> bool:
 
 def _turned_event(player: InstrumentPlayer) -> InstrumentTurned:
     """The instrument with the pick-up it is heard through. That is not its own where a single string is played."""
-    pickup = {"points": player.ear.points, "kind": player.ear.pickup}
-    return InstrumentTurned(
-        player.instrument.model_copy(update={"pickup": player.instrument.pickup.model_copy(update=pickup)})
-    )
+    instrument, ear = player.instrument, player.ear
+    pickup = instrument.pickup.model_copy(update={"points": ear.points, "kind": ear.pickup})
+    return InstrumentTurned(instrument.model_copy(update={"pickup": pickup}))

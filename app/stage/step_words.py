@@ -47,9 +47,8 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     """
     changed = [name for name in after if before[name] != after[name]]
     if "single" in changed:
-        return (
-            _instrument_words(None, after["instrument"]) if after["single"] is None else f"preset {after['single']}"
-        )
+        preset = after["single"]
+        return f"preset {preset}" if preset is not None else _instrument_words(None, after["instrument"])
     if "instrument" in changed:
         old, new = before["instrument"], after["instrument"]
         heard = [CHOICES[name] for name in changed if name in Listener.model_fields]
@@ -60,7 +59,7 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
 
 
 def turned_fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """The fields of a step, and of an instrument that has kept its name its own as "instrument.PATH"."""
+    """The fields of a step; of an instrument that has kept its name, also "instrument.PATH" for each that changed."""
     old, new = before.get("instrument"), after.get("instrument")
     is_turned = isinstance(old, Instrument) and isinstance(new, Instrument) and old.name == new.name
     return frozenset(after) | ({f"instrument.{path}" for path in _changed(old, new)} if is_turned else set())

@@ -411,10 +411,9 @@ class Controller(QObject):
         """Choose an instrument that was just learned."""
         self.library.refresh()
         self.instruments.reload()
-        self.instruments.take_file(kept.instrument)
-        self.window.notices.inform(
-            f"{kept.instrument.stem}: learned. Its report: {kept.report}", file=kept.instrument
-        )
+        file = kept.instrument
+        self.instruments.take_file(file)
+        self.window.notices.inform(f"{file.stem}: learned. Its report: {kept.report}", file=file)
 
     def close(self) -> None:
         """Save the settings and end every thread."""

@@ -70,7 +70,7 @@ TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 
 class InstrumentDesk(BrowserDesk):
-    """A desk of instruments, with the strip that plays them.
+    """The controller of instruments: of their browser, their files, and the strip that plays one.
 
     Attributes:
         recordings: of what is played.
@@ -95,9 +95,7 @@ class InstrumentDesk(BrowserDesk):
         self._inputs = inputs
         self._panel = window.instrument
         self._entries: list[InstrumentEntry] = []
-        self._sounding: frozenset[int] = (
-            frozenset()
-        )  # MIDI keys of the instrument for which the octave was judged last
+        self._sounding = frozenset[int]()  # MIDI keys of the instrument for which the octave was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(self._play_event, performance.notes, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
@@ -148,11 +146,10 @@ class InstrumentDesk(BrowserDesk):
     @property
     def entry(self) -> InstrumentEntry | None:
         """The saved instrument whose name the present one has."""
-        instrument = self.instrument
-        return next(
-            (entry for entry in self._entries if instrument is not None and entry.instrument.name == instrument.name),
-            None,
-        )
+        if self.instrument is None:
+            return None
+        name = self.instrument.name
+        return next((entry for entry in self._entries if entry.instrument.name == name), None)
 
     @property
     def chosen(self) -> str:
@@ -287,6 +284,7 @@ class InstrumentDesk(BrowserDesk):
         self._ask("Rename instrument", "New name:", entry.instrument.name, lambda new: self._rename(entry, new))
 
     def _rename(self, entry: InstrumentEntry, name: str) -> None:
+        """Rename an instrument and its file. Favourites, which are names of files, and the present one follow."""
         renamed = rename_instrument(entry, name)
         if entry.name in self.favourites:
             self.favourites ^= {entry.name, renamed.name}
@@ -393,10 +391,9 @@ class InstrumentDesk(BrowserDesk):
         if instrument is None:
             self._notices.report(f"{name} tunes an instrument, and none is chosen; choose one first.")
             return
-        other, kind = (
-            (instrument.tuning.keymap, "keyboard mapping") if field == "scale" else (instrument.tuning.scale, "scale")
-        )
-        self._update(tuning=TuningChoice.model_validate({**dict(instrument.tuning), field: text}))
+        before = instrument.tuning
+        other, kind = (before.keymap, "keyboard mapping") if field == "scale" else (before.scale, "scale")
+        self._update(tuning=TuningChoice.model_validate({**dict(before), field: text}))
         joined = f", with the {kind} that it had" if other else ""
         self._notices.inform(f"{name} tunes {instrument.name}{joined}.")
 
@@ -553,10 +550,9 @@ class InstrumentDesk(BrowserDesk):
         panel.bar.show_note("" if instrument is not None else NO_INSTRUMENT)
         if instrument is None:
             return
-        panel.bar.show_instrument(
-            instrument, entry is not None and entry.own, entry is None or entry.instrument != instrument
-        )
-        panel.knobs.show_instrument(instrument, entry.instrument if entry is not None else None)
+        saved = entry.instrument if entry is not None else None
+        panel.bar.show_instrument(instrument, own=entry is not None and entry.own, changed=saved != instrument)
+        panel.knobs.show_instrument(instrument, saved)
         self._show_string(instrument)
         panel.set_range(*instrument.range)
         strings = instrument.strings

@@ -295,10 +295,8 @@ class Recordings(QObject):
         events = self._keys.recorder.end()
         journal = self._journaling.end()
         self._bar.show_recording(None)
-        instruments = [
-            timed_event.event.instrument for timed_event in events if isinstance(timed_event.event, InstrumentTurned)
-        ]
-        instrument = instruments[0] if instruments else self._session.choices.instrument
+        turned = [entry.event for entry in events if isinstance(entry.event, InstrumentTurned)]
+        instrument = turned[0].instrument if turned else self._session.choices.instrument
         if not events or instrument is None:
             if journal is not None:
                 journal.delete()

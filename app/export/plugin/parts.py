@@ -58,9 +58,8 @@ def kit_of(keys: DrumKeys) -> Kit:
     drums = keys.drums.drums
     highest_hz = keys.drums.highest_hz
     most = kernel.LOW_MODES
-    slack = DrumKeys(
-        instrument.with_value("knobs.modulus", OF_INSTRUMENTS["knobs.modulus"].limits[0]), keys.ear, keys
-    )
+    lowest = OF_INSTRUMENTS["knobs.modulus"].limits[0]
+    slack = DrumKeys(instrument.with_value("knobs.modulus", lowest), keys.ear, keys)
     possible = [played.drum for played in drums]
     for variant, key in product((slack, keys), range(of.KEYS)):  # the softer, the more modes are below a frequency
         with contextlib.suppress(ValueError):

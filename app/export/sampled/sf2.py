@@ -190,9 +190,8 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
     """The nine tables (7.1); each ends with a row of its own that closes it."""
     instrument = plan.instrument
     name = _name(instrument.name)
-    zones: list[list[Generator]] = [
-        [(RELEASE_VOL_ENV, release_timecents(instrument) & 0xFFFF)]
-    ]  # of all others (7.7)
+    release = release_timecents(instrument) & 0xFFFF
+    zones: list[list[Generator]] = [[(RELEASE_VOL_ENV, release)]]  # the global zone, for all others (7.7)
     for number, channel in enumerate(channels):
         # key range first, velocity range next, the sample last (8.1.2)
         zone = [(KEY_RANGE, _span(channel.zone.keys)), (VEL_RANGE, _span(channel.zone.velocities))]

@@ -77,9 +77,8 @@ class HeardPerformance:
     def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
         """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
         if self.preset is None:
-            raise ValueError(
-                f"The preset {self.played.instrument.preset}, which plays the instrument, was not found."
-            )
+            missing = self.played.instrument.preset
+            raise ValueError(f"The preset {missing}, which plays the instrument, was not found.")
         name = name or f"{self.name}{choices.ending}"
         return PlayedExport(self.played, self.preset, folder / name, choices.wav)
 
@@ -479,9 +478,8 @@ class PluginPage(ExportPage):
             raise ValueError(self.missing)
         check_compiler()
         instrument, preset = self._subject.instrument, self._subject.preset.path
-        return PluginExport(
-            instrument, preset, self["form"].currentData(), self["system"].currentData(), self.file.path
-        )
+        form, system = self["form"].currentData(), self["system"].currentData()
+        return PluginExport(instrument, preset, form, system, self.file.path)
 
     def offer(self) -> tuple[str, str]:
         replaces = self.job().replaces()
