@@ -1,7 +1,5 @@
 """A window with its controller, a sound without a device and one small preset."""
 
-from __future__ import annotations
-
 import gc
 import os
 import shutil

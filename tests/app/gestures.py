@@ -1,7 +1,5 @@
 """Gestures on widgets, what signals report of them, and pictures of them."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, Qt, SignalInstance

@@ -1,7 +1,5 @@
 """What notes are given in tests: monitors, and the shipped presets."""
 
-from __future__ import annotations
-
 from app.presets.library import PresetEntry
 from app.session.monitor import Monitor
 from engine.presets import SHIPPED, read_info

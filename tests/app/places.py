@@ -1,7 +1,5 @@
 """Places of files for tests: folders that are remembered, and what a user chooses in a dialog."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import get_args
 

@@ -1,7 +1,5 @@
 """Answers to the questions of the app, by keys or by clicks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """The sound of a note, as an export has it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from app.export.note import WavReport, export_sounds

@@ -1,7 +1,5 @@
 """Takes of known motion."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """A factory instrument is played and drawn without torch, which takes more than a second and 200 MB to load."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -60,7 +58,7 @@ assert loaded == [False] and "torch" in sys.modules  # the Lab has it before a m
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there torch must come before Qt")
-def test_an_instrument_is_rendered_and_the_window_plays_keys_and_draws_their_strings(tmp_path: Path) -> None:
+def test_an_instrument_is_rendered_and_the_window_plays_keys_and_draws_their_strings(tmp_path):
     settings = {"QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(tmp_path / "s.json")}
     command = [sys.executable, "-c", SCRIPT]
     done = subprocess.run(

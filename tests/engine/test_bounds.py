@@ -1,7 +1,6 @@
 """Values out of their bounds are refused by name, and large numbers cost nothing."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -57,7 +56,7 @@ REFUSED: list[tuple[type, dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("kind", "values", "words"), REFUSED, ids=range(len(REFUSED)))
-def test_a_value_out_of_its_bounds_is_refused_by_name(kind: type, values: dict[str, Any], words: str) -> None:
+def test_a_value_out_of_its_bounds_is_refused_by_name(kind, values, words):
     with pytest.raises(ValueError, match=words):
         kind(**values)
 
@@ -76,14 +75,14 @@ def test_a_value_out_of_its_bounds_is_refused_by_name(kind: type, values: dict[s
         ),
     ],
 )
-def test_what_does_not_go_together_is_refused(make: Callable[[], Any], words: str) -> None:
+def test_what_does_not_go_together_is_refused(make, words):
     with pytest.raises(ValueError, match=words):
         make()
 
 
 @pytest.mark.parametrize("frequency_hz", [0.0, 100.0, 246.93, 20_000.0, 1e6])
 @pytest.mark.parametrize("change", [{}, {"second_moment_m4": 0}, {"length_m": 90}])
-def test_modes_below_counts_them_and_costs_nothing(change: dict[str, float], frequency_hz: float) -> None:
+def test_modes_below_counts_them_and_costs_nothing(change, frequency_hz):
     string = StringParameters(**change)
     count = string.modes_below(frequency_hz)
     omega = undamped_frequencies(string, count + 2)

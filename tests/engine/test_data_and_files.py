@@ -3,11 +3,8 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from datetime import date
-from pathlib import Path
 from typing import Literal
 
 import pytest
@@ -61,12 +58,12 @@ class Outer:
         ({"name": "x", "inner": {"size": 1.5}}, "here.inner.size: must be a valid integer"),
     ],
 )
-def test_what_does_not_fit_is_named(data: object, message: str) -> None:
+def test_what_does_not_fit_is_named(data, message):
     with pytest.raises(SchemaError, match=message):
         read(Outer, data, "here")
 
 
-def test_what_is_written_is_read_without_a_byte_order_mark_and_with_no_field_twice(tmp_path: Path) -> None:
+def test_what_is_written_is_read_without_a_byte_order_mark_and_with_no_field_twice(tmp_path):
     value = Outer("x", "b", 0.25, False, (1, 2), (0.5, 1.5), Inner(9))
     assert read(Outer, write(value), "here") == value
     assert read(Outer, {"name": "x", "share": 1}, "here") == Outer("x", share=1.0)
@@ -90,9 +87,7 @@ with whole_file(path) as unfinished, working_folder(path.parent, "many files") a
 
 
 @pytest.mark.parametrize("again", (whole_file, whole_folder))
-def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(
-    tmp_path: Path, again: Callable[[Path], AbstractContextManager[Path]]
-) -> None:
+def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(tmp_path, again):
     path = tmp_path / "out.wav"
     for name in (path, tmp_path / "other.wav"):
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -117,7 +112,7 @@ def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(
     assert [each.name for each in aside.iterdir()] == ["kept"]
 
 
-def test_a_folder_replaces_another_as_a_whole_and_an_error_changes_nothing(tmp_path: Path) -> None:
+def test_a_folder_replaces_another_as_a_whole_and_an_error_changes_nothing(tmp_path):
     path = tmp_path / "bundle"
     for names in (("one", "two"), ("two", "three")):
         with whole_folder(path) as made:
@@ -132,7 +127,7 @@ def test_a_folder_replaces_another_as_a_whole_and_an_error_changes_nothing(tmp_p
 
 
 @pytest.mark.parametrize("name", ("古" * 80, "é" * 120, "🎸" * 60, "a" * 250))
-def test_long_names_in_any_script_can_be_written(tmp_path: Path, name: str) -> None:
+def test_long_names_in_any_script_can_be_written(tmp_path, name):
     with whole_file(tmp_path / name) as unfinished, working_folder(tmp_path, name) as folder:
         unfinished.write_text(folder.name)
     assert [each.name for each in tmp_path.iterdir()] == [name]

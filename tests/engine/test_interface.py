@@ -21,7 +21,7 @@ from tests.engine.sounds import initial_m, shipped
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     section = (ROOT / "README.md").read_text(encoding="utf-8").split("## From Python")[1].split("\n## ")[0]
     (example,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
     assert len(example.strip().splitlines()) < 25
@@ -33,7 +33,7 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert 0.01 < abs(sound).max() <= 1
 
 
-def test_every_name_is_there_and_the_engine_itself_loads_nothing_nor_effects_a_compiler() -> None:
+def test_every_name_is_there_and_the_engine_itself_loads_nothing_nor_effects_a_compiler():
     for name in engine.__all__:
         assert getattr(engine, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
@@ -44,7 +44,7 @@ def test_every_name_is_there_and_the_engine_itself_loads_nothing_nor_effects_a_c
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
-def test_blocks_chain_and_listening_is_the_grid_there(small_preset: Path, kind: str) -> None:
+def test_blocks_chain_and_listening_is_the_grid_there(small_preset, kind):
     preset, weights = load_preset(small_preset), listening_weights(np.array([0.37]), 101)
     source: StringSource = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
     initial = initial_m(preset.info, Pluck(0.4, 3.0))[None]
@@ -62,9 +62,7 @@ def test_blocks_chain_and_listening_is_the_grid_there(small_preset: Path, kind: 
 
 
 @pytest.mark.parametrize("factor", [float("nan"), 1e9])
-def test_runaway_output_is_detected_with_its_time(
-    small_preset: Path, factor: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_runaway_output_is_detected_with_its_time(small_preset, factor, monkeypatch):
     preset, scale = load_preset(small_preset), torch.ones(64, 1)
     decode, scale[30:] = preset.model.decode, factor
     monkeypatch.setattr(preset.model, "decode", lambda *given: decode(*given) * scale)
@@ -75,7 +73,7 @@ def test_runaway_output_is_detected_with_its_time(
     assert caught.value.time_s == pytest.approx(31 / 4_000)
 
 
-def test_a_model_of_many_strings_moves_in_numpy_as_in_torch() -> None:
+def test_a_model_of_many_strings_moves_in_numpy_as_in_torch():
     steel = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
     preset = of_string(shipped("studio_any_string"), steel, 16_000)
     plucks = [Pluck(0.17, 1.0), Pluck(0.3, 12.0, "triangular"), Pluck(0.03, 12.0, width=0.03)]

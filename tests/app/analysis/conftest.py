@@ -1,7 +1,5 @@
 """Takes of known motion, and what computations are given in place of a thread's job."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,10 +1,7 @@
 """The listening test without its dialog: order, score and p-value, sounds of one level, and results that are kept."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,13 +22,13 @@ TIME_S = np.arange(RATE_HZ)[:, None] / RATE_HZ
 
 
 @pytest.mark.parametrize("trials", [1, 2, 4, 5, 10, 16, 25, 200])
-def test_p_values_and_the_right_answers_that_are_needed_are_those_of_scipy(trials: int) -> None:
+def test_p_values_and_the_right_answers_that_are_needed_are_those_of_scipy(trials):
     expected = [binomtest(correct, trials, 0.5, alternative="greater").pvalue for correct in range(trials + 1)]
     assert [p_value(correct, trials) for correct in range(trials + 1)] == pytest.approx(expected, rel=1e-9)
     assert needed_correct(trials) == next((correct for correct, p in enumerate(expected) if p < 0.05), None)
 
 
-def test_the_seed_is_the_order_and_the_coin_is_fair() -> None:
+def test_the_seed_is_the_order_and_the_coin_is_fair():
     assert "".join(draw_order(7, 12)) == "AABABAABAAAA"
     assert draw_order(7, 25)[:12] == draw_order(7, 12)
     counts = [draw_order(seed, 16).count("A") for seed in range(500)]
@@ -39,7 +36,7 @@ def test_the_seed_is_the_order_and_the_coin_is_fair() -> None:
     assert {*counts} >= set(range(4, 13))  # not balanced within a test
 
 
-def test_a_run_keeps_what_happened_in_each_trial_and_takes_no_answer_without_x() -> None:
+def test_a_run_keeps_what_happened_in_each_trial_and_takes_no_answer_without_x():
     order = draw_order(3, 2)
     run = ListeningTest(seed=3, planned=2)
     assert [run.heard_as(name) for name in ("X", "A", "B")] == [order[0], "A", "B"]
@@ -65,7 +62,7 @@ def record_of(planned: int, right: int, answered: int) -> AbxRecord:
     return AbxRecord(a=a, b=b, pluck=pluck, through=through, planned_trials=planned, seed=5, trials=run.trials)
 
 
-def test_results_come_back_the_same_and_none_is_overwritten(tmp_path: Path) -> None:
+def test_results_come_back_the_same_and_none_is_overwritten(tmp_path):
     record, stopped = record_of(10, 9, 10), record_of(10, 3, 4)
     assert (record.correct, record.p_value) == (9, pytest.approx(11 / 1024))
     assert record.date.tzinfo is not None
@@ -81,7 +78,7 @@ def test_results_come_back_the_same_and_none_is_overwritten(tmp_path: Path) -> N
     assert (p_text(0.0384), p_text(2.0**-25)) == ("p = 0.038", "p < 0.001")
 
 
-def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
+def test_the_chosen_pluck_and_string_are_kept(preset_folder):
     entry = list_presets(preset_folder)[0][0]
     for stereo, chosen in ((False, None), (True, StringParameters())):
         choices = Choices(single=entry.name, position=0.3, string=chosen, stereo=stereo)
@@ -95,7 +92,7 @@ def decay(hz: float, peak: float) -> np.ndarray:
     return peak * np.exp(-3 * TIME_S) * np.sin(2 * np.pi * hz * TIME_S)
 
 
-def test_levels_are_equal_and_gains_are_reported() -> None:
+def test_levels_are_equal_and_gains_are_reported():
     model, truth = decay(200, 0.4), decay(200, 0.1)
     made = make_stimuli({"model": truth, "truth": model}, RATE_HZ)
     a, b = (made.samples[name] for name in IDENTITIES)
@@ -107,7 +104,7 @@ def test_levels_are_equal_and_gains_are_reported() -> None:
 
 
 @pytest.mark.parametrize("volume_db", [-20.0, 0.0, 12.0])
-def test_two_overlapping_sounds_stay_below_the_limiter(volume_db: float) -> None:
+def test_two_overlapping_sounds_stay_below_the_limiter(volume_db):
     made = make_stimuli({"model": decay(200, 1.4), "truth": decay(300, 0.9)}, RATE_HZ, volume_db)
     peak = max(np.abs(made.samples[name]).max() for name in IDENTITIES)
     assert 2 * peak * 10 ** (volume_db / 20) <= CEILING * 1.000001
@@ -115,18 +112,18 @@ def test_two_overlapping_sounds_stay_below_the_limiter(volume_db: float) -> None
 
 
 @pytest.mark.parametrize(("hz", "same", "trivial"), [(200, True, False), (450, False, True), (200.2, False, False)])
-def test_sounds_that_say_nothing_are_noticed(hz: float, same: bool, trivial: bool) -> None:
+def test_sounds_that_say_nothing_are_noticed(hz, same, trivial):
     made = make_stimuli({"model": decay(200, 0.5), "truth": decay(hz, 0.5)}, RATE_HZ)
     assert (made.same, made.trivial) == (same, trivial)
 
 
-def test_silence_is_refused() -> None:
+def test_silence_is_refused():
     for frames in (RATE_HZ, 0):
         with pytest.raises(ValueError, match="Truth is silent"):
             make_stimuli({"model": decay(200, 0.5), "truth": np.zeros((frames, 1))}, RATE_HZ)
 
 
-def test_a_turn_ends_in_silence_as_it_is_looped_and_both_sides_stay() -> None:
+def test_a_turn_ends_in_silence_as_it_is_looped_and_both_sides_stay():
     stereo = decay(200, 0.5) * (1, 0.25) + 0.1
     made = make_stimuli({"model": stereo, "truth": stereo[:, ::-1]}, RATE_HZ)
     for name in IDENTITIES:

@@ -1,7 +1,5 @@
 """Figures of models: eigenvalues, the map of errors, partials, and presets compared, each against its definition."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from dataclasses import replace
@@ -48,7 +46,7 @@ def of_family(path: Path, model: str) -> Preset:
 
 
 @pytest.mark.parametrize("model", ["dmd", "koopman", "koopman_var", "koopman_integrated", "lru", "s5"])
-def test_a_model_that_starts_from_the_string_has_its_modes(small_preset: Path, model: str) -> None:
+def test_a_model_that_starts_from_the_string_has_its_modes(small_preset, model):
     preset = of_family(small_preset, model)
     figure, own = pole_figure(preset), preset.info.resonator
     own_hz = own.eigenvalues().imag / (2 * math.pi)
@@ -65,7 +63,7 @@ def test_a_model_that_starts_from_the_string_has_its_modes(small_preset: Path, m
         assert figure.learned.mode_hz[found][best] == pytest.approx(own_hz[mode - 1], rel=1e-3)
 
 
-def test_of_a_conjugate_pair_one_is_shown_and_what_grows_has_no_decay_time(small_preset: Path) -> None:
+def test_of_a_conjugate_pair_one_is_shown_and_what_grows_has_no_decay_time(small_preset):
     preset = of_family(small_preset, "dmd")
     assert len(pole_figure(preset).learned) == 10  # of 20 that are there and 50 that could be
     with torch.no_grad():
@@ -73,7 +71,7 @@ def test_of_a_conjugate_pair_one_is_shown_and_what_grows_has_no_decay_time(small
     assert np.isinf(pole_figure(preset).learned.t60_s).sum() == 1
 
 
-def test_a_sharp_eigenvalue_is_so_many_cents_high(small_preset: Path) -> None:
+def test_a_sharp_eigenvalue_is_so_many_cents_high(small_preset):
     preset = load_preset(small_preset)
     with torch.no_grad():
         preset.model.theta_log += math.log(2 ** (10 / 1200))  # type: ignore[operator,union-attr]
@@ -82,13 +80,13 @@ def test_a_sharp_eigenvalue_is_so_many_cents_high(small_preset: Path) -> None:
 
 
 @pytest.mark.parametrize("model", ["fgru", "frnn"])
-def test_a_model_without_eigenvalues_says_so(small_preset: Path, model: str) -> None:
+def test_a_model_without_eigenvalues_says_so(small_preset, model):
     figure = pole_figure(of_family(small_preset, model))
     assert (len(figure.learned), figure.layers, len(figure.string)) == (0, 0, 10)
     assert f"a {model} has no eigenvalues" in figure.note
 
 
-def test_interpolation_keeps_its_points_and_is_linear_between() -> None:
+def test_interpolation_keeps_its_points_and_is_linear_between():
     coarse = np.array([[0.0, 4.0], [8.0, 12.0], [8.0, math.inf]])
     fine = refine(coarse, 4)
     assert fine.shape == (9, 5)
@@ -97,7 +95,7 @@ def test_interpolation_keeps_its_points_and_is_linear_between() -> None:
     assert np.isfinite(fine[:5]).all() and not np.isnan(fine).any()
 
 
-def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: Any) -> None:
+def test_coarse_first_and_nothing_twice(monkeypatch, job):
     asked: list[tuple[int, int]] = []
 
     def errors(plucks: list[Pluck], job: object) -> np.ndarray:
@@ -120,7 +118,7 @@ def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: An
     assert [nearest_cell(0.5, 0.5), nearest_cell(2.0, 0.0)] == [(24, 0), (48, 0)]
 
 
-def test_errors_are_those_of_the_sources_and_infinite_where_they_are_not_finite(small_preset: Path, job: Any) -> None:
+def test_errors_are_those_of_the_sources_and_infinite_where_they_are_not_finite(small_preset, job):
     preset, plucks = load_preset(small_preset), [Pluck(0.3, 2.0), Pluck(0.62, 9.0, "triangular")]
     for pluck, error in zip(plucks, error_of_plucks(preset)(plucks, job), strict=True):
         initial = project(pluck.displacement(101), 10)[None]
@@ -155,7 +153,7 @@ def take_of(info: PresetInfo, position: float, first: float = 1.0, model: String
 
 
 @pytest.mark.parametrize("decay", [0.6, 1.0, 1.8])
-def test_a_tighter_string_is_sharp_and_another_loss_rings_so_long(info: PresetInfo, job: Any, decay: float) -> None:
+def test_a_tighter_string_is_sharp_and_another_loss_rings_so_long(info, job, decay):
     own = info.string
     loss = {name: decay * getattr(own, name) for name in ("damping_d1_kg_m_s", "damping_d3_kg_m_s")}
     other = replace(own, tension_n=own.tension_n * 2 ** (10 / 1200), **loss)
@@ -173,14 +171,14 @@ def test_a_tighter_string_is_sharp_and_another_loss_rings_so_long(info: PresetIn
         assert row.t60_error_percent == pytest.approx(100 / decay - 100, abs=1)
 
 
-def test_rows_without_figures_say_why(info: PresetInfo, job: Any) -> None:
+def test_rows_without_figures_say_why(info, job):
     rows = take_partials(take_of(info, 0.5), job)["all"]  # the middle is a node of the second mode
     assert (rows[0].note, rows[1].truth_hz) == ("", None)
     assert "60 dB" in rows[1].note
     assert "above half the sample rate: heard at" in rows[8].note
 
 
-def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info: PresetInfo, job: Any) -> None:
+def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info, job):
     take = take_of(info, 0.37)
     take.model_ends_s = 0.05
     take.motion_m("model")[201:] = 0
@@ -191,7 +189,7 @@ def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info: PresetInfo, j
     assert take_partials(take, job) == {}
 
 
-def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Any) -> None:
+def test_a_take_of_pictures_has_the_partials_of_every_sample(job):
     preset = load_preset(SHIPPED / "studio_nylon_b3.safetensors")
     info, pluck, source = preset.info, Pluck(0.3, 4.0), ModelSource(preset)
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
@@ -223,7 +221,7 @@ def entries(small_preset: Path, tmp_path: Path) -> list[PresetEntry]:
     return list_presets(tmp_path)[0]
 
 
-def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: Any) -> None:
+def test_figures_are_those_of_the_definition(entries, job):
     compare([plucked(entries[0])], job)
     (row,) = job.results
     preset, initial = load_preset(entries[0].path), project(PLUCK.displacement(101), 10)[None]
@@ -241,7 +239,7 @@ def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: An
     assert job.shares == sorted(job.shares) and job.shares[-1] == 1
 
 
-def test_the_ear_finds_what_it_finds_in_the_exported_sound(entries: list[PresetEntry], job: Any) -> None:
+def test_the_ear_finds_what_it_finds_in_the_exported_sound(entries, job):
     """Through the pick-up, unless it is too short for a spectrum."""
     sound = NoteSound(entries[0].path, PLUCK, 1.0, Ear((LISTEN,), "bridge"))
     compare([(entries[0], sound), (entries[0], replace(sound, seconds=0.1))], job)
@@ -256,7 +254,7 @@ def test_the_ear_finds_what_it_finds_in_the_exported_sound(entries: list[PresetE
     assert sorted([far, near]) == [near, far], "in order of the distance"
 
 
-def test_a_bad_preset_is_a_row_and_the_next_runs_away_and_says_when(entries: list[PresetEntry], job: Any) -> None:
+def test_a_bad_preset_is_a_row_and_the_next_runs_away_and_says_when(entries, job):
     entries[0].path.write_bytes(b"damaged")
     preset = load_preset(entries[1].path)
     with torch.no_grad():

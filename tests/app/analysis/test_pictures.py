@@ -1,7 +1,5 @@
 """Pictures of a take: at a moment, over time, and by frequency; growth changes none of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -36,9 +34,7 @@ def both(take: Take) -> list[HeardMotion]:
     return [HeardMotion(take.motions, name) for name in ("model", "truth")]
 
 
-def test_signals_are_at_their_points_and_with_their_gain(
-    make_take: MakeTake, hear: Callable[[Take, Ear], None]
-) -> None:
+def test_signals_are_at_their_points_and_with_their_gain(make_take, hear):
     first, second = (
         size_m * np.cos(2 * np.pi * hz * TIME_S) * np.sin(mode * np.pi * PLACES)
         for mode, size_m, hz in ((1, 1e-3, 200), (2, 1e-4, 440))
@@ -58,7 +54,7 @@ def test_signals_are_at_their_points_and_with_their_gain(
     assert difference == pytest.approx(alone, abs=1e-7)  # a tenth, ten times as loud
 
 
-def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it(sines: Take, make_take: MakeTake) -> None:
+def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it(sines, make_take):
     frame = frame_at(sines, both(sines), 0.5, 1.0)
     expected = np.cos(2 * np.pi * sines.fundamental_hz * 0.5)
     assert frame.shapes["truth"][50] == pytest.approx(expected, abs=0.02)
@@ -70,7 +66,7 @@ def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it(sines: Take, make_
     assert (frame_at(empty, both(empty), 0.0, 1.0).shapes["model"] == 0).all()
 
 
-def test_an_envelope_holds_the_last_second_and_forgets_what_was_before(make_take: MakeTake) -> None:
+def test_an_envelope_holds_the_last_second_and_forgets_what_was_before(make_take):
     model, truth = (
         np.repeat(np.float32([1e-3, soft]), (4_000, 8_001))[:, None] + STILL[0] for soft in (-1e-4, -5e-5)
     )
@@ -85,7 +81,7 @@ def test_an_envelope_holds_the_last_second_and_forgets_what_was_before(make_take
     assert frame_at(take, motions, 1.5, 1.0).envelopes == {}
 
 
-def test_the_difference_and_another_preset_at_its_own_rate_and_grid_move_too(sines: Take) -> None:
+def test_the_difference_and_another_preset_at_its_own_rate_and_grid_move_too(sines):
     sines.motions["preset:other"] = other = Pictures(1_000, 11, 1.0)
     motions = [HeardMotion(sines.motions, DIFFERENCE, 10.0), HeardMotion(sines.motions, "preset:other")]
     assert set(frame_at(sines, motions, 0.5, 1.0).shapes) == {DIFFERENCE}
@@ -118,7 +114,7 @@ def drawn(take: Take, quantity: str, times_s: tuple[float, float], columns: int)
     return made
 
 
-def test_envelopes_are_the_same_however_the_take_grows(make_take: MakeTake) -> None:
+def test_envelopes_are_the_same_however_the_take_grows(make_take):
     whole = grown(make_take(MODEL, TRUTH))
     take = make_take(MODEL, TRUTH, 1)
     piecewise = Envelopes(take)
@@ -134,7 +130,7 @@ def test_envelopes_are_the_same_however_the_take_grows(make_take: MakeTake) -> N
 
 
 @pytest.mark.parametrize("quantity", ["model", "error"])
-def test_zoomed_in_every_frame_is_drawn_at_its_time(make_take: MakeTake, quantity: str) -> None:
+def test_zoomed_in_every_frame_is_drawn_at_its_time(make_take, quantity):
     made = drawn(make_take(MODEL, TRUTH), quantity, (0.1, 0.12), 300)
     first, last = round(made.start_s * RATE_HZ), round(made.stop_s * RATE_HZ)
     assert made.detail == "frames" and made.start_s <= 0.1 and made.stop_s >= 0.12
@@ -142,7 +138,7 @@ def test_zoomed_in_every_frame_is_drawn_at_its_time(make_take: MakeTake, quantit
 
 
 @pytest.mark.parametrize(("stop_s", "detail", "seen_m"), [(0.05, "extremes", -1e-3), (1.0, "envelope", 1e-3)])
-def test_a_single_frame_is_seen_at_any_zoom(make_take: MakeTake, stop_s: float, detail: str, seen_m: float) -> None:
+def test_a_single_frame_is_seen_at_any_zoom(make_take, stop_s, detail, seen_m):
     motion = np.zeros((FRAMES, 101), np.float32)
     motion[123, 40] = -1e-3
     made = drawn(make_take(motion, motion), "truth", (0.0, stop_s), 150)
@@ -153,7 +149,7 @@ def test_a_single_frame_is_seen_at_any_zoom(make_take: MakeTake, stop_s: float, 
 
 
 @pytest.mark.parametrize("times_s", [(0.0, 1.0), (0.2, 0.3), (0.24, 0.26)])
-def test_what_has_been_drawn_stays_while_the_take_grows(make_take: MakeTake, times_s: tuple[float, float]) -> None:
+def test_what_has_been_drawn_stays_while_the_take_grows(make_take, times_s):
     part, whole = (drawn(make_take(MODEL, TRUTH, ready), "model", times_s, 90) for ready in (1009, None))
     columns = part.displacement_m.shape[1]
     assert 0 < columns < whole.displacement_m.shape[1]
@@ -161,13 +157,13 @@ def test_what_has_been_drawn_stays_while_the_take_grows(make_take: MakeTake, tim
     assert picture(grown(make_take(MODEL, TRUTH, 400)), "model", (0.5, 0.6), 100) is None
 
 
-def test_signs_are_drawn_as_long_as_columns_are_short_against_a_period(make_take: MakeTake) -> None:
+def test_signs_are_drawn_as_long_as_columns_are_short_against_a_period(make_take):
     take = make_take(MODEL, TRUTH)
     details = [detail_for(take, (0, 10 / take.fundamental_hz), columns) for columns in (125, 115)]
     assert details == ["extremes", "envelope"]
 
 
-def test_the_typical_displacement_ignores_a_short_peak(make_take: MakeTake) -> None:
+def test_the_typical_displacement_ignores_a_short_peak(make_take):
     motion = np.full((FRAMES, 101), 1e-3, np.float32)
     motion[:40] = 1.0
     envelopes = grown(make_take(motion, motion))
@@ -198,7 +194,7 @@ def spectrogram(hear: Callable[[Take, Ear], None]) -> Spectrograms:
     return of
 
 
-def test_a_sine_has_its_level_and_frequency_from_the_start(make_take: MakeTake, spectrogram: Spectrograms) -> None:
+def test_a_sine_has_its_level_and_frequency_from_the_start(make_take, spectrogram):
     made = spectrogram(make_take(tone(1e-3), tone(1e-2)))
     for name, level_db in (("model", -20.0), ("truth", 0.0), ("error", 20 * np.log10(0.9))):
         levels_db = made.levels_db[name]
@@ -215,14 +211,12 @@ def test_a_sine_has_its_level_and_frequency_from_the_start(make_take: MakeTake, 
         (Ear((0.5,), solo=2), FLOOR_DB, 30),  # there is the first mode alone
     ],
 )
-def test_levels_of_the_ear(
-    make_take: MakeTake, spectrogram: Spectrograms, ear: Ear, level_db: float, near_db: float
-) -> None:
+def test_levels_of_the_ear(make_take, spectrogram, ear, level_db, near_db):
     made = spectrogram(make_take(tone(1e-3), tone(2e-3)), ear)
     assert made.levels_db["truth"].max(axis=1) == pytest.approx(np.full(made.columns, level_db), abs=near_db)
 
 
-def test_growing_in_pieces_is_the_same(make_take: MakeTake, spectrogram: Spectrograms) -> None:
+def test_growing_in_pieces_is_the_same(make_take, spectrogram):
     motion = np.random.default_rng(2).standard_normal((2001, 101)).astype(np.float32)
     motions, take = (motion, motion[::-1].copy()), make_take(motion, motion, 30)
     whole, made, counts = spectrogram(make_take(*motions)), Spectrogram(take, take.listened), []
@@ -240,7 +234,7 @@ def test_growing_in_pieces_is_the_same(make_take: MakeTake, spectrogram: Spectro
 
 @pytest.mark.parametrize("space", [np.geomspace, np.linspace])
 @pytest.mark.parametrize("bins", [65, 2049])
-def test_no_partial_falls_between_two_rows_and_a_flat_spectrum_stays_flat(space: Callable[..., NDArray], bins: int):
+def test_no_partial_falls_between_two_rows_and_a_flat_spectrum_stays_flat(space, bins):
     bin_hz = 8_000 / (bins - 1)
     rows, edges_hz = FrequencyRows(bins, bin_hz, 100, 50.0, space is np.geomspace), space(50.0, 8_000, 101)
     for bin_ in range(round(200 / bin_hz) + 1, bins - 1, 7):

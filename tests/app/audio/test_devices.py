@@ -1,7 +1,5 @@
 """Outputs are known by name, and one table has what goes wrong with them, in plain words."""
 
-from __future__ import annotations
-
 import builtins
 import math
 import subprocess
@@ -61,7 +59,7 @@ def asked(stream: Mock) -> list[str]:
     return [name for name, *_ in stream.method_calls]
 
 
-def test_outputs_are_listed_with_the_default_first(portaudio: Mock) -> None:
+def test_outputs_are_listed_with_the_default_first(portaudio):
     assert output_devices() == [
         AudioDevice("Speakers", "ALSA", 48_000, 2, is_default=True),
         AudioDevice("HDMI", "ALSA", 48_000, 8),
@@ -79,8 +77,8 @@ def test_outputs_are_listed_with_the_default_first(portaudio: Mock) -> None:
 
 @pytest.mark.parametrize(("buffer_s", "latency_s", "block"), [(0.05, 0.05, 600), (0.005, 0.01, 64), (0.0, 0.01, 64)])
 def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
-    portaudio: Mock, mixer: Mixer, buffer_s: float, latency_s: float, block: int
-) -> None:
+    portaudio, mixer, buffer_s, latency_s, block
+):
     """In blocks of a quarter of its buffer, of two channels. PortAudio is not started again under an open stream."""
     wanted = found("HDMI")
     portaudio.entries.insert(0, ("Webcam", 0, 2))  # its index moves
@@ -103,7 +101,7 @@ def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf"), float("-inf"), -1795774879.331, 1e12])
-def test_times_that_cannot_be_are_not_shown(portaudio: Mock, mixer: Mixer, value: float) -> None:
+def test_times_that_cannot_be_are_not_shown(portaudio, mixer, value):
     portaudio.stream.configure_mock(latency=value, time=value, cpu_load=value)
     output = DeviceOutput(found(), 0.05, mixer)
     assert output.latency_s == 0.05, "as it was asked for"
@@ -115,7 +113,7 @@ def test_times_that_cannot_be_are_not_shown(portaudio: Mock, mixer: Mixer, value
     output.close()
 
 
-def test_an_output_plays_stalls_and_is_lost(portaudio: Mock, mixer: Mixer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_output_plays_stalls_and_is_lost(portaudio, mixer, monkeypatch):
     now_s, stream = 100.0, portaudio.stream
     monkeypatch.setattr("app.audio.output.time.monotonic", lambda: now_s)
     output = DeviceOutput(found(), 0.05, mixer)
@@ -157,9 +155,7 @@ WORDS = {
         (ValueError("strange"), ProblemKind.NOT_OPENED),
     ],
 )
-def test_a_device_that_cannot_be_opened_is_explained_and_freed(
-    portaudio: Mock, mixer: Mixer, place: str, error: Exception, kind: ProblemKind
-) -> None:
+def test_a_device_that_cannot_be_opened_is_explained_and_freed(portaudio, mixer, place, error, kind):
     attrgetter(place)(portaudio).side_effect = error
     with pytest.raises(AudioProblem, match=WORDS[kind]) as caught:
         DeviceOutput(found(), 0.05, mixer)
@@ -173,7 +169,7 @@ def test_a_device_that_cannot_be_opened_is_explained_and_freed(
 @pytest.mark.parametrize(
     ("error", "kind"), [(OSError, ProblemKind.PORTAUDIO_MISSING), (PortAudioError, ProblemKind.NOT_STARTED)]
 )
-def test_no_portaudio_is_said(monkeypatch: pytest.MonkeyPatch, error: type[Exception], kind: ProblemKind) -> None:
+def test_no_portaudio_is_said(monkeypatch, error, kind):
     original = builtins.__import__
 
     def refuse(name: str, *arguments: Any, **options: Any) -> Any:
@@ -188,7 +184,7 @@ def test_no_portaudio_is_said(monkeypatch: pytest.MonkeyPatch, error: type[Excep
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="ALSA is Linux's")
-def test_alsa_prints_nothing_into_the_terminal() -> None:
+def test_alsa_prints_nothing_into_the_terminal():
     """In a process of its own: the handler stays."""
     script = (
         "import ctypes, contextlib, sys; from app.audio.devices import output_devices\n"

@@ -4,8 +4,6 @@ A private PulseAudio with a null sink stands for the sound card; `parec` records
 This file is also the program that plays there, as ALSA and PulseAudio read their settings once per process.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -145,7 +143,7 @@ def play(environment: dict[str, str], *server: str) -> dict[str, Any]:
     return said
 
 
-def test_overlapping_notes_and_a_switch_arrive_as_a_mixer_renders_them(server: Server, tmp_path: Path) -> None:
+def test_overlapping_notes_and_a_switch_arrive_as_a_mixer_renders_them(server, tmp_path):
     command = ["parec", "-d", "test.monitor", f"--rate={RATE_HZ}", "--format=float32le", "--channels=2"]
     gaps, file = 0, tmp_path / "recorded"
     for _ in range(3):
@@ -171,7 +169,7 @@ def test_overlapping_notes_and_a_switch_arrive_as_a_mixer_renders_them(server: S
     pytest.skip(f"this computer is too busy for gapless sound: {gaps} gaps")
 
 
-def test_a_sound_server_that_dies_is_reported_once_and_time_goes_on(server: Server) -> None:
+def test_a_sound_server_that_dies_is_reported_once_and_time_goes_on(server):
     said = play(server[1], str(server[0].pid))
     assert said["problems"] == ["vanished"]
     assert said["over"] == [True] * 3, "all notes must come to their end without sound"

@@ -1,7 +1,5 @@
 """The sound opens devices, changes them, outlives them, and reports what is wrong with them."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -133,9 +131,7 @@ def plays_on(sound: Sound, desk: Desk) -> None:
 # Devices and their mixers
 
 
-def test_time_goes_on_and_a_default_is_opened(
-    sound: Sound, desk: Desk, threads_begun: Callable[[], list[str]]
-) -> None:
+def test_time_goes_on_and_a_default_is_opened(sound, desk, threads_begun):
     before, voice = sound.mixer, lasting(sound)
     time_goes_on(voice)
     assert sound.status().device is None and sound.now_s() > 0
@@ -153,7 +149,7 @@ def test_time_goes_on_and_a_default_is_opened(
     assert len(desk.outputs) == 1
 
 
-def test_what_rings_goes_on_where_the_rate_stays_and_choices_are_obeyed(sound: Sound, desk: Desk) -> None:
+def test_what_rings_goes_on_where_the_rate_stays_and_choices_are_obeyed(sound, desk):
     desk.devices.append(AudioDevice("Monitor", "Test API", 48_000))
     opened(sound)
     voice = lasting(sound)
@@ -172,7 +168,7 @@ def test_what_rings_goes_on_where_the_rate_stays_and_choices_are_obeyed(sound: S
         assert [output.close.called for output in desk.outputs[3:]] == [True] * number + [False]
 
 
-def test_another_rate_has_another_mixer_with_all_that_is_set(sound: Sound, desk: Desk) -> None:
+def test_another_rate_has_another_mixer_with_all_that_is_set(sound, desk):
     """A device may take a second to open, in which the window sets volume, body and room."""
     opened(sound)
     before, effects = sound.mixer, Effects(room=Room(0.3, 1.0))
@@ -206,7 +202,7 @@ GONE = replace(HEADPHONES, name="Gone")
 @pytest.mark.parametrize(
     ("device", "rate_hz", "kind"), [(SPEAKERS, 0, "busy"), (HEADPHONES, 96_000, "busy"), (GONE, 0, "vanished")]
 )
-def test_a_refused_change_is_undone(sound: Sound, desk: Desk, device: AudioDevice, rate_hz: int, kind: str) -> None:
+def test_a_refused_change_is_undone(sound, desk, device, rate_hz, kind):
     opened(sound, HEADPHONES)
     voice, desk.refuses = lasting(sound), busy
     opened(sound, device, rate_hz=rate_hz)
@@ -215,7 +211,7 @@ def test_a_refused_change_is_undone(sound: Sound, desk: Desk, device: AudioDevic
     assert sound.mixer.voices == [voice] and not desk.outputs[-1].close.called
 
 
-def test_no_device_at_all_is_reported_and_who_hears_of_it_may_close_the_sound(desk: Desk) -> None:
+def test_no_device_at_all_is_reported_and_who_hears_of_it_may_close_the_sound(desk):
     """Who hears of a problem finds it in the status."""
     desk.devices.clear()
     found: list[str | None] = []
@@ -232,7 +228,7 @@ def test_no_device_at_all_is_reported_and_who_hears_of_it_may_close_the_sound(de
     other.close()
 
 
-def test_a_lost_device_is_reported_once_and_found_again(sound: Sound, desk: Desk) -> None:
+def test_a_lost_device_is_reported_once_and_found_again(sound, desk):
     opened(sound)  # the default, whichever it is
     voice = lasting(sound)
     desk.devices.remove(HEADPHONES)
@@ -257,7 +253,7 @@ def test_a_lost_device_is_reported_once_and_found_again(sound: Sound, desk: Desk
     assert (sound.status().device, desk.rescans) == (SPEAKERS, tries)
 
 
-def test_a_stall_is_reported_and_withdrawn(sound: Sound, desk: Desk) -> None:
+def test_a_stall_is_reported_and_withdrawn(sound, desk):
     opened(sound)
     for number in (1, 2):
         desk.outputs[0].stalled.return_value = True
@@ -269,7 +265,7 @@ def test_a_stall_is_reported_and_withdrawn(sound: Sound, desk: Desk) -> None:
     assert desk.kinds == [ProblemKind.STALLED] * 2 and not desk.outputs[0].close.called
 
 
-def test_a_device_that_stops_is_opened_at_once(sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_device_that_stops_is_opened_at_once(sound, desk, monkeypatch):
     """Nobody waits for it as for one that was unplugged, and what rings continues."""
     monkeypatch.setattr(sound_module, "TRY_AGAIN_S", 1e6)
     opened(sound)
@@ -288,7 +284,7 @@ def test_a_device_that_stops_is_opened_at_once(sound: Sound, desk: Desk, monkeyp
 # Faults of the program
 
 
-def test_what_has_rung_out_is_freed_and_gaps_are_kept(sound: Sound) -> None:
+def test_what_has_rung_out_is_freed_and_gaps_are_kept(sound):
     opened(sound)
     sound.mixer.add(Voice.of_samples(plain_program(48_000), np.full((64, 1), 30.0, np.float32)))
     sound.mixer.render(640)
@@ -297,9 +293,7 @@ def test_what_has_rung_out_is_freed_and_gaps_are_kept(sound: Sound) -> None:
 
 
 @pytest.mark.parametrize("stage", ["watch", "forget_ended", "set_effects", "output"])
-def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(
-    sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch, stage: str
-) -> None:
+def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(sound, desk, monkeypatch, stage):
     """An output that cannot be supervised is opened again."""
     monkeypatch.setattr(sound_module, "RESTART_AFTER", 2)
     opened(sound)
@@ -320,7 +314,7 @@ def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(
 
 
 @pytest.mark.parametrize("stage", ["look_up", "open_output"])
-def test_a_fault_while_a_device_is_opened_is_reported_and_tried_again(desk: Desk, stage: str) -> None:
+def test_a_fault_while_a_device_is_opened_is_reported_and_tried_again(desk, stage):
     works, faults = getattr(desk, stage), [True, True]
     setattr(desk, stage, lambda *values: broken() if faults and faults.pop() else works(*values))
     with desk.sound() as sound:
@@ -331,7 +325,7 @@ def test_a_fault_while_a_device_is_opened_is_reported_and_tried_again(desk: Desk
         plays_on(sound, desk)
 
 
-def test_a_fault_where_problems_are_shown_stops_nothing(desk: Desk) -> None:
+def test_a_fault_where_problems_are_shown_stops_nothing(desk):
     desk.refuses = busy
     with desk.sound(on_problem=broken) as sound:
         opened(sound)

@@ -1,7 +1,5 @@
 """Sound files as notes and bodies: valid ones of an independent writer, odd ones, and one line for refused ones."""
 
-from __future__ import annotations
-
 import os
 import random
 import struct
@@ -100,7 +98,7 @@ def made_wav(draw: random.Random) -> tuple[bytes, NDArray[np.float64], int, str]
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_random_files_are_read_as_they_were_meant(seed: int, path: Path) -> None:
+def test_random_files_are_read_as_they_were_meant(seed, path):
     draw = random.Random(seed)
     for number in range(60):
         data, samples, rate_hz, kind = made_wav(draw)
@@ -116,7 +114,7 @@ OTHERS = ("flac PCM_24", "flac PCM_16", "aiff PCM_24", "aiff FLOAT")
 
 @pytest.mark.parametrize("channels", [1, 2])
 @pytest.mark.parametrize("name", [*(f"wav {form}" for form in WAV_FORMS), *OTHERS])
-def test_what_libsndfile_writes_is_read_as_note_and_as_body(tmp_path: Path, name: str, channels: int) -> None:
+def test_what_libsndfile_writes_is_read_as_note_and_as_body(tmp_path, name, channels):
     ending, subtype = name.split()
     path = tmp_path / f"a.{ending}"
     soundfile.write(path, DECAYING[:, :channels], 44_100, subtype)
@@ -126,7 +124,7 @@ def test_what_libsndfile_writes_is_read_as_note_and_as_body(tmp_path: Path, name
         np.testing.assert_allclose(read.samples[:3_000], whole[:3_000], atol=2e-7)  # behind are remains of a block
 
 
-def test_odd_files_cost_no_samples(path: Path) -> None:
+def test_odd_files_cost_no_samples(path):
     """Lists that are cut off, zeros of a recorder that fills its blocks, bits that fill no bytes."""
     cut_off = chunk(b"LIST", TEXTS + (b"ICMT\x20\0\0\0abcd")[:6])
     assert samples_of(path, riff(cut_off, format_of(), DATA)) == [1, 2, 3]
@@ -141,7 +139,7 @@ def test_odd_files_cost_no_samples(path: Path) -> None:
 
 @pytest.mark.parametrize("name", [b"DISP", b"_PMX", b"LIST"])
 @pytest.mark.parametrize(("length", "filled"), [(1, 33), (17, 0), (603, 100)])
-def test_odd_chunks_may_lack_their_padding(name: bytes, length: int, filled: int, path: Path) -> None:
+def test_odd_chunks_may_lack_their_padding(name, length, filled, path):
     """A name less its first letter, and a size of 100, look like a name too."""
     odd = chunk(b"strc", bytes([filled]) * length, padded=False)
     text = chunk(name, (b"INFO" if name == b"LIST" else b"") + bytes([filled]) * 100)
@@ -149,7 +147,7 @@ def test_odd_chunks_may_lack_their_padding(name: bytes, length: int, filled: int
 
 
 @pytest.mark.parametrize(("subtype", "kind"), [("ULAW", 7), ("ALAW", 6)])
-def test_a_compressed_body_with_an_extensible_header(subtype: str, kind: int, path: Path) -> None:
+def test_a_compressed_body_with_an_extensible_header(subtype, kind, path):
     raw = path.with_suffix(".raw")
     soundfile.write(raw, DECAYING[:, 0], 48_000, subtype=subtype, format="RAW")
     head = struct.pack("<HHIIHH", 0xFFFE, 1, 48_000, 48_000, 1, 8) + struct.pack("<HHIH", 22, 8, 0, kind) + GUID
@@ -182,7 +180,7 @@ def remainder(data: bytes, polynomial: int, bits: int) -> int:
 
 
 @pytest.mark.parametrize("code", [0, 4])
-def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code: int, path: Path) -> None:
+def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code, path):
     """Blocks may state 16 bits, or refer to the file's first block for them."""
     samples = np.arange(-90, 90, dtype=">i2")
     blocks = flac_block(samples[:100], 0, 4 - code) + flac_block(samples[100:], 1, code)
@@ -190,7 +188,7 @@ def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code: int
 
 
 @pytest.mark.parametrize("frames", [1, 192, 4_096, 600_000])
-def test_a_flac_stream_that_states_no_length_or_is_cut_off(frames: int, path: Path) -> None:
+def test_a_flac_stream_that_states_no_length_or_is_cut_off(frames, path):
     """Also behind a tag of MP3 players."""
     samples = np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
     soundfile.write(path, samples, 44_100, "PCM_24", format="FLAC")
@@ -212,7 +210,7 @@ def readable_or_named(path: Path, most_frames: int = 10**9) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_damage_of_any_kind_is_read_or_named(seed: int, path: Path) -> None:
+def test_damage_of_any_kind_is_read_or_named(seed, path):
     draw = random.Random(seed)
     for _ in range(100):
         data = bytearray(made_wav(draw)[0])
@@ -226,7 +224,7 @@ def test_damage_of_any_kind_is_read_or_named(seed: int, path: Path) -> None:
 
 
 @pytest.mark.parametrize("seconds", [3.0, 3.0 + 1 / 48_000, 6.97])
-def test_of_a_long_response_the_beginning_is_used_and_fades_out(path: Path, seconds: float) -> None:
+def test_of_a_long_response_the_beginning_is_used_and_fades_out(path, seconds):
     frames, most = round(48_000 * seconds), 3 * 48_000
     samples = np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
     soundfile.write(path, samples, 48_000, "FLOAT")
@@ -240,7 +238,7 @@ def test_of_a_long_response_the_beginning_is_used_and_fades_out(path: Path, seco
 
 
 @pytest.mark.parametrize("silent_s", [0.0, 0.05, 5.0])
-def test_silence_before_a_body_is_left_out(silent_s: float, path: Path) -> None:
+def test_silence_before_a_body_is_left_out(silent_s, path):
     response = DECAYING.copy()
     response[0] = 0.5
     silence = np.random.default_rng(1).uniform(-1e-3, 1e-3, (round(silent_s * 48_000), 2))
@@ -307,7 +305,7 @@ UNUSABLE = [  # as a note, as a body
 @pytest.mark.parametrize(
     ("make", "as_note", "as_body"), [*((make, words, words) for make, words in UNREADABLE), *UNUSABLE]
 )
-def test_what_cannot_be_used_is_named(path: Path, make: Callable[[Path], object], as_note: str, as_body: str) -> None:
+def test_what_cannot_be_used_is_named(path, make, as_note, as_body):
     make(path)
     for read, error, reported in ((read_note, NoteFileError, as_note), (read_impulse, ImpulseError, as_body)):
         if reported:
@@ -317,7 +315,7 @@ def test_what_cannot_be_used_is_named(path: Path, make: Callable[[Path], object]
             assert len(str(caught.value)) < 400
 
 
-def test_many_channels_are_refused_before_they_fill_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_channels_are_refused_before_they_fill_memory(tmp_path, monkeypatch):
     """A minute of silence of eight channels at 384 kHz is a small FLAC, and 1.5 GB of samples."""
     with soundfile.SoundFile(tmp_path / "a.flac", "w", 384_000, 8, "PCM_16") as file:
         for _ in range(6):

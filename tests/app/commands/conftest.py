@@ -1,7 +1,5 @@
 """Command lines in this process, and the files that they read: each is made when a line names it."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -1,7 +1,5 @@
 """The program's own behaviour: help, files that open in the app, failures, progress, the current folder."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -19,7 +17,6 @@ from app.export.sound import SOURCES
 from app.shared.vocabulary import BITS
 from engine.python_process import python_command, python_environment
 from engine.values.ear import PICKUPS
-from tests.app.commands.conftest import Run
 from training.cli import console
 
 ROOT = Path(__file__).parents[3]
@@ -31,7 +28,7 @@ def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, env={**environment, **variables}, capture_output=True, text=True)
 
 
-def test_help_needs_none_of_the_heavy_imports() -> None:
+def test_help_needs_none_of_the_heavy_imports():
     done = python(
         "import sys; from app.commands.cli import main; status = main(['--help'])\n"
         "assert not {'torch', 'numpy', 'scipy', 'numba', 'soundfile', 'PySide6'} & set(sys.modules)\n"
@@ -40,7 +37,7 @@ def test_help_needs_none_of_the_heavy_imports() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wait() -> None:
+def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wait():
     """OpenMP spins for no turns; pydantic is needed: newer versions of typer themselves need it."""
     done = python(
         "import sys\n"
@@ -60,7 +57,7 @@ def test_commands_need_neither_window_nor_sound_packages_and_sleep_while_they_wa
     assert sys.platform != "linux" or "GOMP_SPINCOUNT = '0'" in done.stderr
 
 
-def test_help_cuts_no_summary(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_cuts_no_summary(run, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     listed = {name: run(f"{name} --help").out for name in ("", "render", "family", "drums")}
     assert all("Usage: learned-strings" in text for text in listed.values())
@@ -71,9 +68,7 @@ def test_help_cuts_no_summary(run: Run, monkeypatch: pytest.MonkeyPatch) -> None
         assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 
-def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
-    run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path
-) -> None:
+def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(run, monkeypatch, folder):
     opened: list[list[Path]] = []
     main = types.SimpleNamespace(run=lambda files=(): opened.append(list(files)) or 3)  # it ends with status 3
     monkeypatch.setitem(sys.modules, "app.window.main", main)  # type: ignore[arg-type]
@@ -88,7 +83,7 @@ def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
     assert run("--version").out.strip()
 
 
-def test_a_failure_is_one_line_and_an_interruption_status_130(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_is_one_line_and_an_interruption_status_130(run, monkeypatch):
     errors: list[BaseException] = [ValueError("first\nsecond"), ValueError("again"), KeyboardInterrupt()]
 
     def fail() -> int:
@@ -115,15 +110,15 @@ def test_a_failure_is_one_line_and_an_interruption_status_130(run: Run, monkeypa
         (RuntimeError("DOP853 failed"), "DOP853 failed"),
     ],
 )
-def test_a_failure_names_what_and_the_remedy(error: Exception, expected: str) -> None:
+def test_a_failure_names_what_and_the_remedy(error, expected):
     assert cli.describe(error).startswith(expected)
 
 
-def test_choices_that_are_known_without_soundfile_are_its_own() -> None:
+def test_choices_that_are_known_without_soundfile_are_its_own():
     assert (render.Bits.__args__, render.Source.__args__, render.Pickup.__args__) == (BITS, SOURCES, PICKUPS)
 
 
-def test_progress_is_lines_or_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_lines_or_a_bar(monkeypatch, capsys):
     now_s = 0.0
     with monkeypatch.context() as instrumented:
         instrumented.setattr(console.time, "monotonic", lambda: now_s)
@@ -143,9 +138,7 @@ def test_progress_is_lines_or_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert found.out == "" and all(words in found.err for words in ("[/b].mid by [red]", "1 min 30 s left", "[/i]"))
 
 
-def test_json_is_valid_and_a_table_keeps_a_long_cell(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_json_is_valid_and_a_table_keeps_a_long_cell(capsys):
     console.print_json({"a": [float("inf"), float("nan"), 1.5], "b": (1, None)})
     assert json.loads(capsys.readouterr().out) == {"a": [None, None, 1.5], "b": [1, None]}
     console.print_table(("a", "b"), [("x" * 300, 1234.5678), ("y", None)])
@@ -179,7 +172,7 @@ if __name__ == "__main__":
 """
 
 
-def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path: Path) -> None:
+def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path):
     """As the installed command starts: the current folder is not on its path."""
     (folder := tmp_path / "current").mkdir()
     for name in (*PROJECT, *USED, *LIBRARY):
@@ -193,7 +186,7 @@ def test_commands_and_their_processes_run_nothing_of_the_current_folder(tmp_path
     assert done.stdout.splitlines()[-1].startswith("{'rows': [], 'error': "), done.stderr
 
 
-def test_every_process_leaves_the_current_folder_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_every_process_leaves_the_current_folder_out(monkeypatch, tmp_path):
     """Also after `python -m`, which puts the current folder on the path, and for a folder of the user's own."""
     product = [path for name in ("app", "engine", "training") for path in (ROOT / name).rglob("*.py")]
     starting = re.compile(r"[(\[]\s*sys\.executable")

@@ -1,7 +1,5 @@
 """evaluate: a preset that is nearly the linear string, on the data of the linear string."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
@@ -29,7 +27,7 @@ def facts_of(run: Run, line: str) -> Any:
     return json.loads(run(f"{line} --json").out)
 
 
-def test_the_papers_figures_are_printed_too(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_papers_figures_are_printed_too(run, folder, monkeypatch):
     def few(data: DatasetConfiguration, folder: Path | None) -> Dataset:
         return load_dataset(replace(data, count=20, steps=400), folder)
 
@@ -42,7 +40,7 @@ def test_the_papers_figures_are_printed_too(run: Run, folder: Path, monkeypatch:
     assert "rel_mae" in reported and "paper" not in reported
 
 
-def test_fresh_plucks_that_nobody_trained_on(run: Run) -> None:
+def test_fresh_plucks_that_nobody_trained_on(run):
     held_out = "evaluate {tiny} --cache {cache} --held-out 12"
     reported = run(f"{held_out} --past 0.5 --partials")
     assert (reported.status, reported.err) == (0, "")
@@ -58,7 +56,7 @@ def test_fresh_plucks_that_nobody_trained_on(run: Run) -> None:
     assert facts_of(run, held_out)["rel_mse"] == found["rel_mse"]
 
 
-def test_the_errors_by_how_far_a_pluck_raises_the_tension(run: Run, tiny: Path, folder: Path) -> None:
+def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, tiny, folder):
     """Played on the tension-modulated string, a linear model has its largest error where it is plucked hardest."""
     loaded = load_preset(tiny)
     data = {**loaded.info.training["data"], "tension_modulated": True}
@@ -75,7 +73,7 @@ def test_the_errors_by_how_far_a_pluck_raises_the_tension(run: Run, tiny: Path, 
     assert groups[0]["rel_mse"] < 0.5 * groups[3]["rel_mse"]  # at half the rate soon out of step, too
 
 
-def test_past_the_horizon_a_row_a_second_and_partials(run: Run) -> None:
+def test_past_the_horizon_a_row_a_second_and_partials(run):
     evaluate = "evaluate {tiny} --past 2.5 --partials --cache {cache}"
     reported, found = run(evaluate), facts_of(run, evaluate)["validation"]
     late = [w for w in found["windows"] if w["past_horizon"]]
@@ -107,7 +105,7 @@ def test_past_the_horizon_a_row_a_second_and_partials(run: Run) -> None:
     assert horizon["weighted"]["cents"] < 0.01
 
 
-def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run: Run) -> None:
+def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run):
     many = "evaluate studio_any_string"
     found = facts_of(run, f"{many} --string steel_e4 --rate 16000 --partials")
     assert (found["split"], found["rate_hz"], found["held_out"]["trajectories"]) == ("held_out", 16_000, 10)
@@ -124,7 +122,7 @@ def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run: Run) -> None
     assert "decay time 27.6" not in beyond  # of the first mode: the error does not grow with it
 
 
-def test_heard_differences_are_printed_and_kept(run: Run, tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_heard_differences_are_printed_and_kept(run, tiny, monkeypatch):
     reported = run("evaluate {tiny} --heard")
     assert reported.status == 0 and "tiny" in reported.out and "spectra dB" in reported.out
     assert read_heard(tiny.parent) == ({}, [])
@@ -140,7 +138,7 @@ def test_heard_differences_are_printed_and_kept(run: Run, tiny: Path, monkeypatc
     assert "broken.safetensors: not a whole safetensors file" in reported.err
 
 
-def test_errors_on_strings_of_a_family_are_by_rise_of_tension(run: Run) -> None:
+def test_errors_on_strings_of_a_family_are_by_rise_of_tension(run):
     evaluate = "family evaluate studio_any_string --strings 2 --rate 8000"
     facts = facts_of(run, evaluate)
     for column in ("inside", "beyond"):

@@ -3,8 +3,6 @@
 A line of a text that begins with `$` is a command; `LEARNED_STRINGS_GOLDEN=write` writes what follows it again.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path
@@ -12,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from engine.presets import SHIPPED, preset_digest
-from tests.app.commands.conftest import Run
 from training.heard_file import Heard, add_heard
 
 OF_A_VERSION = re.compile(r"[ \"]*(version|preset.sha256)")
@@ -28,7 +25,7 @@ def plain(text: str, *places: Path) -> str:
 
 
 @pytest.mark.parametrize("file", sorted(Path(__file__).with_name("golden").glob("*.txt")), ids=lambda file: file.stem)
-def test_a_command_prints_its_golden_text(run: Run, file: Path, folder: Path, request: pytest.FixtureRequest) -> None:
+def test_a_command_prints_its_golden_text(run, file, folder, request):
     wanted = file.read_text(encoding="utf-8")
     if "good" in wanted:
         installed = request.getfixturevalue("installed")

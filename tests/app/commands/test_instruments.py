@@ -1,7 +1,5 @@
 """Commands that list instruments and write them for samplers and as plug-ins."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -17,12 +15,9 @@ from app.export.sampled.plan import SampledPlan
 from app.instruments.library import SHIPPED, find_instrument, list_instruments
 from app.player import offline
 from app.shared.parameters import OF_INSTRUMENTS
-from tests.app.commands.conftest import Run
 
 
-def test_a_preset_is_found_by_its_name_the_shipped_one_first(
-    run: Run, installed: Path, small_preset: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_preset_is_found_by_its_name_the_shipped_one_first(run, installed, small_preset, folder, monkeypatch):
     for name in ("mine", "good"):  # of two of one name, the shipped one counts
         shutil.copy(small_preset, folder / f"{name}.safetensors")
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
@@ -38,7 +33,7 @@ def test_a_preset_is_found_by_its_name_the_shipped_one_first(
         assert message in run(compare.format(name)).failure
 
 
-def test_a_broken_instrument_hides_no_other(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broken_instrument_hides_no_other(run, tmp_path, monkeypatch):
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
     (own := tmp_path / "instruments").mkdir()
     some = json.loads((SHIPPED / "classical_guitar.json").read_text(encoding="utf-8"))
@@ -52,7 +47,7 @@ def test_a_broken_instrument_hides_no_other(run: Run, tmp_path: Path, monkeypatc
     assert all(each["name"] in table and each["title"] in table for each in listed)
 
 
-def test_an_instruments_parameters_are_listed_with_its_values(run: Run) -> None:
+def test_an_instruments_parameters_are_listed_with_its_values(run):
     own = find_instrument("classical_guitar").instrument
     listed = {each["id"]: each for each in json.loads(run("instruments classical_guitar --json").out)}
     assert set(listed) == {id for id in OF_INSTRUMENTS if own.has(id)}
@@ -68,7 +63,7 @@ def test_an_instruments_parameters_are_listed_with_its_values(run: Run) -> None:
 SAMPLED = "sampled classical_guitar {out}.sfz --keys C4-62 --layers 2 --seconds 0.2"  # 60 to 62
 
 
-def test_an_sfz_with_its_samples(run: Run, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_sfz_with_its_samples(run, out, monkeypatch):
     render = Mock(wraps=offline.render_note)
     monkeypatch.setattr(offline, "render_note", render)
     instrument, samples = find_instrument("classical_guitar").instrument, out.with_name("out_samples")
@@ -89,7 +84,7 @@ def test_an_sfz_with_its_samples(run: Run, out: Path, monkeypatch: pytest.Monkey
     assert [run(f"{SAMPLED}{more}").status for more in ("", " --yes")] == [1, 0]
 
 
-def test_a_soundfont_is_one_file(run: Run, folder: Path) -> None:
+def test_a_soundfont_is_one_file(run, folder):
     found = run(SAMPLED.replace(".sfz", ".sf2"), "--every", 3)
     assert found.status == 0
     assert [path.name for path in folder.iterdir()] == ["out.sf2"]
@@ -120,7 +115,7 @@ def held(home: Path) -> dict[str, int]:
     return {path.name: len(held_in(path)) for path in home.rglob("*.clap") if path.is_file()}
 
 
-def test_one_bank_does_not_replace_another(run: Run, home: Path) -> None:
+def test_one_bank_does_not_replace_another(run, home):
     many = [entry.name for entry in list_instruments(SHIPPED)[0]][:9]
     assert run("plugin", *many, "--install").status == 0
     (name,) = held(home)
@@ -135,13 +130,13 @@ def test_one_bank_does_not_replace_another(run: Run, home: Path) -> None:
         assert "replaces the one before" in run("plugin", *others, *more).out
 
 
-def test_nothing_is_written_where_one_of_several_would_lose_something(run: Run, home: Path, folder: Path) -> None:
+def test_nothing_is_written_where_one_of_several_would_lose_something(run, home, folder):
     (folder / "Concert harp.vst3").write_bytes(b"org.learned-strings.another\0")
     assert run("plugin concert_harp --format all --out {folder}").status == 1
     assert [path.name for path in folder.iterdir()] == ["Concert harp.vst3"]
 
 
-def test_without_a_compiler_the_extra_is_named(run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+def test_without_a_compiler_the_extra_is_named(run, monkeypatch, folder):
     monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: None)
     assert "learned-strings[plugin]" in run("plugin concert_harp --out {folder}").failure
     assert not list(folder.iterdir())

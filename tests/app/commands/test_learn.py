@@ -1,7 +1,5 @@
 """learn and render --as-recorded, on a synthetic recording."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -20,7 +18,6 @@ from app.player.offline import render_note
 from app.shared.parameters import NOISE_DB
 from engine.presets import load_preset
 from engine.whole_file import WriteError
-from tests.app.commands.conftest import Run
 from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
@@ -67,8 +64,8 @@ def files(folder: Path) -> list[Path]:
 
 @pytest.mark.usefixtures("learned_once")
 def test_a_note_becomes_an_instrument_of_whose_files_all_or_none_are_written(
-    run: Run, recording: Path, own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    run, recording, own, tmp_path, monkeypatch
+):
     def full(*_: object) -> None:
         raise WriteError("instruments: cannot be written (No space left on device)")
 
@@ -116,9 +113,7 @@ def steps_of(folder: Path) -> int:
     return json.loads(checkpoints[0].read_text())["steps"] if checkpoints else 0
 
 
-def test_a_killed_command_continues_with_the_same_result(
-    run: Run, recording: Path, own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_killed_command_continues_with_the_same_result(run, recording, own, tmp_path, monkeypatch):
     words = [*LEARN.split(), str(recording)]
     with subprocess.Popen([sys.executable, "-m", "app.commands.cli", *words], stderr=subprocess.DEVNULL) as process:
         while process.poll() is None and steps_of(own) <= 8:
@@ -144,9 +139,7 @@ def test_a_killed_command_continues_with_the_same_result(
     assert (own / PRESET).read_bytes() == (tmp_path / PRESET).read_bytes()
 
 
-def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
-    run: Run, recording: Path, own: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(run, recording, own, monkeypatch):
     def save_and_stop(*given: object) -> None:
         save(*given)
         raise KeyboardInterrupt
@@ -161,9 +154,7 @@ def test_an_interrupted_command_names_its_continuation_and_a_damaged_checkpoint(
     assert "damaged checkpoint" in damaged and "delete it to start again" in damaged
 
 
-def test_only_an_option_keeps_what_is_no_string(
-    run: Run, own: Path, tmp_path: Path, learned_once: list[bool]
-) -> None:
+def test_only_an_option_keeps_what_is_no_string(run, own, tmp_path, learned_once):
     samples, rate_hz = membrane(np.random.default_rng(30))
     drum = tmp_path / "drum.wav"
     soundfile.write(drum, samples[:rate_hz], rate_hz, subtype="FLOAT")

@@ -1,7 +1,5 @@
 """Motions as arrays, of strings and drums: simulate, predict, compare."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -50,7 +48,7 @@ def relative_l2(found: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
 
 
-def test_simulations_are_the_closed_form_and_dop853s(moved: Moved, run: Run, u0: Path) -> None:
+def test_simulations_are_the_closed_form_and_dop853s(moved, run, u0):
     motion_m = moved(f"{SIMULATE} 200")
     assert motion_m.shape == (3, 201, 101)
     start = ModalState.at_rest(torch.from_numpy(to_modes(np.load(u0), 10)))
@@ -65,9 +63,7 @@ def test_simulations_are_the_closed_form_and_dop853s(moved: Moved, run: Run, u0:
 
 
 @pytest.mark.parametrize("batch", [1, 3])
-def test_blocks_do_not_show_in_the_file(
-    moved: Moved, u0: Path, small_preset: Path, batch: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blocks_do_not_show_in_the_file(moved, u0, small_preset, batch, monkeypatch):
     np.save(u0, np.load(u0)[:batch])
     start = project(np.load(u0), 10)
     predict = "predict {small_preset} {u0} {out}.npy --steps"
@@ -85,7 +81,7 @@ def test_blocks_do_not_show_in_the_file(
     assert found.shape == (batch, 51, 101) and found[:, 1:] == pytest.approx(frames, abs=1e-9)
 
 
-def test_compare_is_the_papers_metric(run: Run, small_preset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compare_is_the_papers_metric(run, small_preset, monkeypatch):
     """Over grid and time."""
     monkeypatch.setattr(arrays, "FRAMES_AT_ONCE", 123)
     compare = "compare {small_preset} --position 0.4 --seconds 0.2 --json --amplitude-mm"
@@ -104,7 +100,7 @@ def test_compare_is_the_papers_metric(run: Run, small_preset: Path, monkeypatch:
     assert silent is None or math.isfinite(silent)
 
 
-def test_a_preset_of_many_strings_predicts_the_one_that_is_named(run: Run, moved: Moved, u0: Path) -> None:
+def test_a_preset_of_many_strings_predicts_the_one_that_is_named(run, moved, u0):
     np.save(u0, Pluck(0.3, 1.0).displacement(101)[None])
     predict, modes = f"predict {MANY} {{u0}} {{out}}.npy", read_string(STEEL_E4).modes_below(20_000)
     model = moved(f"{predict} --string steel_e4 --steps 300")
@@ -117,7 +113,7 @@ def test_a_preset_of_many_strings_predicts_the_one_that_is_named(run: Run, moved
     assert json.loads(compared.out)["rel_mse"] < 1e-9
 
 
-def test_a_string_beyond_the_family_is_rendered_and_reported(run: Run, u0: Path, tmp_path: Path) -> None:
+def test_a_string_beyond_the_family_is_rendered_and_reported(run, u0, tmp_path):
     np.save(u0, Pluck(0.3, 20.0, "triangular").displacement(101)[None])
     text = STEEL_E4.read_text(encoding="utf-8").replace("tension_n = 72.592", "tension_n = 0.72592")
     (tmp_path / "slack.toml").write_text(re.sub("d3_kg_m_s = .*", "d3_kg_m_s = 1e-8", text), encoding="utf-8")
@@ -143,7 +139,7 @@ MEASURED = {
 }
 
 
-def test_model_and_solver_move_a_drum_as_the_oracle_does(moved: Moved) -> None:
+def test_model_and_solver_move_a_drum_as_the_oracle_does(moved):
     """A bar of an instrument, on a grid, from rest; its ends stay at rest. Without tension modulation it differs."""
     options = "thin_bars {out}.npy --key 72 --velocity 127 --steps 400 --points 21"
     solver = " --solver dop853"
@@ -160,7 +156,7 @@ def test_model_and_solver_move_a_drum_as_the_oracle_does(moved: Moved) -> None:
     assert np.square(linear_truth - truth).mean() > 1e-6 * size
 
 
-def test_the_motion_of_a_drums_file_is_within_its_circle(moved: Moved) -> None:
+def test_the_motion_of_a_drums_file_is_within_its_circle(moved):
     (file,) = (file for file in FILES if file.stem == "tom_13")
     found = moved(f"drums simulate {file} {{out}}.npy --steps 100 --points 12 --place 0.5 0 --rate 8000")
     assert found.shape == (101, 13, 13)
@@ -170,7 +166,7 @@ def test_the_motion_of_a_drums_file_is_within_its_circle(moved: Moved) -> None:
     assert np.unravel_index(first.argmax(), first.shape) == (6, 9), "it moves first where it is struck"
 
 
-def test_errors_of_a_drum_are_those_of_the_blow_at_the_place_by_second(run: Run) -> None:
+def test_errors_of_a_drum_are_those_of_the_blow_at_the_place_by_second(run):
     compare = "drums compare thin_bars --key 72 --seconds 1.5 --rate 16000 --json --place {} 0"
     centre, side = (json.loads(run(compare.format(place)).out) for place in (0, 0.6))
     for found in (centre, side):
@@ -181,7 +177,7 @@ def test_errors_of_a_drum_are_those_of_the_blow_at_the_place_by_second(run: Run)
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_every_file_of_a_drum_is_read_and_its_modes_are_as_measured(run: Run, file: Path) -> None:
+def test_every_file_of_a_drum_is_read_and_its_modes_are_as_measured(run, file):
     lowest = json.loads(run(f"drums modes {file} --count 20 --json").out)["lowest"]
     hz = {(mode["m"], mode["n"]): mode["hz"] for mode in reversed(lowest)}  # of a pair the lower
     for mode, (measured_hz, off) in MEASURED.get(file.stem, {}).items():

@@ -1,7 +1,5 @@
 """Requests that are refused: in one line or as bad usage, before any work that would not end, and no file is made."""
 
-from __future__ import annotations
-
 import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,7 +11,6 @@ import typer
 
 from app.commands import cli
 from engine.presets import load_preset, save_preset
-from tests.app.commands.conftest import Run
 
 BASES: list[str] = []  # command lines to which options can be added; of one that is given twice the last counts
 TABLE: list[tuple[int, str, str]] = []  # status, words, and what the message says
@@ -32,9 +29,7 @@ def no_file_is_made(folder: Path) -> Iterator[None]:
 
 
 @pytest.mark.parametrize(("status", "words", "message"), TABLE)
-def test_a_request_that_cannot_be_carried_out_is_refused(
-    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, status: int, words: str, message: str
-) -> None:
+def test_a_request_that_cannot_be_carried_out_is_refused(run, folder, monkeypatch, status, words, message):
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
     done = run(words)
     assert message in (done.usage if status == 2 else done.failure.replace("'", ""))
@@ -56,13 +51,13 @@ CHECKED_WITH_THEIR_VALUE = [(base, each.opts[0]) for base, each in WHOLE if None
 
 
 @pytest.mark.parametrize(("base", "option"), CHECKED_WITH_THEIR_VALUE)
-def test_whole_numbers_out_of_range_are_refused(run: Run, base: str, option: str) -> None:
+def test_whole_numbers_out_of_range_are_refused(run, base, option):
     for value in (-1, 0, 10**12, 10**30):
         assert "must lie in" in run(base, option, value).usage
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-1e300"])
-def test_numbers_that_are_none_or_endless_are_refused(run: Run, value: str) -> None:
+def test_numbers_that_are_none_or_endless_are_refused(run, value):
     for base, option, values in NUMBERS:
         done = run(base, option, *[value] * values)
         assert done.status == 2, (base, option, done)
@@ -82,7 +77,7 @@ def test_numbers_that_are_none_or_endless_are_refused(run: Run, value: str) -> N
         "predict {small_preset} {u0} {out}.npy --steps 3000",
     ],
 )
-def test_a_full_disk_leaves_nothing(run: Run, words: str, made: Any, u0: Path, folder: Path) -> None:
+def test_a_full_disk_leaves_nothing(run, words, made, u0, folder):
     """No file can be larger than some bytes: the system fails the write that would make it so."""
     resource = pytest.importorskip("resource", reason="needs POSIX limits")
     assert f"{made:song.mid}"  # which may have its place
@@ -107,14 +102,14 @@ def test_a_full_disk_leaves_nothing(run: Run, words: str, made: Any, u0: Path, f
         ({"grid_points": 51}, "grid_points is 101, the data's are 51"),
     ],
 )
-def test_other_data_is_reported(run: Run, tiny: Path, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+def test_other_data_is_reported(run, tiny, tmp_path, changes, message):
     preset = load_preset(tiny)
     training = {**preset.info.training, "data": {**preset.info.training["data"], **changes}}
     save_preset(tmp_path / "other.safetensors", replace(preset.info, training=training), preset.model)
     assert message in run("evaluate", tmp_path / "other.safetensors").failure
 
 
-def test_a_drum_on_a_fine_grid_takes_little_memory(run: Run, out: Path) -> None:
+def test_a_drum_on_a_fine_grid_takes_little_memory(run, out):
     tracemalloc.start()
     done = run("drums simulate thin_bars {out}.npy --key 72 --steps 300 --points 513")
     _, peak_bytes = tracemalloc.get_traced_memory()

@@ -1,7 +1,5 @@
 """Sounds that commands write: render, its recipes, play, and drums."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -45,9 +43,7 @@ MANY = "studio_any_string"
     ],
 )
 @pytest.mark.usefixtures("installed")
-def test_a_file_has_what_was_asked_and_its_recipe_makes_the_same_bytes(
-    run: Run, folder: Path, more: str, subtype: str, rate_hz: int, frames: int | None
-) -> None:
+def test_a_file_has_what_was_asked_and_its_recipe_makes_the_same_bytes(run, folder, more, subtype, rate_hz, frames):
     first, again = folder / "first.wav", folder / "again.wav"
     assert run(f"render good {{folder}}/first.wav {PLUCK} {more}").status == 0
     facts, recipe = soundfile.info(first), recipe_of(first)
@@ -62,7 +58,7 @@ def test_a_file_has_what_was_asked_and_its_recipe_makes_the_same_bytes(
     assert again.read_bytes() == first.read_bytes()
 
 
-def test_the_difference_is_model_minus_truth_and_silence_is_explained(run: Run, folder: Path) -> None:
+def test_the_difference_is_model_minus_truth_and_silence_is_explained(run, folder):
     render, sounds = f"render {{small_preset}} {{out}}.wav {PLUCK} --bits 32f --source", {}
     for source in ("model", "truth", "difference"):
         assert run(f"{render} {source}").status == 0
@@ -81,9 +77,7 @@ def first(run: Run, installed: Path, folder: Path, monkeypatch: pytest.MonkeyPat
     return folder / "first.wav"
 
 
-def test_a_default_name_replaces_nothing(
-    run: Run, first: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_default_name_replaces_nothing(run, first, folder, monkeypatch):
     monkeypatch.chdir(folder)
     assert run("render --recipe first.wav").status == 0
     assert (folder / "good_x0.41_a3.3_4000_model.wav").read_bytes() == first.read_bytes()
@@ -93,7 +87,7 @@ def test_a_default_name_replaces_nothing(
     assert (soundfile.read(flac)[0] == soundfile.read(first)[0]).all() and flac.stat().st_size < first.stat().st_size
 
 
-def test_a_preset_is_found_by_its_content_or_missed(run: Run, first: Path, installed: Path, folder: Path) -> None:
+def test_a_preset_is_found_by_its_content_or_missed(run, first, installed, folder):
     again, own = folder / "again.wav", folder.parent / "own" / "renamed.safetensors"
     own.parent.mkdir()
     (installed / "good.safetensors").rename(own)
@@ -117,9 +111,7 @@ def recipe_of(file: Path) -> dict[str, Any]:
         return recipe
 
 
-def test_no_name_in_a_recipe_is_a_path(
-    run: Run, first: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_name_in_a_recipe_is_a_path(run, first, tmp_path, monkeypatch):
     inside = tmp_path / "deep" / "inside"
     inside.mkdir(parents=True)
     monkeypatch.chdir(inside)
@@ -135,7 +127,7 @@ def test_no_name_in_a_recipe_is_a_path(
         assert Path(plain).name == plain and plain.isprintable() and not plain.startswith(".") and "\\" not in plain
 
 
-def test_escapes_of_a_recipe_do_not_reach_the_terminal(run: Run, first: Path, tmp_path: Path) -> None:
+def test_escapes_of_a_recipe_do_not_reach_the_terminal(run, first, tmp_path):
     evil = "\x1b]0;owned\x07\nseconds  999\r\x9b2J\u202e"
     words = {"preset": evil, "preset_sha256": "0" * 64, "program": evil, "version": evil}
     bad = with_recipe(tmp_path / "bad.wav", recipe_of(first) | words)
@@ -147,7 +139,7 @@ def test_escapes_of_a_recipe_do_not_reach_the_terminal(run: Run, first: Path, tm
     assert run("render --recipe", bad, tmp_path / "again.wav").failure.isprintable()
 
 
-def test_a_recipe_holds_the_string_that_a_model_of_many_played(run: Run, folder: Path, tmp_path: Path) -> None:
+def test_a_recipe_holds_the_string_that_a_model_of_many_played(run, folder, tmp_path):
     """Its file may be gone: the eight parameters are in the recipe, and rate and modes beside them."""
     string, first, again = tmp_path / "mine.toml", folder / "first.wav", folder / "again.wav"
     string.write_bytes(STEEL_G3.read_bytes())
@@ -182,7 +174,7 @@ def play(run: Run, tmp_path: Path) -> Play:
     return played
 
 
-def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time_without_drums(play: Play) -> None:
+def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time_without_drums(play):
     guitar, tone = "--instrument jazz_guitar", midi_bytes(EVENTS)
     model, plain = play(tone, guitar)
     truth, _ = play(tone, f"{guitar} --source truth")
@@ -201,7 +193,7 @@ def song(notes: dict[int, int], velocity: int) -> bytes:
     return data.getvalue()
 
 
-def test_parts_of_a_song_sound_together_as_each_alone_and_softer_where_they_would_clip(run: Run, play: Play) -> None:
+def test_parts_of_a_song_sound_together_as_each_alone_and_softer_where_they_would_clip(run, play):
     parts = {0: (52, "classical_guitar"), 1: (33, "electric_bass"), 9: (40, "concert_toms")}
     alone = [play(song({n: key}, 60), f"--bits 32f --instrument {name}")[0] for n, (key, name) in parts.items()]
     together, done = play(song({n: key for n, (key, _) in parts.items()}, 60), "--bits 32f")
@@ -217,7 +209,7 @@ def test_parts_of_a_song_sound_together_as_each_alone_and_softer_where_they_woul
     assert np.abs(loud).max() == pytest.approx(10 ** (-1 / 20), abs=1e-4) and "made softer by " in done.err
 
 
-def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(play: Play, tmp_path: Path) -> None:
+def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(play, tmp_path):
     instrument = json.loads((INSTRUMENTS / "classical_guitar.json").read_text(encoding="utf-8"))
     (tmp_path / "mine.json").write_text(json.dumps({**instrument, "body": {"name": "a cello", "mix": 0.5}}))
     sound, done = play(midi_bytes(EVENTS), "--instrument {tmp_path}/mine.json")
@@ -225,7 +217,7 @@ def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(play: Play, 
     assert abs(sound).max() > 0.01
 
 
-def test_a_blow_at_another_place_is_another_sound_and_model_and_truth_agree(run: Run, folder: Path) -> None:
+def test_a_blow_at_another_place_is_another_sound_and_model_and_truth_agree(run, folder):
     sounds = []
     for more in ("", "--place 0 0", "--place 0 0 --source truth"):
         assert run(f"drums render thin_bars {{out}}.wav --key 72 --seconds 0.2 {more}").status == 0
@@ -255,7 +247,7 @@ instruments {}.json
 """
 
 
-def test_names_that_are_no_utf_8_are_read_written_and_printed(run: Run, tmp_path: Path) -> None:
+def test_names_that_are_no_utf_8_are_read_written_and_printed(run, tmp_path):
     folder = tmp_path / CAFE
     try:
         folder.mkdir()

@@ -1,7 +1,5 @@
 """train, sweep, results and table: runs, their files, and how they continue."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -9,7 +7,6 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +16,7 @@ import torch
 from engine.compare.relative import RelativeError
 from engine.presets import load_preset, preset_digest
 from engine.schema import read, write
-from tests.app.commands.conftest import CONFIGURATION, Run
+from tests.app.commands.conftest import CONFIGURATION
 from training.cell import Cell, configuration_of
 from training.cli import console
 from training.cli.sweep import Shown
@@ -34,7 +31,7 @@ from training.sweeping.task import Task, Workers
 NAMES = ["nylon_linear_noise_4k_koopman_var_60", "nylon_linear_noise_4k_koopman_60"]
 
 
-def test_runs_are_trained_together_alone_or_shortened_and_never_twice(run: Run, tmp_path: Path, folder: Path) -> None:
+def test_runs_are_trained_together_alone_or_shortened_and_never_twice(run, tmp_path, folder):
     train = f"train {{made:tiny.toml}} --runs {{folder}} --cache {tmp_path / 'cache'}"
     together = run(f"{train} --seeds 2")
     assert (together.status, together.err) == (0, "")
@@ -69,7 +66,7 @@ def test_runs_are_trained_together_alone_or_shortened_and_never_twice(run: Run, 
         assert "no CUDA device can be used here" in run(f"{train} --seed 5 --device cuda").failure
 
 
-def test_a_shortened_cell_is_no_row_of_its_recipe(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shortened_cell_is_no_row_of_its_recipe(run, monkeypatch):
     chosen: list[tuple[str, str]] = []
 
     def begin(runs: Any, *_: Any, **__: Any) -> None:
@@ -123,7 +120,7 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Script:
     return make
 
 
-def test_a_sweep_ends_with_its_rows(run: Run, folder: Path, script: Script) -> None:
+def test_a_sweep_ends_with_its_rows(run, folder, script):
     layouts = script(row_of)
     found = run(f"{SWEEP} --workers 3 --threads 2")
     assert found.status == 0
@@ -140,9 +137,7 @@ def test_a_sweep_ends_with_its_rows(run: Run, folder: Path, script: Script) -> N
     assert again.err == f"learned-strings: plan: 0 of 2 runs to do; rows go to {file}\n"
 
 
-def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(
-    run: Run, script: Script, tmp_path: Path
-) -> None:
+def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(run, script, tmp_path):
     begun: list[str] = []
 
     def outcome(name: str) -> Row | str:
@@ -170,14 +165,14 @@ def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(
 
 
 @pytest.mark.parametrize(("scheme", "warned"), [("tcp", True), ("tls", False)])
-def test_an_open_scheduler_is_warned_of(run: Run, monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool) -> None:
+def test_an_open_scheduler_is_warned_of(run, monkeypatch, scheme, warned):
     monkeypatch.setitem(sys.modules, "distributed", None)
     found = run(f"{SWEEP} --scheduler {scheme}://127.0.0.1:9")
     assert found.status == 1 and ("can run code on its workers" in found.err) == warned
     assert found.err.splitlines()[-1].startswith(f"learned-strings: {scheme}://127.0.0.1:9: a cluster needs Dask")
 
 
-def test_files_of_other_machines_are_merged(run: Run, tmp_path: Path) -> None:
+def test_files_of_other_machines_are_merged(run, tmp_path):
     here, there, elsewhere = (tmp_path / f"{name}.csv" for name in ("here", "there", "elsewhere"))
     add_rows(here, [row_of("a")])
     add_rows(there, [row_of("a", rel_mae=0.25, finished="2026-01-02T00:00:00Z"), row_of("b")])
@@ -198,7 +193,7 @@ def progress_of(seconds: float, seconds_left: float) -> FitProgress:
 ONE, OTHER = (SimpleNamespace(name=name) for name in "ab")
 
 
-def test_the_time_left_follows_from_the_runs_so_far() -> None:
+def test_the_time_left_follows_from_the_runs_so_far():
     ended: list[str] = []
     shown = Shown(lambda what: lambda share, *_: ended.append(what) if share == 1 else None, 5, 2)
     assert shown.summary() == "0 done, 0 running, 5 waiting"
@@ -214,7 +209,7 @@ def test_the_time_left_follows_from_the_runs_so_far() -> None:
     assert ended == ["a", "b"]
 
 
-def test_runs_under_way_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_runs_under_way_are_shown(capsys):
     for every_s in (60.0, 0.0):
         with console.bars(every_s) as begin:
             shown = Shown(begin, 3, 2)
@@ -224,7 +219,7 @@ def test_runs_under_way_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().err == f"learned-strings: a: 25%, {facts}\n"
 
 
-def test_tables_are_printed_written_or_made_again_in_a_document(run: Run, folder: Path) -> None:
+def test_tables_are_printed_written_or_made_again_in_a_document(run, folder):
     results, path, document = (folder / name for name in ("results.csv", "tables.md", "RESULTS.md"))
     facts: dict[str, Any] = {"model": "s5", "string": "linear", "initial": "noise", "rate_hz": 4000, "horizon": 4000}
     for seed in (1, 2):

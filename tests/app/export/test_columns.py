@@ -1,12 +1,9 @@
 """Columns become CSV that any reader takes back, digit for digit; words from files stay words."""
 
-from __future__ import annotations
-
 import csv
 from io import StringIO
 
 import numpy as np
-import pytest
 
 from app.export import columns
 from app.export.columns import Columns, aligned
@@ -16,7 +13,7 @@ def read(made: Columns) -> list[list[str]]:
     return list(csv.reader(StringIO(made.text)))
 
 
-def test_numbers_come_back_exactly_and_hostile_words_are_words() -> None:
+def test_numbers_come_back_exactly_and_hostile_words_are_words():
     random = np.random.default_rng(0)
     numbers = {
         "single": (random.standard_normal(99) * 10.0 ** random.integers(-30, 30, 99)).astype(np.float32),
@@ -36,7 +33,7 @@ def test_numbers_come_back_exactly_and_hostile_words_are_words() -> None:
     assert {row[1] for row in made[1:]} == {""}
 
 
-def test_curves_of_two_rates_share_their_places_and_what_is_too_much_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_curves_of_two_rates_share_their_places_and_what_is_too_much_is_said(monkeypatch):
     fast, slow = np.arange(9) / 8, np.arange(5) / 4
     both = aligned("time (s)", {"fast": (fast, 8 * fast), "slow": (slow, np.arange(5, dtype=np.float32))})
     assert read(both)[1:4] == [["0.0", "0.0", "0.0"], ["0.125", "1.0", ""], ["0.25", "2.0", "1.0"]] and not both.words

@@ -1,7 +1,5 @@
 """A recording's journal: what was played comes back as it was, also from a torn or damaged file."""
 
-from __future__ import annotations
-
 import json
 import random
 from datetime import UTC, datetime
@@ -73,7 +71,7 @@ def written(
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_what_is_written_is_read(tmp_path: Path, seed: int) -> None:
+def test_what_is_written_is_read(tmp_path, seed):
     events = recorded(random.Random(seed), 120)
     meter = Meter(tempo_bpm=90 + seed, metronome=True) if seed % 2 else None
     if meter is not None:  # begun in the count-in, of which notes are left out
@@ -88,7 +86,7 @@ def test_what_is_written_is_read(tmp_path: Path, seed: int) -> None:
     assert (played.source, played.difference_gain_db) == heard
 
 
-def test_cut_at_any_byte_it_gives_the_whole_lines_before(tmp_path: Path) -> None:
+def test_cut_at_any_byte_it_gives_the_whole_lines_before(tmp_path):
     events = recorded(random.Random(3), 12)
     journal = written(tmp_path, events)
     raw, draw = journal.path.read_bytes(), random.Random(4)
@@ -139,7 +137,7 @@ nonsense
 {"end": "x"}"""
 
 
-def test_of_a_damaged_journal_what_stands_before_is_kept(tmp_path: Path) -> None:
+def test_of_a_damaged_journal_what_stands_before_is_kept(tmp_path):
     journal = written(tmp_path, [])
     for line in [*DAMAGED.split("\n"), "\x00\xff", "[" * 100_000]:
         journal.path.write_bytes("\n".join([HEAD, FIRST, ON, line, ON.replace("60", "61"), ""]).encode("latin-1"))
@@ -148,7 +146,7 @@ def test_of_a_damaged_journal_what_stands_before_is_kept(tmp_path: Path) -> None
         assert [each.event for each in played.events if isinstance(each.event, NoteOn)] == [NoteOn(60, 90)], line[:80]
 
 
-def test_what_is_no_journal_is_named(tmp_path: Path) -> None:
+def test_what_is_no_journal_is_named(tmp_path):
     journal = written(tmp_path, [])
     for first in ("", "{}", '{"version": 2}', '{"version": 1, "recorded": "x"}', "RIFF", FIRST):
         journal.path.write_text(f"{first}\n{FIRST}\n{ON}\n")
@@ -156,7 +154,7 @@ def test_what_is_no_journal_is_named(tmp_path: Path) -> None:
             journal.read()
 
 
-def test_one_process_has_a_journal_at_a_time(tmp_path: Path) -> None:
+def test_one_process_has_a_journal_at_a_time(tmp_path):
     journal = Journal.begun(tmp_path, NOW)
     assert left_journals(tmp_path) == []
     journal.close()

@@ -1,7 +1,5 @@
 """Notes as files: what a device is given, whole or not at all, rendered again by their recipes; also of models."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import hashlib
@@ -32,7 +30,7 @@ from app.playing.ahead import AheadSamples
 from app.rendering.motion import ModelMotion
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
-from app.shared.vocabulary import FORMATS, Bits, Source
+from app.shared.vocabulary import FORMATS, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
 from engine.levels import FULL_SCALE_M, MATCHED_S
@@ -61,9 +59,7 @@ def plucked(small_preset: Path) -> NoteSound:
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
-def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
-    plucked: NoteSound, kind: Source
-) -> None:
+def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(plucked, kind):
     preset = plucked.load()
     source = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
     start_m = project(plucked.pluck.displacement(101), 10)
@@ -78,9 +74,7 @@ def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
 
 @pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
 @pytest.mark.parametrize("ear", [Ear((0.37,)), Ear((0.37, 0.6), "velocity")])
-def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
-    plucked: NoteSound, preset: str, kind: Source, ear: Ear, tmp_path: Path
-) -> None:
+def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(plucked, preset, kind, ear, tmp_path):
     sound = replace(OF_COMPILED if preset == "compiled" else plucked, ear=ear)
     loaded = sound.load()
     info = loaded.info
@@ -102,7 +96,7 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
 
 
 @pytest.mark.parametrize("preset", [COMPILED, RENDERED])
-def test_what_is_compared_is_the_string_alone(preset: Path) -> None:
+def test_what_is_compared_is_the_string_alone(preset):
     loaded, ear = load_preset(preset), Ear((0.37, 0.6))
     model = model_program(loaded, 48_000)
     source = ModelSource(loaded) if model.rendered else None
@@ -117,9 +111,7 @@ STEPS = {"16": ("PCM_16", 1.5 / 2**15), "24": ("PCM_24", 0.5 / 2**23), "32f": ("
 
 
 @pytest.mark.parametrize(("ending", "bits"), [name.split() for name in FORMATS])
-def test_a_file_holds_the_sound_to_its_own_step_and_its_recipe(
-    plucked: NoteSound, ending: str, bits: Bits, tmp_path: Path
-) -> None:
+def test_a_file_holds_the_sound_to_its_own_step_and_its_recipe(plucked, ending, bits, tmp_path):
     path = tmp_path / f"a.{ending}"
     settings = WavSettings(bits, fade_out_s=0)
     report = export_sound(plucked, path, settings=settings)
@@ -142,9 +134,7 @@ def test_a_file_holds_the_sound_to_its_own_step_and_its_recipe(
         assert read_recipe(path) == read_recipe(wav)
 
 
-def test_the_gain_of_files_is_one_which_does_not_depend_on_what_is_written_beside(
-    plucked: NoteSound, tmp_path: Path
-) -> None:
+def test_the_gain_of_files_is_one_which_does_not_depend_on_what_is_written_beside(plucked, tmp_path):
     model, truth = (render_sound(plucked, source) for source in VOICES)
     assert (render_sound(plucked, "both") == np.stack([model, truth], axis=1)).all()
     difference, loud = (
@@ -165,9 +155,7 @@ def test_the_gain_of_files_is_one_which_does_not_depend_on_what_is_written_besid
     assert max(np.abs(m).max(), np.abs(t).max()) == pytest.approx(10 ** (-1 / 20), rel=1e-6)
 
 
-def test_where_an_export_fails_what_was_there_stays(
-    plucked: NoteSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_an_export_fails_what_was_there_stays(plucked, tmp_path, monkeypatch):
     path, preset = tmp_path / "a.wav", plucked.load()
     path.write_bytes(b"old")
 
@@ -212,7 +200,7 @@ def test_where_an_export_fails_what_was_there_stays(
         ({"file": "b.flac", "rate_hz": 96_001}, r"b\.flac: FLAC has .*rate of 96001 Hz"),
     ],
 )
-def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, message: str) -> None:
+def test_a_sound_out_of_range_is_refused(plucked, change, message):
     wanted = {
         "points": (0.3,),
         "pickup": "displacement",
@@ -228,9 +216,7 @@ def test_a_sound_out_of_range_is_refused(plucked: NoteSound, change: dict, messa
         form_of(file, WavSettings(**wanted).bits, wanted.get("rate_hz", 4_000))
 
 
-def test_a_decay_ends_where_it_is_so_far_down_and_files_of_one_have_one_length(
-    plucked: NoteSound, tmp_path: Path
-) -> None:
+def test_a_decay_ends_where_it_is_so_far_down_and_files_of_one_have_one_length(plucked, tmp_path):
     rate_hz, rate = 1000, 10.0  # 1/s: 86.9 dB in a second
     signal = np.exp(-rate * np.arange(3000) / rate_hz)[:, None]
     assert sound.decayed_frames(signal, rate_hz, 60.0) / rate_hz == pytest.approx(6.9 / rate, abs=0.06)
@@ -265,7 +251,7 @@ RECIPES = {
 }
 
 
-def test_recipes_of_earlier_files_are_read() -> None:
+def test_recipes_of_earlier_files_are_read():
     """Texts that version 0.2.0 wrote."""
     recipe = SoundRecipe.model_validate_json(RECIPES["string"])
     sound = recipe.sound(MANY, Path("a.wav"))
@@ -289,7 +275,7 @@ def test_recipes_of_earlier_files_are_read() -> None:
         ("..", 20_000.0, 0.0, "Note 20000 Hz soft"),
     ],
 )
-def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitude_mm: float, name: str) -> None:
+def test_a_file_is_named_as_musicians_would(title, first_hz, amplitude_mm, name):
     assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
     heard = HeardNote(OF_COMPILED, "model", False, 20.0, "", name, 4_000)
     assert [heard.file_name(source, ".wav") for source in VOICES] == [f"{name}.wav", f"{name} truth.wav"]
@@ -303,14 +289,14 @@ def write(path: Path, struck: Struck | None, choices: ExportChoices = FIXED, sou
     return soundfile.read(path, dtype="float32", always_2d=True)[0]
 
 
-def test_a_key_can_be_written_without_its_instrument(tmp_path: Path) -> None:
+def test_a_key_can_be_written_without_its_instrument(tmp_path):
     struck = Struck(GUITAR, NoteOn(52, 100))
     alone = FIXED.model_copy(update={"alone": True})
     assert (write(tmp_path / "b.wav", struck, alone) == write(tmp_path / "a.wav", None)).all()
     assert write(tmp_path / "c.wav", struck).shape[1] == 2
 
 
-def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) -> None:
+def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path):
     """It is as loud as those of the key's own model and truth: its gain is that of the whole instrument."""
     electric = find_instrument("Electric guitar, bridge pick-up").instrument
     assert electric.amp.drive_db > 0
@@ -349,9 +335,7 @@ def job(small_preset: Path, tmp_path: Path) -> ComparedExport:
 
 
 @pytest.mark.parametrize("match", [False, True])
-def test_each_model_has_its_files_and_its_level_is_matched_where_it_is_chosen(
-    job: ComparedExport, tmp_path: Path, match: bool
-) -> None:
+def test_each_model_has_its_files_and_its_level_is_matched_where_it_is_chosen(job, tmp_path, match):
     shares: list[float] = []
     job = replace(job, settings=replace(job.settings, level_match=match))
     said = job.run(lambda share, *_: shares.append(share))
@@ -377,9 +361,7 @@ def test_each_model_has_its_files_and_its_level_is_matched_where_it_is_chosen(
         assert first.read_bytes() == again.read_bytes()
 
 
-def test_a_folder_that_is_there_stays_and_what_is_not_whole_is_not_left(
-    job: ComparedExport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_is_there_stays_and_what_is_not_whole_is_not_left(job, tmp_path, monkeypatch):
     def cancel(share: float, *_: object) -> None:
         if share > 0.4:
             raise Cancelled

@@ -1,13 +1,10 @@
 """Sounds become files of the same bytes in blocks of any size, of which memory holds one."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
 import tracemalloc
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +15,6 @@ from app.export import recording
 from app.export.recording import Recording, blocks
 from app.export.wav import LONGEST_TAG_BYTES, NORMALISED_PEAK, WavSettings, faded_out, quantised, write_wav
 from app.rendering.note_sound import NoteSound
-from app.shared.vocabulary import Bits
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 from tests.app.sounds import export_sound
@@ -42,7 +38,7 @@ def samples_of(file: io.BytesIO) -> np.ndarray:
     return soundfile.read(file)[0]
 
 
-def test_a_recording_is_what_was_appended() -> None:
+def test_a_recording_is_what_was_appended():
     samples = np.random.default_rng(0).normal(size=(1000, 2)).astype(np.float32)
     made = Recording(2)
     for part in np.split(samples, [1, 400, 401]):
@@ -57,9 +53,7 @@ def test_a_recording_is_what_was_appended() -> None:
 
 @pytest.mark.parametrize("bits", ["16", "24", "32f"])
 @pytest.mark.parametrize("normalise", [False, True])
-def test_any_blocks_make_the_same_bytes_at_any_time(
-    bits: Bits, normalise: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_any_blocks_make_the_same_bytes_at_any_time(bits, normalise, monkeypatch):
     sound = np.random.default_rng(0).normal(size=(1000, 2)) / 3
     settings = WavSettings(bits, normalise=normalise)
     whole, level = written(sound, settings, {"title": "a"}, [2 * sound])
@@ -71,7 +65,7 @@ def test_any_blocks_make_the_same_bytes_at_any_time(
     assert bool(chunk) == (bits == "32f") and not any(behind[8:12] if chunk else b"")  # its time of writing
 
 
-def test_16_bits_have_dither_of_two_steps_without_offset_and_24_are_rounded_not_floored() -> None:
+def test_16_bits_have_dither_of_two_steps_without_offset_and_24_are_rounded_not_floored():
     steps = quantised(np.zeros(200_000), "16")[0].astype(np.int64) >> 16
     assert set(np.unique(steps)) <= {-1, 0, 1}
     assert abs(steps.mean()) < 0.01
@@ -80,7 +74,7 @@ def test_16_bits_have_dither_of_two_steps_without_offset_and_24_are_rounded_not_
     assert (stored >> 8).tolist() == [0, 0, 1, 0, -1]
 
 
-def test_what_is_beyond_full_scale_is_clipped_and_counted_and_silence_is_not_amplified() -> None:
+def test_what_is_beyond_full_scale_is_clipped_and_counted_and_silence_is_not_amplified():
     samples = np.array([0.0, 1.5, -1.5, -1.0, 0.5])
     file, level = written(samples, WavSettings("24", fade_out_s=0))
     assert level.clipped == 2
@@ -92,7 +86,7 @@ def test_what_is_beyond_full_scale_is_clipped_and_counted_and_silence_is_not_amp
     assert (silent.peak_db, silent.gain_db) == (-math.inf, 0)
 
 
-def test_the_end_fades_to_zero_and_the_rest_is_untouched() -> None:
+def test_the_end_fades_to_zero_and_the_rest_is_untouched():
     faded = faded_out(np.ones(1000), 80)
     assert (faded[:920] == 1).all()
     assert (np.diff(faded[919:]) < 0).all()
@@ -100,7 +94,7 @@ def test_the_end_fades_to_zero_and_the_rest_is_untouched() -> None:
     assert faded_out(np.ones(3), 80)[-1] == pytest.approx(0, abs=1e-12)  # a fade that is longer than the sound
 
 
-def test_normalising_takes_one_gain_for_all_channels_and_companions() -> None:
+def test_normalising_takes_one_gain_for_all_channels_and_companions():
     settings = WavSettings("32f", normalise=True, fade_out_s=0)
     both, _ = written(np.stack([0.2 * SINE, 0.1 * SINE], axis=1), settings)
     alone, _ = written(0.1 * SINE, settings, beside=[0.2 * SINE])
@@ -109,13 +103,13 @@ def test_normalising_takes_one_gain_for_all_channels_and_companions() -> None:
 
 
 @pytest.mark.parametrize("bits", ["16", "32f"])
-def test_tags_survive_up_to_the_longest(bits: Bits) -> None:
+def test_tags_survive_up_to_the_longest(bits):
     tags = {"title": "Saite № 1", "comment": json.dumps("x" * (LONGEST_TAG_BYTES - 2))}
     with soundfile.SoundFile(written(SINE, WavSettings(bits), tags)[0]) as file:
         assert {name: getattr(file, name) for name in tags} == tags
 
 
-def test_what_cannot_be_stored_is_refused() -> None:
+def test_what_cannot_be_stored_is_refused():
     for samples, tags, message in (
         ([], {}, "no samples"),
         ([0.0, np.nan], {}, "not finite"),
@@ -125,7 +119,7 @@ def test_what_cannot_be_stored_is_refused() -> None:
             written(np.array(samples), PLAIN, tags)
 
 
-def test_a_disk_that_becomes_full_is_reported() -> None:
+def test_a_disk_that_becomes_full_is_reported():
     class Full(io.BytesIO):
         def write(self, data: object) -> int:  # type: ignore[override]
             if self.tell() > 1000:
@@ -136,7 +130,7 @@ def test_a_disk_that_becomes_full_is_reported() -> None:
         write_wav(Full(), np.zeros(100_000), RATE_HZ, WavSettings(), {})
 
 
-def test_memory_does_not_grow_with_the_duration(small_preset: Path, tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_duration(small_preset, tmp_path):
     settings = WavSettings("16", 192_000, normalise=True)
     peaks = []
     for seconds in (0.5, 1.0, 3.0):  # the first also pays what is loaded once

@@ -1,7 +1,5 @@
 """The shipped instruments: each can be played over all its keys, at every velocity, as physics and in the app."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 
@@ -42,7 +40,7 @@ def strings_of(instrument: Instrument) -> list[KeyString]:
     return [string for string in found if string is not None]
 
 
-def test_there_are_many_and_none_is_broken() -> None:
+def test_there_are_many_and_none_is_broken():
     assert PROBLEMS == [] and len(ENTRIES) >= 32
     counted = Counter(instrument.category for instrument in INSTRUMENTS)
     assert all(counted[category] >= 5 for category in CATEGORIES), counted
@@ -54,7 +52,7 @@ def test_there_are_many_and_none_is_broken() -> None:
 
 
 @pytest.mark.parametrize("instrument", INSTRUMENTS, ids=lambda instrument: instrument.name)
-def test_every_instrument_can_be_played_over_all_its_keys(instrument: Instrument) -> None:
+def test_every_instrument_can_be_played_over_all_its_keys(instrument):
     macros_stand_where_the_fields_are(instrument)
     soft_strokes_are_heard_on_every_key(instrument)
     if isinstance(instrument.strings, Drums):

@@ -1,7 +1,5 @@
 """An instrument: what it refuses, and what its numbers mean."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any
@@ -61,13 +59,13 @@ REFUSED: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-def test_impossible_values_are_refused_by_name() -> None:
+def test_impossible_values_are_refused_by_name():
     for field, changes in REFUSED:
         with pytest.raises(ValidationError, match=field):
             make_instrument(**changes)
 
 
-def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise() -> None:
+def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise():
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_instrument().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
     whole = make_instrument(strings=strings, macros=macro_of("level_db", -3, 3), pluck={"stops": False})
     assert Instrument.model_validate_json(whole.model_dump_json()) == whole
@@ -81,7 +79,7 @@ def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_i
     assert struck == {"cimbalom", "felt_on_wires", "santur_in_shur"}
 
 
-def test_equal_steps_of_velocity_are_equal_steps_in_db_and_a_curve_bends_the_middle() -> None:
+def test_equal_steps_of_velocity_are_equal_steps_in_db_and_a_curve_bends_the_middle():
     facts = {"shape": "gaussian", "softest_mm": 0.1, "hardest_mm": 2, "width": 0.12, "width_hard": 0.04}
     choices = PluckChoices.model_validate(facts)
     plucks = [choices.pluck(1 + 126 * share) for share in (0, 0.25, 0.5, 0.75, 1)]
@@ -97,7 +95,7 @@ def test_equal_steps_of_velocity_are_equal_steps_in_db_and_a_curve_bends_the_mid
         assert (bent.pluck(64).amplitude_mm > plucks[2].amplitude_mm) == (curve > 0)
 
 
-def test_each_assignable_field_can_be_read_and_changed() -> None:
+def test_each_assignable_field_can_be_read_and_changed():
     first = make_instrument(pickup=Pickup(points=(0.2, 0.3)), level_db=1, technique=Technique(harmonic=2))
     for field in ASSIGNABLE:
         value = first.value(field)
@@ -108,7 +106,7 @@ def test_each_assignable_field_can_be_read_and_changed() -> None:
             first.with_value(field, 1e5)
 
 
-def test_fields_have_the_defaults_and_limits_of_the_table() -> None:
+def test_fields_have_the_defaults_and_limits_of_the_table():
     assert all(id in OF_INSTRUMENTS for id in PLAYED) and len(set(PLAYED)) == len(PLAYED)
     instrument = make_instrument()
     for field, declared in OF_INSTRUMENTS.items():
@@ -136,13 +134,13 @@ def test_fields_have_the_defaults_and_limits_of_the_table() -> None:
         ({"colour": 1}, "string: unknown field 'colour'"),
     ],
 )
-def test_the_engines_values_are_checked_where_they_stand(changes: dict[str, Any], words: str) -> None:
+def test_the_engines_values_are_checked_where_they_stand(changes, words):
     with pytest.raises(ValueError) as caught:
         make_instrument(strings={"kind": "fretted", "string": {**STRING, **changes}})
     assert explained(caught.value).startswith(f"strings.fretted.{words}")
 
 
-def test_a_string_or_drum_is_given_whole() -> None:
+def test_a_string_or_drum_is_given_whole():
     for name in STRING:
         less = {each: value for each, value in STRING.items() if each != name}
         with pytest.raises(ValueError, match=f"{name} must be given; add what is missing"):
@@ -158,7 +156,7 @@ def macro_of_two(one: str, other: str, *ends: float) -> list[dict[str, Any]]:
     ]
 
 
-def test_a_macro_writes_its_targets() -> None:
+def test_a_macro_writes_its_targets():
     first = make_instrument(macros=macro_of_two("knobs.decay", "pluck.position", 0.5, 2.5, 0.4, 0.1))
     turned = first.turned(0, 0.25)
     assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)
@@ -166,7 +164,7 @@ def test_a_macro_writes_its_targets() -> None:
     assert first.turned(0, 7).knobs.decay == pytest.approx(2.5)
 
 
-def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can() -> None:
+def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can():
     macros = macro_of_two("pluck.softest_mm", "pluck.hardest_mm", 0.1, 2.5, 3.0, 1.0)
     instrument = make_instrument(pluck={"softest_mm": 0.1, "hardest_mm": 3.0}, macros=macros)
     for value in (0.0, 0.4, 0.7, 1.0, 0.2):
@@ -174,7 +172,7 @@ def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can() -> None:
         assert instrument.macros[0].value == value and instrument.pluck.softest_mm <= instrument.pluck.hardest_mm
 
 
-def test_a_macro_follows_a_knob_that_it_turns() -> None:
+def test_a_macro_follows_a_knob_that_it_turns():
     guitar = find_instrument("Steel-string acoustic").instrument
     names = [macro.name for macro in guitar.macros]
     room, tone = names.index("Room"), names.index("Tone")

@@ -1,7 +1,5 @@
 """Instruments as files: listed, read, saved, renamed; nothing of a stranger's harms the others."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
@@ -25,7 +23,7 @@ def write(path: Path, facts: object) -> Path:
     return path
 
 
-def test_what_is_saved_is_listed_and_read_again(own: Path) -> None:
+def test_what_is_saved_is_listed_and_read_again(own):
     entry = library.save_instrument(make_instrument(name="Čembalo, 8′", category="keys"))
     assert entry.path == own / "čembalo_8.json" and entry.own
     listed, problems = library.list_instruments()
@@ -34,7 +32,7 @@ def test_what_is_saved_is_listed_and_read_again(own: Path) -> None:
         assert library.find_instrument(name) == entry
 
 
-def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own: Path) -> None:
+def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own):
     library.save_instrument(make_instrument(name="My-Bass"))
     with pytest.raises(library.InstrumentError, match=r"my bass: .* exists already; choose another"):
         library.save_instrument(make_instrument(name="my bass", level_db=3))
@@ -44,7 +42,7 @@ def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own
     assert library.read_instrument(own / "my_bass.json").name == "My-Bass"
 
 
-def test_two_instruments_of_one_name_are_reported_apart(own: Path) -> None:
+def test_two_instruments_of_one_name_are_reported_apart(own):
     library.save_instrument(make_instrument(name="Mine"))
     long = "M" * 60
     for name, file in (("Mine", "mine (copy)"), ("mine", "mine_3"), (long, "long"), (long, "longer")):
@@ -57,7 +55,7 @@ def test_two_instruments_of_one_name_are_reported_apart(own: Path) -> None:
     assert names["longer"] == f"{'M' * 58} 2"
 
 
-def test_a_shipped_instrument_is_neither_overwritten_nor_renamed_and_counts_before_ones_own(own: Path) -> None:
+def test_a_shipped_instrument_is_neither_overwritten_nor_renamed_and_counts_before_ones_own(own):
     shipped = library.list_instruments(library.SHIPPED)[0][0]
     for replace in (None, shipped.path):
         with pytest.raises(library.InstrumentError, match="factory"):
@@ -71,7 +69,7 @@ def test_a_shipped_instrument_is_neither_overwritten_nor_renamed_and_counts_befo
     assert "exists already; rename the file" in problem
 
 
-def test_renaming(own: Path) -> None:
+def test_renaming(own):
     first = library.save_instrument(make_instrument(name="First"))
     library.save_instrument(make_instrument(name="Taken"))
     for name, reported in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
@@ -83,14 +81,14 @@ def test_renaming(own: Path) -> None:
     assert spelt.path == second.path and library.read_instrument(spelt.path).name == "SECOND"
 
 
-def test_a_file_name_is_never_a_path() -> None:
+def test_a_file_name_is_never_a_path():
     for name in ("..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"):
         stem = library.file_stem(name)
         assert stem and Path(stem).name == stem and stem.casefold() not in library.DEVICES
         assert all(c.isalnum() or c == "_" for c in stem)
 
 
-def test_one_bad_file_hides_no_other(own: Path) -> None:
+def test_one_bad_file_hides_no_other(own):
     good = library.save_instrument(make_instrument(name="Good"))
     text, facts = good.path.read_text(), json.loads(good.path.read_text())
     (own / "folder.json").mkdir()
@@ -134,7 +132,7 @@ def test_one_bad_file_hides_no_other(own: Path) -> None:
         ("macros", [5], r"macros\[0\]: must be a table of fields, found 5"),
     ],
 )
-def test_faults_are_named_in_plain_words(own: Path, field: str, value: object, words: str) -> None:
+def test_faults_are_named_in_plain_words(own, field, value, words):
     write(own / "a.json", make_instrument(name="One").model_dump(mode="json") | {field: value})
     with pytest.raises(library.InstrumentError, match=f"a.json: {words}; mend this field"):
         library.read_instrument(own / "a.json")

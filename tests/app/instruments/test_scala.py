@@ -1,13 +1,10 @@
 """Scala's files against an independent reading, hostile text, and generated scales against formulas of each pitch."""
 
-from __future__ import annotations
-
 import math
 import random
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -135,7 +132,7 @@ def held_to(choice: TuningChoice, expected: dict[int, float | None]) -> None:
             assert 1200 * math.log2(tuning.hz(key) / 440) == pytest.approx(cents, abs=1e-5), key
 
 
-def test_random_scales_and_mappings() -> None:
+def test_random_scales_and_mappings():
     for seed in range(60):
         draw = random.Random(seed)
         text, cents = made_scale(draw)
@@ -167,7 +164,7 @@ def keymap(*keys: object, middle: int = 60, reference: int = 69, hz: float = 440
     return "\n".join(str(line) for line in (len(keys), 0, 127, middle, reference, hz, octave, *keys)) + "\n"
 
 
-def test_pitches_of_keys_and_between_them() -> None:
+def test_pitches_of_keys_and_between_them():
     for a4_hz in (415.0, 443.5):
         for note in (-5.0, 0.0, 60.0, 69.0, 69.31, 140.5):
             assert Tuning(TuningChoice(a4_hz=a4_hz)).hz(note) == pytest.approx(a4_hz * 2 ** ((note - 69) / 12), 1e-12)
@@ -183,7 +180,7 @@ def test_pitches_of_keys_and_between_them() -> None:
     assert all(0 < wide.hz(key) < math.inf for key in range(-128, 256))
 
 
-def test_keys_that_a_mapping_leaves_out_are_reported_and_lie_between() -> None:
+def test_keys_that_a_mapping_leaves_out_are_reported_and_lie_between():
     """White keys play the seven notes; black keys are silent."""
     white = keymap(0, "x", 1, "x", 2, 3, "x", 4, "x", 5, "x", 6, octave=7)
     tuned = Tuning(TuningChoice(scale=scale(*JUST), keymap=white))
@@ -214,12 +211,12 @@ def test_keys_that_a_mapping_leaves_out_are_reported_and_lie_between() -> None:
         ("36893488147419103232/36472996377170786403", 19.845),
     ],
 )
-def test_lines_of_the_formats_text(line: str, cents: float) -> None:
+def test_lines_of_the_formats_text(line, cents):
     tuning = Tuning(TuningChoice(scale=f"one\n1\n{line}\n"))
     assert 1200 * math.log2(tuning.hz(70) / tuning.hz(69)) == pytest.approx(cents, abs=1e-3)
 
 
-def test_descriptions_of_any_encoding(tmp_path: Path) -> None:
+def test_descriptions_of_any_encoding(tmp_path):
     path = tmp_path / "a.scl"
     for raw in (b"\xef\xbb\xbfp\xc3\xa9log", b"p\xe9log \x96 d\xe9j\xe0\xa0vu\x85", b"caf\xe9", b""):
         path.write_bytes(raw + b"\r\n 1\r\n 3/2\r\n\x1a")
@@ -233,7 +230,7 @@ NO_PITCHES = (
 )
 
 
-def test_what_is_no_scale_is_one_line_that_names_the_file(tmp_path: Path) -> None:
+def test_what_is_no_scale_is_one_line_that_names_the_file(tmp_path):
     bad = {scale(line): r"a\.scl: scale: " for line in NO_PITCHES}
     bad |= dict.fromkeys(("nothing", scale(*(f"{n}." for n in range(1, 1100)))), r"scale")
     for said, listed in ((7, 12), (12, 7), (7, 6), (10**4000, 7), (3, 0)):
@@ -272,7 +269,7 @@ def test_what_is_no_scale_is_one_line_that_names_the_file(tmp_path: Path) -> Non
         (8, "α", "entry"),
     ],
 )
-def test_a_mapping_names_the_number_that_is_wrong(place: int, line: str, words: str) -> None:
+def test_a_mapping_names_the_number_that_is_wrong(place, line, words):
     lines = ["4", "0", "60", "60", "60", "440.0", "7", "0", "x", "4", "5"]
     TuningChoice(keymap="\n".join(lines))
     lines[place] = line
@@ -299,7 +296,7 @@ RATIOS = {  # as formulas, of which several hold a step or a fifth that is no ra
 
 
 @pytest.mark.parametrize("name", SCALES)
-def test_a_scale_has_the_pitches_of_its_formula_and_tunes_keys_from_c_with_a4_where_it_was(name: str) -> None:
+def test_a_scale_has_the_pitches_of_its_formula_and_tunes_keys_from_c_with_a4_where_it_was(name):
     (formulas,) = (wanted for key, wanted in RATIOS.items() if name.startswith(key))
     ratios = [eval(formula, {"Q": Q, "E": E, "V": V}) for formula in formulas.split()]
     np.testing.assert_allclose(1200 * np.array(parse_scale(SCALES[name]).octaves), 1200 * np.log2(ratios), atol=1e-5)

@@ -1,7 +1,5 @@
 """Notes of a compiled player as its memory has them: what a test looks at without hearing it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from app.player.compiled import InstrumentPlayer

@@ -1,7 +1,5 @@
 """A stage: an instrument that is played without a device, and measures of its sound."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import log2

@@ -1,7 +1,5 @@
 """Bodies of the user's own: taken in whole, found by name, heard, and left out when they are gone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +35,7 @@ def on(instrument: Instrument, name: str, mix: float = 1.0) -> Instrument:
     return instrument.model_copy(update={"body": BodyChoice(name=name, mix=mix)})
 
 
-def test_a_file_becomes_a_body_whole_once_and_by_a_safe_name(tmp_path: Path) -> None:
+def test_a_file_becomes_a_body_whole_once_and_by_a_safe_name(tmp_path):
     assert body_names() == list(BODIES)
     file = late(tmp_path / "My Cello: body (near).WAV")
     name = install_body(file)
@@ -51,7 +49,7 @@ def test_a_file_becomes_a_body_whole_once_and_by_a_safe_name(tmp_path: Path) -> 
     assert list(titles) == body_names() and len(set(titles.values())) == len(titles)
 
 
-def test_names_are_never_paths_and_what_is_no_impulse_response_is_not_taken(tmp_path: Path) -> None:
+def test_names_are_never_paths_and_what_is_no_impulse_response_is_not_taken(tmp_path):
     file = tmp_path / "words.wav"
     file.write_text("no sound")
     with pytest.raises(ImpulseError, match=r"words\.wav"):
@@ -66,7 +64,7 @@ def test_names_are_never_paths_and_what_is_no_impulse_response_is_not_taken(tmp_
             own_impulse(name)
 
 
-def test_it_is_heard_in_a_file_on_both_sides(instrument: Instrument, tmp_path: Path) -> None:
+def test_it_is_heard_in_a_file_on_both_sides(instrument, tmp_path):
     wooden = on(instrument, install_body(late(tmp_path / "late.wav")))
     dry, wet = (render_note(each, PRESET, 57, 90, 1.0, 0.2, RATE_HZ) for each in (instrument, wooden))
     peak = np.abs(dry).max()
@@ -79,9 +77,7 @@ def test_it_is_heard_in_a_file_on_both_sides(instrument: Instrument, tmp_path: P
     ("damaged", "reported"),
     [(False, "test is played without its body: the body late is not here"), (True, "late.wav")],
 )
-def test_one_that_is_gone_is_reported_in_a_line_and_left_out(
-    instrument: Instrument, tmp_path: Path, damaged: bool, reported: str
-) -> None:
+def test_one_that_is_gone_is_reported_in_a_line_and_left_out(instrument, tmp_path, damaged, reported):
     wooden, file = on(instrument, install_body(late(tmp_path / "late.wav"))), own_bodies() / "late.wav"
     assert body_problem(wooden) == "" and effects_of(wooden) is not None
     file.unlink()

@@ -1,7 +1,5 @@
 """Drums are played: by the same events and player as strings, softly and hard, alone and in rolls."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -58,7 +56,7 @@ def drum_of(instrument: Instrument, key: int) -> DrumKey:
 
 
 @pytest.mark.parametrize("key", [36, 50])
-def test_model_and_truth_sound_alike_and_a_pluck_by_hand_strikes_as_its_velocity_says(key: int) -> None:
+def test_model_and_truth_sound_alike_and_a_pluck_by_hand_strikes_as_its_velocity_says(key):
     """A file may ask for a pluck, and a preview of drums may hear what was meant for a string."""
     model, truth = (blow(KIT, key, 127, source) for source in ("model", "truth"))
     assert 0.05 < np.abs(truth).max() < 1 and relative(model, truth) < 1e-7
@@ -81,9 +79,7 @@ def let_all_move(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     ("instrument", "key", "velocity", "apart"),
     [(KIT, 36, 90, 1e-7), (KIT, 49, 90, 1e-7), (with_mallet(HARD), 47, 127, 1e-11)],
 )
-def test_modes_that_rest_are_not_missed(
-    instrument: Instrument, key: int, velocity: int, apart: float, let_all_move: Callable[[], None]
-) -> None:
+def test_modes_that_rest_are_not_missed(instrument, key, velocity, apart, let_all_move):
     """Struck by something small and hard most rest; without their average the error is -96 dB, not -124."""
     resting = blow(without_noise(instrument), key, velocity, seconds=0.6)
     let_all_move()
@@ -93,7 +89,7 @@ def test_modes_that_rest_are_not_missed(
 
 
 @pytest.mark.parametrize("key", [36, 47])
-def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, let_all_move: Callable[[], None]) -> None:
+def test_modes_that_rested_are_heard_where_the_listener_moves(key, let_all_move):
 
     def sound() -> np.ndarray:
         stage = Stage(KIT)
@@ -115,7 +111,7 @@ def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, let_all_
         assert np.abs(10 * np.log10(found[:, 0] / found[:, 1])).max() < 0.2  # modes that rest keep their phase
 
 
-def test_the_kernel_strikes_as_the_engine_does_at_any_place() -> None:
+def test_the_kernel_strikes_as_the_engine_does_at_any_place():
     found = drum_of(KIT, 47)
 
     def speeds(where: tuple[float, float] | None) -> np.ndarray:
@@ -133,7 +129,7 @@ def test_the_kernel_strikes_as_the_engine_does_at_any_place() -> None:
     assert np.isfinite(speeds((2.0, 2.0))).all(), "beyond the rim it is the nearest place"
 
 
-def test_the_pitch_drop_follows_velocity() -> None:
+def test_the_pitch_drop_follows_velocity():
     """At the hardest between published ones of toms: almost 8 %, or 133 cents, and 160 cents (`docs/drums.md`)."""
     found = drum_of(TOM, 47)
     drops = [found.drop_cents(velocity) for velocity in (20, 64, 100, 127)]
@@ -145,9 +141,7 @@ def test_the_pitch_drop_follows_velocity() -> None:
 
 
 @pytest.mark.parametrize(("instrument", "keys", "m"), [(TOM, (43, 55), 0), (TIMPANI, (45, 52), 1)])
-def test_keys_tune_a_drum_by_its_lowest_mode_or_a_kettles_principal_one(
-    instrument: Instrument, keys: tuple[int, int], m: int
-) -> None:
+def test_keys_tune_a_drum_by_its_lowest_mode_or_a_kettles_principal_one(instrument, keys, m):
     modes = [drum_of(instrument, key).modes for key in keys]
     low, high = (each.omega[each.surface.m == m].min() for each in modes)
     assert high / low == pytest.approx(2 ** ((keys[1] - keys[0]) / 12), rel=1e-3)
@@ -161,9 +155,7 @@ STICK_DB, FELT_DB = (-50, -30), (-200, -56)
     [*((KIT, key, STICK_DB) for key in (37, 41, 47, 51)), (KIT, 36, FELT_DB), (TIMPANI, 47, FELT_DB)],
 )
 @pytest.mark.parametrize("velocity", [30, 127])
-def test_a_stick_is_heard_above_5_khz_and_felt_is_dull(
-    instrument: Instrument, key: int, velocity: int, within_db: tuple[int, int]
-) -> None:
+def test_a_stick_is_heard_above_5_khz_and_felt_is_dull(instrument, key, velocity, within_db):
     sound = blow(instrument, key, velocity, seconds=0.05)
     high = sosfilt(butter(8, 5_000, "high", fs=RATE_HZ, output="sos"), sound)
     assert within_db[0] < 10 * np.log10(np.square(high).sum() / np.square(sound).sum()) < within_db[1]
@@ -173,7 +165,7 @@ def noise_of(instrument: Instrument, velocity: int = 100, source: str = "model")
     return blow(instrument, 47, velocity, source) - blow(without_noise(instrument), 47, velocity, source)
 
 
-def test_the_noise_of_a_blow_follows_its_speed_and_is_of_each_source_alone() -> None:
+def test_the_noise_of_a_blow_follows_its_speed_and_is_of_each_source_alone():
     assert isinstance(TOM.strings, Drums)
     drum = TOM.strings.drums[0]
     step_db = 20 * np.log10(drum.hardest_m_s / drum.softest_m_s) * 90 / 126

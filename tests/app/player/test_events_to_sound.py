@@ -4,8 +4,6 @@ A row has an instrument, `name field=value …:`, and a score: events, each with
 `on` and `off` have a key; `v` is a velocity (else 60), `@` a channel, `s` a string.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import log, log10
 from typing import Any
@@ -173,7 +171,7 @@ test edge javari.distance_mm=0: {AGAIN}  | test: {AGAIN}                        
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("one", "other", "bounds"), rows(ALIKE))
-def test_two_ways_to_one_sound(read: Read, one: str, other: str, bounds: str, source: str) -> None:
+def test_two_ways_to_one_sound(read, one, other, bounds, source):
     ((seconds, apart),) = numbers_of(bounds)
     sounds = [play(instrument, seconds, *events, source=source) for instrument, events in map(read, (one, other))]
     assert np.abs(sounds[1]).max() > 1e-3
@@ -212,7 +210,7 @@ sitar: on 72 v100              | 1e-6
 
 
 @pytest.mark.parametrize(("played", "apart"), rows(AGREE))
-def test_model_and_truth_agree(read: Read, played: str, apart: str) -> None:
+def test_model_and_truth_agree(read, played, apart):
     instrument, events = read(played)
     model, truth = (play(instrument, events[-1][0] + 0.5, *events, source=source) for source in SOURCES)
     assert np.isfinite(model).all() and np.abs(truth).max() > 1e-3
@@ -242,7 +240,7 @@ guitar mode=poly: portamento 64, slide-time {HALF_S}, legato 64, on 45, .4 on 50
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("played", "heard"), rows(PITCHES))
-def test_pitches(read: Read, played: str, heard: str, source: str) -> None:
+def test_pitches(read, played, heard, source):
     instrument, events = read(played)
     windows = numbers_of(heard)
     sound = play(instrument, windows[-1][1] + 0.05, *events, source=source)
@@ -276,7 +274,7 @@ test: {PULLED_ON}                                       | .9 1 -300 -20
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize(("played", "heard"), rows(LOUDER))
-def test_levels(read: Read, played: str, heard: str, source: str) -> None:
+def test_levels(read, played, heard, source):
     windows = numbers_of(heard)
     instrument, events = read(played)
     sound, alone = (
@@ -458,7 +456,7 @@ def check(text: str, stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("score", SCORES.strip().split("\n\n"), ids=lambda score: score.strip().split("\n")[0])
-def test_hands(read: Read, score: str) -> None:
+def test_hands(read, score):
     title, *lines = score.strip().split("\n")
     stage = Stage(read(title.split(":")[0])[0])
     for line in lines:
@@ -497,7 +495,7 @@ test: tremolo 64, on 45, 24000 reset 0                               | 48000 | {
 
 @pytest.mark.parametrize("block", [64, 4_096])
 @pytest.mark.parametrize(("played", "frames", "begun"), rows(STROKES))
-def test_strokes_begin_at_their_frames(read: Read, played: str, frames: str, begun: str, block: int) -> None:
+def test_strokes_begin_at_their_frames(read, played, frames, begun, block):
     instrument, events = read(played)
     stage = Stage(instrument)
     stage.run([(round(frame), event) for frame, event in events], int(frames), block)

@@ -6,8 +6,6 @@ WITH_TECHNIQUES are of the compiled player. The instruments are there as they we
 voiced otherwise.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Sequence
@@ -150,7 +148,7 @@ WITH_TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
 
 @pytest.mark.parametrize("number", range(len(INSTRUMENTS)), ids=[name for name, _ in INSTRUMENTS])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_random_events_sound_as_they_did(shipped: dict[str, Instrument], number: int, seed: int) -> None:
+def test_random_events_sound_as_they_did(shipped, number, seed):
     name, parts = INSTRUMENTS[number]
     instrument = changed(shipped[name], **parts)
     assert compared(f"{number} {name} {seed}", instrument, drawn(instrument, shipped["kora"], seed)) < CLOSE
@@ -158,9 +156,7 @@ def test_random_events_sound_as_they_did(shipped: dict[str, Instrument], number:
 
 @pytest.mark.parametrize(("name", "parts"), WITH_TECHNIQUES, ids=[name for name, _ in WITH_TECHNIQUES])
 @pytest.mark.parametrize(("seed", "gains"), [(1, GAINS), (2, {"model": 1.0}), (3, {"truth": 1.0})])
-def test_techniques_sound_as_they_did(
-    shipped: dict[str, Instrument], name: str, parts: dict[str, Any], seed: int, gains: Gains
-) -> None:
+def test_techniques_sound_as_they_did(shipped, name, parts, seed, gains):
     instrument = changed(shipped[name], **parts)
     other = instrument if isinstance(instrument.strings, Drums) else shipped["kora"]
     played = drawn(instrument, other, seed, (*CONTROLLERS, *HANDS))
@@ -169,9 +165,7 @@ def test_techniques_sound_as_they_did(
 
 @pytest.mark.parametrize(("name", "kind"), [("classical_guitar", "displacement"), ("fretless_bass", "velocity")])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_string_learned_from_a_recording_has_its_own_modes(
-    shipped: dict[str, Instrument], name: str, kind: str, seed: int
-) -> None:
+def test_a_string_learned_from_a_recording_has_its_own_modes(shipped, name, kind, seed):
     own = replace(recorded(), smooth_hz=(200.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8), pitch_hz=196.0)
     learned = replace(PRESET, info=replace(PRESET.info, recorded=own))
     pickup = Pickup(points=shipped[name].pickup.points, kind=kind)
@@ -180,7 +174,7 @@ def test_a_string_learned_from_a_recording_has_its_own_modes(
     assert compared(f"recorded {name} {seed}", instrument, played, preset=learned) < CLOSE
 
 
-def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument]) -> None:
+def test_cancel_leaves_what_has_begun(shipped):
     stage = Stage(shipped["cimbalom"], gains=GAINS)
     for frame, key, velocity in ((0, 50, 90), (200, 57, 90), (5000, 50, 120), (5003, 57, 120), (6000, 62, 120)):
         stage.player.handle(NoteOn(key, velocity), frame)
@@ -189,7 +183,7 @@ def test_cancel_leaves_what_has_begun(shipped: dict[str, Instrument]) -> None:
     assert off("cancel", np.concatenate([first, stage.run((), 150 * QUANTUM)])) < CLOSE
 
 
-def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[str, Instrument]) -> None:
+def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped):
     instrument = changed(shipped["damped_harp"], mod_wheel="knobs.tension")
     draw, burst = np.random.default_rng(3), list[tuple[int, Event]]()
     for number in range(500):
@@ -205,6 +199,6 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[s
     assert compared("burst", instrument, released_once(burst), 100) < CLOSE
 
 
-def test_the_oldest_make_room(shipped: dict[str, Instrument]) -> None:
+def test_the_oldest_make_room(shipped):
     played = [(1 + 480 * number, NoteOn(30 + 3 * number, 90)) for number in range(12)]
     assert compared("oldest", shipped["concert_harp"], played, 200, most=5) < CLOSE

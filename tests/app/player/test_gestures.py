@@ -1,7 +1,5 @@
 """Gestures measured on rendered sound, against closed forms: hammers, touches, mutes, vibrato, courses, clicks."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -32,7 +30,7 @@ HAMMER = {"shape": "raised_cosine", "width": 0.1, "width_hard": 0.1, "strikes": 
 LENGTH_M = STEEL.length_m * STEEL.pitch_hz / hz_of(KEY)  # of the key's string, about
 
 
-def test_a_hammer_starts_the_string_from_rest_with_speeds(instrument: Instrument) -> None:
+def test_a_hammer_starts_the_string_from_rest_with_speeds(instrument):
     """Against modes in closed form, of a blow so soft that the string is linear."""
     blow = {**HAMMER, "softest_mm": 1e-3, "hardest_mm": 1e-3, "release_ms": 2.0, "release_hard_ms": 2.0}
     heard = changed(instrument, pluck=blow, pickup=Pickup(points=(0.37,)))
@@ -66,9 +64,7 @@ def bursts_db(sound: Sound, begin_s: float) -> Sound:
 @SOURCES
 @pytest.mark.parametrize("kind", ["displacement", "velocity"])
 @pytest.mark.parametrize("second", [127, 30])
-def test_a_string_that_is_stopped_by_the_next_pluck_makes_no_click(
-    instrument: Instrument, kind: str, second: int, source: str
-) -> None:
+def test_a_string_that_is_stopped_by_the_next_pluck_makes_no_click(instrument, kind, second, source):
     heard = changed(instrument, pickup=Pickup(points=(0.3,), kind=kind))
     one, other = (0.0, NoteOn(45, 127)), (0.4, NoteOn(45, second))
     alone, fresh, both = (play(heard, 0.5, *each, source=source) for each in ((one,), (other,), (one, other)))
@@ -81,7 +77,7 @@ def test_a_string_that_is_stopped_by_the_next_pluck_makes_no_click(
 
 
 @SOURCES
-def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(instrument: Instrument, source: str) -> None:
+def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(instrument, source):
     soft, pressed = (0.0, NoteOn(KEY, 10)), (0.0, ControlChange(SOFT, 64))
     plain, muted = (play(instrument, 0.6, *each, source=source) for each in ((soft,), (pressed, soft)))
     for number in (1, 2, 4):
@@ -96,7 +92,7 @@ def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(instrument: Instrume
 
 @SOURCES
 @pytest.mark.parametrize("bend_by", ["tension", "length"])
-def test_vibrato_is_as_wide_and_as_quick_as_it_says(instrument: Instrument, bend_by: str, source: str) -> None:
+def test_vibrato_is_as_wide_and_as_quick_as_it_says(instrument, bend_by, source):
     wheeled = changed(instrument, mod_wheel="technique.vibrato_cents", bend_by=bend_by)
     sound = play(wheeled, 2.0, (0.0, ControlChange(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 20)), source=source)
     near = scipy.signal.butter(2, [0.7 * hz_of(KEY), 1.4 * hz_of(KEY)], "bandpass", fs=RATE_HZ, output="sos")
@@ -108,7 +104,7 @@ def test_vibrato_is_as_wide_and_as_quick_as_it_says(instrument: Instrument, bend
     assert np.count_nonzero(np.diff(np.sign(found - found.mean())) > 0) == pytest.approx(5.5, abs=1)
 
 
-def test_strings_of_a_course_sound_one_after_the_other_and_are_one_note(instrument: Instrument) -> None:
+def test_strings_of_a_course_sound_one_after_the_other_and_are_one_note(instrument):
     apart = changed(instrument, course=Course(strings=2, apart_ms=25))
     sound, one = (play(each, 0.3, (0.0, NoteOn(KEY, 90))) for each in (apart, instrument))
     late = round(0.025 * RATE_HZ)
@@ -119,7 +115,7 @@ def test_strings_of_a_course_sound_one_after_the_other_and_are_one_note(instrume
     assert [each.kind for each in stage.reports] == [of.BEGAN, of.ENDED] and seen(stage.player) == []
 
 
-def test_low_courses_of_a_set_have_octave_strings(guitar: Instrument) -> None:
+def test_low_courses_of_a_set_have_octave_strings(guitar):
     stage = Stage(changed(guitar, course=Course(strings=2, octaves=4)))
     stage.play(NoteOn(41, 60), NoteOn(66, 60))
     notes = seen(stage.player)
@@ -135,7 +131,7 @@ def picked_up(instrument: Instrument, point: float, velocity: int, source: str, 
 
 
 @SOURCES
-def test_an_aperture_averages_over_its_length(instrument: Instrument, source: str) -> None:
+def test_an_aperture_averages_over_its_length(instrument, source):
     narrow, wide = (picked_up(instrument, 0.13, 20, source, aperture_mm=each) for each in (0.0, 60.0))
     ratios = [partial(wide, 0.05, n * hz_of(KEY)) / partial(narrow, 0.05, n * hz_of(KEY)) for n in (1, 2, 3, 4)]
     expected = np.sinc(np.arange(1, 5) * 0.03 / string_of(instrument, KEY).parameters.length_m)
@@ -143,7 +139,7 @@ def test_an_aperture_averages_over_its_length(instrument: Instrument, source: st
 
 
 @SOURCES
-def test_flux_that_grows_faster_near_the_pick_up_adds_harmonics(instrument: Instrument, source: str) -> None:
+def test_flux_that_grows_faster_near_the_pick_up_adds_harmonics(instrument, source):
     """A node of the second partial hears it by the curve alone: half of x/δ, as of exp(x/δ) differentiated."""
     linear, curved = (picked_up(instrument, 0.5, 60, source, flux_mm=each) for each in (0.0, 8.0))
     assert partial(curved, 0.2, 2 * hz_of(KEY)) > 20 * partial(linear, 0.2, 2 * hz_of(KEY))

@@ -4,8 +4,6 @@ The generator writes what Standard MIDI Files 1.0 allows, and knows which messag
 A second kind of file has what other programs write beside it.
 """
 
-from __future__ import annotations
-
 import random
 import shlex
 from dataclasses import dataclass, field
@@ -181,14 +179,14 @@ def held_to(file: bytes, expected: Timed) -> None:
 
 
 @pytest.mark.parametrize("loose", [False, True])
-def test_random_files_are_read_as_they_were_meant(loose: bool) -> None:
+def test_random_files_are_read_as_they_were_meant(loose):
     for seed in range(FILES):
         draw = random.Random(f"{loose}:{seed}")
         song = written(draw, loose)
         held_to((loose_file if loose else strict_file)(song, draw), song.expected)
 
 
-def test_times_of_messages_and_values_above_127() -> None:
+def test_times_of_messages_and_values_above_127():
     tempos = [b"\0\xff\x51\x03" + tempo.to_bytes(3, "big") for tempo in (1, 1_000_000, 0)]
     note = (0x90, 60, 64)
     held_to(one_track(*tempos, b"\x60\x90\x3c\x40"), [(Fraction(1), note)])  # 0 is none; of several the last counts
@@ -221,7 +219,7 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "song.mid"
 
 
-def test_what_is_written_is_read_again_also_by_another_program(file: Path, instrument: Instrument) -> None:
+def test_what_is_written_is_read_again_also_by_another_program(file, instrument):
     """Without controllers long after the last note, which are no music."""
     late = (TimedEvent(600.0, ControlChange(64, 0)), TimedEvent(5_000.0, Bend(0.0)))
     file.write_bytes(midi_bytes([*PLAYED, *late]))
@@ -249,7 +247,7 @@ def test_what_is_written_is_read_again_also_by_another_program(file: Path, instr
         ((0xB0, 121, 127), ControlChange(121, 0)),  # others are the program's own
     ],
 )
-def test_messages_are_events_or_nothing(message: tuple[int, ...], event: Event | None) -> None:
+def test_messages_are_events_or_nothing(message, event):
     assert event_of(message) == event
 
 
@@ -259,7 +257,7 @@ WIDE = NARROW.model_copy(update={"bend_semitones": 12.5})
 ANOTHER = WIDE.model_copy(update={"name": "another", "bend_semitones": 5.0})
 
 
-def test_a_recording_has_the_range_of_bends_of_each_channel_and_lets_go_of_them(file: Path) -> None:
+def test_a_recording_has_the_range_of_bends_of_each_channel_and_lets_go_of_them(file):
     first, two = TimedEvent(0.0, NoteOn(50, 90, 0)), TimedEvent(0.1, NoteOn(52, 90, 3))
     own_range = [TimedEvent(0.1, event) for event in bend_range(24, 1)]
     turned = [TimedEvent(0.2, InstrumentTurned(WIDE)), TimedEvent(0.3, InstrumentTurned(ANOTHER))]
@@ -315,13 +313,7 @@ NO_DRUMS = "song.mid is played without its drums (channel 10)"
         ),
     ],
 )
-def test_a_song_is_its_notes_and_what_is_left_out(
-    file: Path,
-    notes: list[tuple[int, int]],
-    instrument: Instrument | None,
-    kept: list[tuple[int, int]],
-    left_out: str,
-) -> None:
+def test_a_song_is_its_notes_and_what_is_left_out(file, notes, instrument, kept, left_out):
     timed: list[TimedEvent] = []
     for place, (key, channel) in enumerate(notes):
         timed += [TimedEvent(0.5 * place, each) for each in (NoteOn(key, 90, channel), ControlChange(64, 9, channel))]
@@ -331,7 +323,7 @@ def test_a_song_is_its_notes_and_what_is_left_out(
     assert channels_in(each.event for each in found.events) == {channel for _, channel in kept}
 
 
-def test_what_a_song_is_played_without_is_reported_once_with_a_command_that_quotes_its_name(tmp_path: Path) -> None:
+def test_what_a_song_is_played_without_is_reported_once_with_a_command_that_quotes_its_name(tmp_path):
     file = tmp_path / 'a"$(b);c.mid'
     for pressure in (b"\0\xd0\x40", b"\0\xa0\x3c\x40"):
         file.write_bytes(one_track(pressure, ON))
@@ -355,7 +347,7 @@ def on(key: int, channel: int = 0, ticks: int = 0) -> bytes:
     return bytes((ticks, 0x90 + channel, key, 64))
 
 
-def test_programs_choose_the_factory_instrument_of_each_channel(file: Path) -> None:
+def test_programs_choose_the_factory_instrument_of_each_channel(file):
     assert {len(files) for files in FAMILIES.values()} == {8} and len(FAMILIES) == 16
     assert {name for files in FAMILIES.values() for name in files} <= {"", *(path.stem for path in SHIPPED.iterdir())}
     first = (program(25), program(33, 1), on(60), on(48, 1), on(64, 3), on(38, 9), on(80, 9), b"\0\xb0\x5b\x40")
@@ -408,7 +400,7 @@ def test_programs_choose_the_factory_instrument_of_each_channel(file: Path) -> N
         (None, "not an ordinary file; give another MIDI file"),
     ],
 )
-def test_a_file_that_cannot_be_played_is_named(file: Path, raw: bytes | None, reported: str) -> None:
+def test_a_file_that_cannot_be_played_is_named(file, raw, reported):
     if raw is None:
         file.mkdir()
     elif raw:
@@ -418,6 +410,6 @@ def test_a_file_that_cannot_be_played_is_named(file: Path, raw: bytes | None, re
     assert str(file) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_file_of_too_many_messages_is_refused() -> None:
+def test_a_file_of_too_many_messages_is_refused():
     with pytest.raises(NotMidi, match=r"more than [0-9,]+ m"):
         read_messages(one_track(*[ON] * (MOST + 1)), MOST)

@@ -1,8 +1,5 @@
 """How loud instruments are: keys, chords and drums; and the noise of contact, which is never compared."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,9 +41,7 @@ def energy_db(sound: Sound) -> float:
 
 @pytest.mark.parametrize("kind", CONTACTS)
 @pytest.mark.parametrize(("level", "begins_s"), [("onset_db", 0.0), ("release_db", RELEASED_S)])
-def test_a_noise_has_its_energy_and_begins_with_its_contact(
-    instrument: Instrument, kind: str, level: str, begins_s: float
-) -> None:
+def test_a_noise_has_its_energy_and_begins_with_its_contact(instrument, kind, level, begins_s):
     noise = noise_of(instrument, ON, OFF, kind=kind, **{level: -6.0})
     assert energy_db(noise) == pytest.approx(-6.0, abs=2.5)  # bursts are random
     begin = round(begins_s * RATE_HZ)
@@ -55,9 +50,7 @@ def test_a_noise_has_its_energy_and_begins_with_its_contact(
 
 
 @pytest.mark.parametrize(("kind", "follows"), [("nail", 1.0), ("quill", 0.0)])
-def test_a_harder_stroke_is_noisier_and_brighter_but_a_quill_is_not(
-    instrument: Instrument, kind: str, follows: float
-) -> None:
+def test_a_harder_stroke_is_noisier_and_brighter_but_a_quill_is_not(instrument, kind, follows):
     ratio_db = 20 * np.log10(instrument.pluck.pluck(110).amplitude_mm / instrument.pluck.pluck(50).amplitude_mm)
     noises = [noise_of(instrument, (0.0, NoteOn(KEY, v)), kind=kind, onset_db=0.0) for v in (50, 110)]
     assert energy_db(noises[1]) - energy_db(noises[0]) == pytest.approx(follows * ratio_db, abs=1.0)
@@ -88,9 +81,7 @@ def moved(velocity: int) -> tuple[Timed, ...]:
         ("finger", (ON, (0.2, NoteOn(KEY, 20)), OFF, OFF), ((0.2, NoteOn(KEY, 20)), OFF), (-0.5, 0.5)),
     ],
 )
-def test_a_release_is_as_loud_as_what_it_lands_on(
-    instrument: Instrument, kind: str, one: Sequence[Timed], other: Sequence[Timed], apart: tuple[float, float]
-) -> None:
+def test_a_release_is_as_loud_as_what_it_lands_on(instrument, kind, one, other, apart):
     found = [
         energy_db(noise_of(instrument, *each, seconds=each[-1][0] + 0.4, kind=kind, release_db=-6.0))
         for each in (one, other)
@@ -98,9 +89,7 @@ def test_a_release_is_as_loud_as_what_it_lands_on(
     assert apart[0] <= found[0] - found[1] <= apart[1]
 
 
-def test_there_is_hardly_noise_on_a_string_at_rest_and_none_after_a_stop_or_of_strings_that_are_let_ring(
-    instrument: Instrument,
-) -> None:
+def test_there_is_hardly_noise_on_a_string_at_rest_and_none_after_a_stop_or_of_strings_that_are_let_ring(instrument):
     string = replace(STEEL, damping_d1_kg_m_s=400 * STEEL.damping_d1_kg_m_s)
     dull, tick = changed(instrument, strings=Fretted(string=string)), {"kind": "finger", "release_db": 6.0}
     at_once, late = (energy_db(noise_of(dull, *struck(127, time_s), **tick)) for time_s in (0.01, 0.4))
@@ -111,7 +100,7 @@ def test_there_is_hardly_noise_on_a_string_at_rest_and_none_after_a_stop_or_of_s
     assert np.abs(noise[:400]).max() > 0.01 and not noise[round(0.04 * RATE_HZ) :].any()
 
 
-def test_comparisons_are_without_noise(instrument: Instrument) -> None:
+def test_comparisons_are_without_noise(instrument):
     model, truth, difference = (
         noise_of(instrument, ON, OFF, source=source, kind="plectrum", onset_db=6.0, release_db=6.0)
         for source in ("model", "truth", "difference")
@@ -121,9 +110,7 @@ def test_comparisons_are_without_noise(instrument: Instrument) -> None:
 
 
 @pytest.mark.parametrize(("variation", "alike"), [(0.0, True), (1e-9, False)])
-def test_the_same_strokes_have_the_same_noise_and_others_another(
-    instrument: Instrument, variation: float, alike: bool
-) -> None:
+def test_the_same_strokes_have_the_same_noise_and_others_another(instrument, variation, alike):
     sounds, struck_twice = [], [(frame, NoteOn(KEY, 100)) for frame in (0, 4_800)]
     for onset_db in (0.0, -60.0):
         varied = changed(instrument, pluck={"variation": variation}, noise=Noise(kind="nail", onset_db=onset_db))
@@ -137,7 +124,7 @@ def test_the_same_strokes_have_the_same_noise_and_others_another(
 RELEASED = [entry.instrument for entry in list_instruments(SHIPPED)[0] if entry.instrument.noise.release_db > -60]
 
 
-def test_no_instrument_releases_louder_than_it_plays() -> None:
+def test_no_instrument_releases_louder_than_it_plays():
     for instrument in RELEASED:
         dry, key = instrument.with_value("room.mix", 0.0), sum(instrument.range) // 2
         for velocity in (10, 127):
@@ -149,7 +136,7 @@ def test_no_instrument_releases_louder_than_it_plays() -> None:
             assert 10 * np.log10(tick / loudest) < -5.0, instrument.name
 
 
-def test_many_strokes_at_once_keep_within_the_places_of_noises(instrument: Instrument) -> None:
+def test_many_strokes_at_once_keep_within_the_places_of_noises(instrument):
     stage = Stage(changed(instrument, noise=Noise(onset_db=0.0)), most=96)
     for key in range(30, 30 + of.MOST_NOISES + 8):
         stage.player.handle(NoteOn(key, 100))
@@ -157,7 +144,7 @@ def test_many_strokes_at_once_keep_within_the_places_of_noises(instrument: Instr
     assert np.all(stage.player.compiled.record["noises"]["left"] >= 0)
 
 
-def test_a_solo_of_one_partial_is_without_noise(instrument: Instrument) -> None:
+def test_a_solo_of_one_partial_is_without_noise(instrument):
     sounds = []
     for each in (changed(instrument, noise=Noise(onset_db=6.0)), instrument):
         stage = Stage(each)
@@ -187,14 +174,14 @@ def peak_db(instrument: Instrument, keys: tuple[int, ...], apart_s: float) -> fl
     return 20 * float(np.log10(max(np.abs(block).max() for block in blocks)))
 
 
-def test_six_strummed_keys_of_a_guitar_peak_at_nine_db() -> None:
+def test_six_strummed_keys_of_a_guitar_peak_at_nine_db():
     guitar = find_instrument("Classical guitar").instrument
     strummed = [peak_db(guitar, E_MAJOR, apart_s) for apart_s in (0.005, 0.01, 0.02, 0.04)]
     assert np.mean(strummed) == pytest.approx(-9, abs=1) and max(strummed) < -6.5
     assert np.mean([peak_db(guitar, (key,), STRUM_S) for key in E_MAJOR]) == pytest.approx(-18, abs=1)
 
 
-def test_no_key_peaks_much_above_the_highest_peak_and_six_that_are_strummed_stay_below_the_limiter() -> None:
+def test_no_key_peaks_much_above_the_highest_peak_and_six_that_are_strummed_stay_below_the_limiter():
     """Peaks of five keys are estimated; at others, and through bodies, one may be 2.5 dB higher."""
     for instrument in INSTRUMENTS:
         low, high = instrument.range
@@ -205,7 +192,7 @@ def test_no_key_peaks_much_above_the_highest_peak_and_six_that_are_strummed_stay
 
 
 @pytest.mark.parametrize("name", ["Classical guitar", "Electric bass", "Cimbalom", "Falling nylon"])
-def test_keys_are_equally_loud_as_they_sound(name: str) -> None:
+def test_keys_are_equally_loud_as_they_sound(name):
     """Without what keys are not made equally loud by: body, room, amplifier and noise."""
     instrument = find_instrument(name).instrument.with_values(
         {"body.mix": 0.0, "room.mix": 0.0, "noise.onset_db": -60.0}
@@ -221,7 +208,7 @@ def test_keys_are_equally_loud_as_they_sound(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["Timpani", "Thin bars"])
-def test_drums_are_as_loud_as_strings_unless_they_would_peak_too_high(name: str) -> None:
+def test_drums_are_as_loud_as_strings_unless_they_would_peak_too_high(name):
     instrument = find_instrument(name).instrument
     low, high = instrument.range
     for key in (low + 2, (low + high) // 2, high - 2):

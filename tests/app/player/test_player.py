@@ -1,11 +1,8 @@
 """The player itself: more events than fit, threads, other players, knobs, plucks by hand, and what it reports."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +23,7 @@ from engine import bounds
 from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
-from engine.pluck import SHAPES, Pluck, Shape
+from engine.pluck import SHAPES, Pluck
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
 from engine.values.effects import Room
@@ -47,7 +44,7 @@ def stage() -> Stage:
     return Stage(shipped("concert_harp"))
 
 
-def test_more_notes_than_there_are_places_all_begin() -> None:
+def test_more_notes_than_there_are_places_all_begin():
     stage = Stage(shipped("concert_harp", mode="mpe"))
     given = [stage.player.handle(NoteOn(30 + 20 * (number % 3), 80, number % 16)) for number in range(300)]
     assert np.isfinite(stage.run((), 40 * QUANTUM)).all()
@@ -55,7 +52,7 @@ def test_more_notes_than_there_are_places_all_begin() -> None:
     assert begun == given[-len(begun) :] and len(begun) > 200 and len(stage.player.compiled.ringing()) <= 40
 
 
-def test_threads_may_give_more_events_than_the_ring_holds_while_the_mixer_plays(stage: Stage) -> None:
+def test_threads_may_give_more_events_than_the_ring_holds_while_the_mixer_plays(stage):
     count, compiled = of.EVENTS, stage.player.compiled
 
     def give(channel: int) -> None:
@@ -74,7 +71,7 @@ def test_threads_may_give_more_events_than_the_ring_holds_while_the_mixer_plays(
     assert int(compiled.record["taken"]) == 4 * count + 1
 
 
-def test_tables_are_freed_when_the_kernel_has_left_them(stage: Stage) -> None:
+def test_tables_are_freed_when_the_kernel_has_left_them(stage):
     tables = []
     for number in range(20):
         stage.take(stage.player.instrument.with_value("knobs.decay", 1 + number / 100))
@@ -84,7 +81,7 @@ def test_tables_are_freed_when_the_kernel_has_left_them(stage: Stage) -> None:
     assert sum(table() is not None for table in tables) <= 2
 
 
-def test_a_single_note_can_be_released_and_its_events_cancelled(stage: Stage) -> None:
+def test_a_single_note_can_be_released_and_its_events_cancelled(stage):
     player = stage.player
     one, other = (player.handle(NoteOn(key, 90)) for key in (50, 57))
     stage.run((), 10 * QUANTUM)
@@ -99,7 +96,7 @@ def test_a_single_note_can_be_released_and_its_events_cancelled(stage: Stage) ->
     assert {each.key for each in player.compiled.ringing()} == {57, 60} and later in [each.id for each in stage.begun]
 
 
-def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage: Stage) -> None:
+def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage):
     stage.run([(1, NoteOn(50, 90))], 20 * QUANTUM)
     others = [InstrumentPlayer(shipped("koto"), PRESET, RATE_HZ, {"model": 1.0}) for _ in range(2)]
     stage.mixer.set_player(others[0].compiled)
@@ -114,7 +111,7 @@ def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage: Stage) -> 
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_players_one_after_the_other_add_up(instrument: Instrument, source: str) -> None:
+def test_players_one_after_the_other_add_up(instrument, source):
     """Of courses, whose strokes have the same numbers in both."""
     moving = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.02, second_conductance_s_kg=0.004)
     course = changed(instrument, polarisations=moving, course={"strings": 2, "bridge": 1.0, "cents": 2})
@@ -134,7 +131,7 @@ def test_players_one_after_the_other_add_up(instrument: Instrument, source: str)
 
 
 @pytest.mark.parametrize("name", ["brass_strung_harp", "electric_guitar_bridge_pick_up", "tanpura_drone"])
-def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(name: str) -> None:
+def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(name):
     """A string of the Lab neither sounds through an instrument that rings nor moves its other strings."""
     instrument = read_instrument(INSTRUMENTS / f"{name}.json")
     strangers = np.random.default_rng(0).uniform(-0.5, 0.5, (RATE_HZ // 4, 2)).astype(np.float32)
@@ -155,7 +152,7 @@ def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["koto", "timpani"])
-def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(name: str) -> None:
+def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(name):
     instrument, sounds = read_instrument(INSTRUMENTS / f"{name}.json"), {}
     event = NoteOn(sum(instrument.range) // 2, 100)
     for compared in (False, True):
@@ -172,7 +169,7 @@ def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(nam
     np.testing.assert_array_equal(sounds[False], sounds[True])
 
 
-def test_reports_say_what_was_plucked() -> None:
+def test_reports_say_what_was_plucked():
     instrument = shipped("fretless_bass", mod_wheel="none", pluck={"variation": 0.0})
     stage = Stage(instrument)
     struck = {500 * n + 7: NoteOn(key, 1 + 25 * n, n % 4) for n, key in enumerate((28, 33, 41, 47, 52, 60))}
@@ -191,7 +188,7 @@ def test_reports_say_what_was_plucked() -> None:
         )
 
 
-def test_strokes_vary_where_the_instrument_says_so() -> None:
+def test_strokes_vary_where_the_instrument_says_so():
     instrument = shipped("koto", pluck={"variation": 1.0, "release_ms": 2.0, "release_hard_ms": 1.0})
     found = []
     for varied in (True, False):
@@ -204,7 +201,7 @@ def test_strokes_vary_where_the_instrument_says_so() -> None:
 
 
 @pytest.mark.parametrize(("name", "key"), [("classical_guitar", 52), ("fretless_bass", 40), ("cimbalom", 60)])
-def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(name: str, key: int) -> None:
+def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(name, key):
     instrument, heard = shipped(name, pluck={"variation": 0.0}), []
     pluck = on_string(string_of(instrument, key), instrument.pluck.pluck(90))
     for event in (NoteOn(key, 90), NoteOn(key, 1, pluck=pluck)):
@@ -213,7 +210,7 @@ def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(name:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_pluck_by_hand_is_exactly_itself(shape: Shape) -> None:
+def test_a_pluck_by_hand_is_exactly_itself(shape):
     instrument = shipped("classical_guitar", noise=Noise(), pluck={"variation": 0.0})
     pluck, heard = Pluck(0.3, 2.5, shape, 0.2), []
     for variation, own in ((0.0, instrument.pluck.shape), (0.0, shape), (1.0, shape)):
@@ -229,7 +226,7 @@ def test_a_pluck_by_hand_is_exactly_itself(shape: Shape) -> None:
 @pytest.mark.parametrize(
     ("switch", "moves_to"), [(ControlChange(midi.TREMOLO, 127), 52), (ControlChange(midi.LEGATO, 127), 53)]
 )
-def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(switch: ControlChange, moves_to: int) -> None:
+def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(switch, moves_to):
     stage = Stage(shipped("classical_guitar"))
     by_hand = NoteOn(52, 90, pluck=Pluck(0.3, 1.0, stage.player.instrument.pluck.shape, 0.03))
     moved = [(6_400, NoteOn(53, 90))] if moves_to == 53 else []
@@ -240,7 +237,7 @@ def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(switch: Co
     assert [(each.key, each.damped) for each in sounding(stage.player)] == [(moves_to, True)]
 
 
-def test_another_player_begins_as_the_hands_are(stage: Stage) -> None:
+def test_another_player_begins_as_the_hands_are(stage):
     player, instrument = stage.player, stage.player.instrument  # the wheel turns its room
     assert player.at_hand == [] and player.heard_through == instrument
     player.set_gains({"model": 0.25})
@@ -262,7 +259,7 @@ def test_another_player_begins_as_the_hands_are(stage: Stage) -> None:
     assert player.heard_through == instrument
 
 
-def test_the_wheel_turns_whatever_it_may(instrument: Instrument) -> None:
+def test_the_wheel_turns_whatever_it_may(instrument):
 
     def heard(field: str, value: int) -> object:
         stage = Stage(changed(instrument, mod_wheel=field, body=BodyChoice(name="guitar"), room=Room(mix=0.1)))
@@ -276,7 +273,7 @@ def test_the_wheel_turns_whatever_it_may(instrument: Instrument) -> None:
         assert field == "damping.mute" or "technique" in field or heard(field, 0) != heard(field, 127), field
 
 
-def test_the_wheel_brings_the_room_whose_echo_has_two_sides(instrument: Instrument) -> None:
+def test_the_wheel_brings_the_room_whose_echo_has_two_sides(instrument):
     wheel = changed(instrument, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
     timed = [TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127)), *timed_key(0.2)]
     for played, channels, loudest in ((timed[1:], 1, (0, 1e-5)), (timed, 2, (1e-4, 1))):
@@ -285,7 +282,7 @@ def test_the_wheel_brings_the_room_whose_echo_has_two_sides(instrument: Instrume
         assert loudest[0] <= np.abs(sound[RATE_HZ:]).max() < loudest[1] and sound.shape[1] == channels
 
 
-def test_a_parameter_changes_as_by_a_turned_instrument() -> None:
+def test_a_parameter_changes_as_by_a_turned_instrument():
     slow = {"release_ms": 4.0, "release_hard_ms": 2.0, "variation": 0.0}
     instrument = shipped("koto", noise=Noise(onset_db=-20, release_db=-20), pluck=slow)
     later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
@@ -305,9 +302,7 @@ TURNS |= {"tuning.a4_hz": 466.16}
 
 
 @pytest.mark.parametrize("field", sorted({*TURNS, *(f"knobs.{name}" for name in Knobs.model_fields)}))
-def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_a_click(
-    instrument: Instrument, field: str
-) -> None:
+def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_a_click(instrument, field):
     section, _, name = field.partition(".")
     sounds, at, glide = {}, RATE_HZ // 4, round(0.1 * RATE_HZ)
     for turned in (changed(instrument, **{section: {name: TURNS[field]}}), instrument):
@@ -327,7 +322,7 @@ def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_
     assert relative(sounds["model", False][at:], sounds["truth", False][at:]) < 1e-5
 
 
-def test_a_knob_goes_as_far_as_a_string_is_possible(instrument: Instrument) -> None:
+def test_a_knob_goes_as_far_as_a_string_is_possible(instrument):
     stage, densest = Stage(instrument), bounds.STRING["density_kg_m3"][1]
     (note,) = stage.play(NoteOn(57, 60))
     before = note.now.now
@@ -345,7 +340,7 @@ def test_a_knob_goes_as_far_as_a_string_is_possible(instrument: Instrument) -> N
     assert stage.begun[-1].parameters.density_kg_m3 == densest  # type: ignore[union-attr]
 
 
-def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(instrument: Instrument) -> None:
+def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(instrument):
     lively, timed = changed(instrument, room=Room(mix=0.4, t60_s=1.0), sympathy_s_kg=0.01), timed_key(0.2)
     late = [TimedEvent(time_s, ControlChange(11, 90)) for time_s in (30.0, 50.0)]
     sound, followed = (
@@ -355,7 +350,7 @@ def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(instrumen
     assert heard > 0.2 * RATE_HZ and len(followed) == len(sound) <= heard + 2 * BLOCK_FRAMES
 
 
-def test_the_pedal_after_the_last_note_of_a_file_is_followed(instrument: Instrument) -> None:
+def test_the_pedal_after_the_last_note_of_a_file_is_followed(instrument):
     pedal = [TimedEvent(0.05, ControlChange(midi.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(midi.SUSTAIN, 0))]
     sound = np.concatenate(list(render_events(instrument, PRESET, timed_key(0.1) + pedal, RATE_HZ)))
     assert RATE_HZ < len(sound) < 2 * RATE_HZ and level_db(sound[:, 0], 0.8, 0.95) > -60
@@ -365,7 +360,7 @@ def timed_key(seconds: float) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(60, 100)), TimedEvent(seconds, NoteOff(60))]
 
 
-def test_a_note_can_be_stopped_while_it_is_rendered(instrument: Instrument) -> None:
+def test_a_note_can_be_stopped_while_it_is_rendered(instrument):
     reached_s: list[float] = []
 
     def advanced(seconds: float) -> None:
@@ -399,9 +394,7 @@ HIGH = {"range": (0, 127), "tuning": TuningChoice(a4_hz=880, transpose=48)}
         ),
     ],
 )
-def test_what_cannot_be_played_is_an_error(
-    instrument: Instrument, ask: Callable[[Instrument], object], reported: str
-) -> None:
+def test_what_cannot_be_played_is_an_error(instrument, ask, reported):
     with pytest.raises(ValueError, match=reported):
         ask(instrument)
 
@@ -414,7 +407,7 @@ def test_what_cannot_be_played_is_an_error(
         ("koto", PluckAt(Pluck()), []),
     ],
 )
-def test_what_is_no_key_of_an_instrument_is_silent(name: str, event: Any, kinds: list[int]) -> None:
+def test_what_is_no_key_of_an_instrument_is_silent(name, event, kinds):
     stage = Stage(read_instrument(INSTRUMENTS / f"{name}.json"))
     stage.player.handle(event)
     stage.run((), 128)

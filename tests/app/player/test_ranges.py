@@ -1,7 +1,5 @@
 """Plucks and strings stay within their ranges, whatever the knobs, macros and wheels of an instrument stand at."""
 
-from __future__ import annotations
-
 import itertools
 import random
 from collections.abc import Iterator
@@ -58,7 +56,7 @@ def at_ends(instrument: Instrument) -> Iterator[Instrument]:
         yield with_ends(instrument, draw.sample(PLUCKING, 6), draw)
 
 
-def test_every_stroke_of_every_knob_is_a_pluck() -> None:
+def test_every_stroke_of_every_knob_is_a_pluck():
     draw = random.Random(1)
     for turned in itertools.chain.from_iterable(map(at_ends, INSTRUMENTS.values())):
         for velocity in (*VELOCITIES, draw.randint(2, 126)):
@@ -73,7 +71,7 @@ def test_every_stroke_of_every_knob_is_a_pluck() -> None:
 
 
 @EVERY
-def test_no_knob_makes_a_string_or_a_blow_impossible(instrument: Instrument) -> None:
+def test_no_knob_makes_a_string_or_a_blow_impossible(instrument):
     chosen, found = instrument.strings, np.empty(of.STRING)
     if isinstance(chosen, Drums):
         keys, (low, high) = DrumKeys(instrument, Ear(tuple(instrument.pickup.points))), instrument.range
@@ -105,7 +103,7 @@ def scattered(count: int) -> list[Event]:
 
 
 @pytest.mark.parametrize("mode", ["poly", "mpe"])
-def test_wheels_slides_hands_and_techniques_stay_within_ranges(mode: str) -> None:
+def test_wheels_slides_hands_and_techniques_stay_within_ranges(mode):
     extreme = INSTRUMENTS["Classical guitar"].with_values(
         {"pluck.position": POSITION_RANGE[0], "pluck.hardest_mm": AMPLITUDE_MM_RANGE[1]}
     )
@@ -120,7 +118,7 @@ def test_wheels_slides_hands_and_techniques_stay_within_ranges(mode: str) -> Non
         assert [(each.position, each.width) for each in found.values()] == [(p.position, p.width) for p in wild]
 
 
-def test_a_knob_may_go_to_every_end_while_strings_ring() -> None:
+def test_a_knob_may_go_to_every_end_while_strings_ring():
     instrument = INSTRUMENTS["Steel-string acoustic"]
     stage, draw = Stage(instrument), random.Random(2)
     fields = [*PLUCKING, *(f"knobs.{name}" for name in KNOBS)]
@@ -129,6 +127,6 @@ def test_a_knob_may_go_to_every_end_while_strings_ring() -> None:
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf"), -1.0, 1e300])
-def test_the_nearest_pluck_is_always_one(value: float) -> None:
+def test_the_nearest_pluck_is_always_one(value):
     made = Pluck(shape="rounded").nearest(position=value, amplitude_mm=value, width=value)
     assert made.shape == "rounded" and POSITION_RANGE[0] <= made.position <= POSITION_RANGE[1]

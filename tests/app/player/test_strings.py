@@ -1,7 +1,5 @@
 """The strings of keys: pitches, what hands and knobs do to them, their figures, and how far hard strokes glide."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 
@@ -35,14 +33,14 @@ def in_tune(string: StringParameters, hz: float) -> bool:
     return abs(cents(string.pitch_hz, hz)) < 1e-3
 
 
-def test_every_key_has_its_pitch_by_length_alone(instrument: Instrument) -> None:
+def test_every_key_has_its_pitch_by_length_alone(instrument):
     for key in range(28, 89):
         found = string_of(instrument, key)
         assert in_tune(found.parameters, hz_of(key)) and 1 <= found.modes <= 99
         assert replace(found.parameters, length_m=STEEL.length_m) == STEEL
 
 
-def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guitar: Instrument) -> None:
+def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guitar):
     tuned = changed(guitar, tuning=TuningChoice(a4_hz=443.0))
     strings = {key: string_of(tuned, key).parameters for key in (30, 40, 44, 45, 64, 80)}
     assert all(in_tune(string, hz_of(key) * 443 / 440) for key, string in strings.items())
@@ -50,7 +48,7 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert strings[30].length_m == pytest.approx(strings[40].length_m, rel=1e-3)
 
 
-def test_a_set_may_be_asked_for_a_string(guitar: Instrument) -> None:
+def test_a_set_may_be_asked_for_a_string(guitar):
     own = ((50, 60.0), (55, 70.0), (59, 80.0))
     strings = tuple(OpenString(note=note, string=replace(STEEL, tension_n=tension_n)) for note, tension_n in own)
     chosen = changed(guitar, strings=StringSet(strings=strings))
@@ -67,7 +65,7 @@ def test_a_set_may_be_asked_for_a_string(guitar: Instrument) -> None:
     assert tension_n(57, 0) == pytest.approx(80 * 2 ** (-4 / 12), rel=0.01)  # it is slackened
 
 
-def test_bends_and_slides_reach_the_pitch_and_a_damper_adds_its_decay_to_every_partial() -> None:
+def test_bends_and_slides_reach_the_pitch_and_a_damper_adds_its_decay_to_every_partial():
     for semitones in (-2, -0.5, 0.3, 2, 12):
         ratio = 2 ** (semitones / 12)
         by_tension = made(STEEL, TENSION, law.bent(STEEL.row, ratio))
@@ -79,7 +77,7 @@ def test_bends_and_slides_reach_the_pitch_and_a_damper_adds_its_decay_to_every_p
     assert added.tolist() == pytest.approx([math.log(1000) / 0.2] * 20)
 
 
-def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is() -> None:
+def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is():
     def turned(**knobs: float) -> StringParameters:
         law.turned(STEEL.row, [getattr(Knobs(**knobs), name) for name in KNOBS], out := [0.0] * 8)
         return StringParameters(*out)
@@ -92,7 +90,7 @@ def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is() ->
 
 
 @pytest.mark.parametrize(("name", "key"), [("instrument", 57), ("guitar", 57), ("guitar", 30)])
-def test_tension_and_length_go_together_at_a_keys_pitch(name: str, key: int, request: pytest.FixtureRequest) -> None:
+def test_tension_and_length_go_together_at_a_keys_pitch(name, key, request):
     played: Instrument = request.getfixturevalue(name)
     own = string_of(played, key)
     for knob, value in (("tension", 4.0), ("length", 2.0)):
@@ -120,16 +118,14 @@ ROD = StringSet(strings=(OpenString(note=60, string=replace(STEEL, second_moment
         (ROD, 31, "key 31.*no tension slackens its string so far; choose a higher key"),
     ],
 )
-def test_an_impossible_key_is_named(
-    instrument: Instrument, strings: Fretted | StringSet, key: int, error: str
-) -> None:
+def test_an_impossible_key_is_named(instrument, strings, key, error):
     found = Strings(changed(instrument, strings=strings, range=(28, 88)))
     assert found.of_key(27) is found.of_key(89) is None, "beyond the range"
     with pytest.raises(ValueError, match=error):
         found.of_key(key)
 
 
-def test_each_tenth_of_the_mute_knob_shortens_a_string_alike() -> None:
+def test_each_tenth_of_the_mute_knob_shortens_a_string_alike():
     instrument = read_instrument(SHIPPED / "steel_string_acoustic.json")
     string, knob, t60_s = string_of(instrument, 40), OF_INSTRUMENTS["damping.mute"], []
     own, modes = string.parameters, string.modes
@@ -152,7 +148,7 @@ def test_each_tenth_of_the_mute_knob_shortens_a_string_alike() -> None:
     ("name", "key", "decay"),
     [("slack_bass", 44, 1.0), ("slack_bass", 50, 20.0), ("electric_bass", 45, 1.0), ("harpsichord", 84, 1.0)],
 )
-def test_a_rendered_note_starts_as_sharp(name: str, key: int, decay: float, source: str) -> None:
+def test_a_rendered_note_starts_as_sharp(name, key, decay, source):
     """Of the string alone. Keys high enough for many periods in START_S: partials of a lower one overlap."""
     instrument = read_instrument(SHIPPED / f"{name}.json").with_values(
         {"noise.onset_db": -60.0, "knobs.decay": decay}
@@ -164,7 +160,7 @@ def test_a_rendered_note_starts_as_sharp(name: str, key: int, decay: float, sour
     assert found == pytest.approx(wanted, rel=0.15)
 
 
-def test_the_glide_grows_with_amplitude_squared_and_is_of_keys_that_have_a_string(instrument: Instrument) -> None:
+def test_the_glide_grows_with_amplitude_squared_and_is_of_keys_that_have_a_string(instrument):
     """So that its error over a layer of velocities has one least value."""
     glides = glides_cents(instrument)
     assert (np.diff(glides[60, 1:]) > 0).all()
@@ -181,7 +177,7 @@ def test_the_glide_grows_with_amplitude_squared_and_is_of_keys_that_have_a_strin
 KEY = 57
 
 
-def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohertz(instrument: Instrument) -> None:
+def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohertz(instrument):
     string = string_of(instrument, KEY).parameters
     assert bright_mode(string) == 14  # of 220 Hz
     for mode in (1, 14):
@@ -190,7 +186,7 @@ def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohe
 
 
 @pytest.mark.parametrize("lossy", [False, True])
-def test_a_figure_leads_back_to_its_knob(instrument: Instrument, guitar: Instrument, lossy: bool) -> None:
+def test_a_figure_leads_back_to_its_knob(instrument, guitar, lossy):
     """Also where losses by mode are in it; beyond its ends it is its end. A guitar's is of the string that plays."""
     chosen = instrument.model_copy(update={"losses": Losses(friction=1e-3)}) if lossy else instrument
     for field, figure in FIGURES.items():
@@ -209,7 +205,7 @@ def test_a_figure_leads_back_to_its_knob(instrument: Instrument, guitar: Instrum
     assert knob_for(guitar, (KEY, 5), "knobs.length", 2 * wanted) == pytest.approx(2.0, rel=1e-2)
 
 
-def test_a_figure_beyond_the_bounds_is_the_bound_and_a_silent_key_is_reported(instrument: Instrument) -> None:
+def test_a_figure_beyond_the_bounds_is_the_bound_and_a_silent_key_is_reported(instrument):
     heavy = changed(instrument, strings=Fretted(string=replace(STEEL, density_kg_m3=50_000.0)))
     turned = heavy.with_value("knobs.density", knob_for(heavy, (KEY, None), "knobs.density", 1e9))
     assert string_of(turned, KEY).parameters.density_kg_m3 == 1e5
@@ -217,9 +213,7 @@ def test_a_figure_beyond_the_bounds_is_the_bound_and_a_silent_key_is_reported(in
         knob_for(instrument, (10, None), "knobs.tension", 80.0)
 
 
-def test_what_lies_outside_the_training_is_reported_of_the_string_as_the_knobs_have_it(
-    instrument: Instrument,
-) -> None:
+def test_what_lies_outside_the_training_is_reported_of_the_string_as_the_knobs_have_it(instrument):
     """Near 3 kHz; the decay of the first mode, with which no error grows, is not named. A silent key has nothing."""
     slow = changed(instrument, knobs={"decay": 20.0, "brightness_decay": 20.0})
     words = [outside_of_key(PRESET.info, each, NoteOn(KEY, 60)) for each in (instrument, slow)]

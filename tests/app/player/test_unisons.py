@@ -1,7 +1,5 @@
 """Strings of a course on one bridge, and those that meet its edge: against their equations, and their energy."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -100,9 +98,7 @@ def layout(modes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 @SOURCES
 @STRINGS
-def test_modes_of_a_course_are_those_of_the_coupled_equations(
-    instrument: Instrument, strings: int, source: str
-) -> None:
+def test_modes_of_a_course_are_those_of_the_coupled_equations(instrument, strings, source):
     """Of each partial and direction 2n eigenvalues, of q̈ + 2 (Σ + s sᵀ) q̇ + Ω² q = 0, fitted to the motion."""
     watched = Watched(coupled(linear(instrument), strings, cents=3), source)
     states = watched.states(700)[20:]
@@ -134,7 +130,7 @@ def test_modes_of_a_course_are_those_of_the_coupled_equations(
 
 @STRINGS
 @pytest.mark.parametrize(("source", "loud"), [("model", False), ("truth", False), ("truth", True)])
-def test_energy_of_a_course_never_rises(instrument: Instrument, strings: int, source: str, loud: bool) -> None:
+def test_energy_of_a_course_never_rises(instrument, strings, source, loud):
     """With no other loss than that to the bridge it falls to a part that the bridge does not see."""
     lossless = linear(instrument, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
     course = coupled(instrument, strings, cents=3) if loud else coupled(lossless, strings, cents=3, apart_ms=4)
@@ -187,9 +183,7 @@ def watched(instrument: Instrument, source: str, velocity: int = 90, key: int = 
     [(90, 0.0, 1e-9, (1 - 1e-7, 1 + 1e-7)), (90, 0.5, 1e-9, (0, 0.999)), (127, 0.5, 1e-5, (0, 0.9))],
 )
 @SOURCES
-def test_energy_of_string_and_edge_never_rises(
-    instrument: Instrument, velocity: int, loss: float, rises: float, left: tuple[float, float], source: str
-) -> None:
+def test_energy_of_string_and_edge_never_rises(instrument, velocity, loss, rises, left, source):
     lossless = linear(instrument, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
     note, equation = watched(buzzing(instrument if velocity == 127 else lossless, loss_s_m=loss), source, velocity)
     found = equation.energy(note.states(750))
@@ -197,7 +191,7 @@ def test_energy_of_string_and_edge_never_rises(
     assert left[0] <= found[-1] / found[0] <= left[1]
 
 
-def test_truth_is_the_solution_of_its_equation(instrument: Instrument) -> None:
+def test_truth_is_the_solution_of_its_equation(instrument):
     """DOP853, on a short string, for 10 ms in which it meets the edge a dozen times."""
     note, equation = watched(buzzing(instrument, stiffness_n_m=1e4), "truth", key=88)
     assert equation.stiffness == 1e4
@@ -214,7 +208,7 @@ def test_truth_is_the_solution_of_its_equation(instrument: Instrument) -> None:
 
 
 @SOURCES
-def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(instrument: Instrument, source: str) -> None:
+def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(instrument, source):
     """On average the end pulls as much as the edge pushes, apart from the overshoot of a finite series (Gibbs)."""
     note, _ = watched(changed(buzzing(instrument, gap_um=0), pickup=Pickup(kind="bridge")), source)
     heard, pushes = [], []

@@ -1,7 +1,5 @@
 """Notes in a mixer whose frames the test takes itself; presets that sound at once, and one that is rendered first."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path

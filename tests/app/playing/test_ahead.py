@@ -1,7 +1,5 @@
 """Models that are rendered before they are heard: when they begin, what is remembered, how they end."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -89,7 +87,7 @@ def heard(voice: Voice, frames: int) -> np.ndarray:
     return mixer.render(frames)[:, 0]
 
 
-def test_it_begins_when_a_little_is_there_and_is_the_models_signal(at: Ahead4k) -> None:
+def test_it_begins_when_a_little_is_there_and_is_the_models_signal(at):
     voice = at.finished()
     (begun_s,) = at.begun_s
     assert LEAST_S <= begun_s < 1.0 and voice.waits_s == 0
@@ -100,7 +98,7 @@ def test_it_begins_when_a_little_is_there_and_is_the_models_signal(at: Ahead4k) 
     assert at.finished(seconds=30.0, amplitude_mm=1e-6).rendered_s < 10, "silent, it is not rendered to its end"
 
 
-def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
+def test_what_was_rendered_once_is_there_at_once(at):
     first = at.finished(key="a")
     at.finished(key="b")  # the first is remembered by now: one thread renders both
     again = at.finished(key="a")
@@ -110,12 +108,12 @@ def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
 
 
 @pytest.mark.parametrize(("from_s", "least_s"), [(0.8, 0.8 + LEAST_S), (5.0, 1.0)])
-def test_where_a_seek_begins_in_the_middle_it_waits_for_that(at: Ahead4k, from_s: float, least_s: float) -> None:
+def test_where_a_seek_begins_in_the_middle_it_waits_for_that(at, from_s, least_s):
     at.finished(from_s=from_s)
     assert at.begun_s[0] >= least_s - 1e-3
 
 
-def test_a_model_that_runs_away_is_silent_from_there_on(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_runs_away_is_silent_from_there_on(at, monkeypatch):
     def faulty(self: KoopmanVar, state: Any, steps: int, readout: Any = None) -> Any:
         frames, after = ADVANCE(self, state, steps, readout)
         return (frames * float("nan") if state.step >= 512 else frames), after
@@ -128,7 +126,7 @@ def test_a_model_that_runs_away_is_silent_from_there_on(at: Ahead4k, monkeypatch
     assert not samples[ends + 128 :].any() and at.errors == []
 
 
-def test_a_fault_is_reported_and_the_others_go_on(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_is_reported_and_the_others_go_on(at, monkeypatch):
     with monkeypatch.context() as broken:
         broken.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
         at.render()
@@ -137,7 +135,7 @@ def test_a_fault_is_reported_and_the_others_go_on(at: Ahead4k, monkeypatch: pyte
     at.finished()
 
 
-def test_what_nobody_wants_is_rendered_no_further(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_nobody_wants_is_rendered_no_further(at, monkeypatch):
     slow_down(monkeypatch, speed=4.0)
     voice = at.render(seconds=60.0)
     at.wait(lambda: voice.given > 1_000)
@@ -149,7 +147,7 @@ def test_what_nobody_wants_is_rendered_no_further(at: Ahead4k, monkeypatch: pyte
     assert not voice.finished
 
 
-def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_one_that_is_heard_soonest_goes_first(at, monkeypatch):
     slow_down(monkeypatch, speed=5.0)
     first, second = (at.render(seconds=20.0) for _ in range(2))
     at.wait(lambda: not any(note.pending for note in at.notes))
@@ -161,9 +159,7 @@ def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pyte
     assert 1 - CARE * 0.8 <= at.begun_s[2] < 1.0, "some of it is rendered while it is heard"
 
 
-def test_where_more_sound_than_can_be_rendered_the_oldest_make_room(
-    at: Ahead4k, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_more_sound_than_can_be_rendered_the_oldest_make_room(at, monkeypatch):
     slow_down(monkeypatch, speed=3.0)
     mixer, began_s = Mixer(RATE_HZ, limited=False), time.monotonic()
     for _ in range(6):

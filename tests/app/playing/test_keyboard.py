@@ -1,9 +1,5 @@
 """Which key means what, without any window."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from app.playing import keyboard
@@ -15,14 +11,14 @@ REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
 EVERY_OCTAVE = range(keyboard.LOWEST_OCTAVE, keyboard.HIGHEST_OCTAVE + 1)
 
 
-def test_rows_of_keys_are_places_and_a_piano() -> None:
+def test_rows_of_keys_are_places_and_a_piano():
     assert [keyboard.place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
     assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
     assert [keyboard.semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
     assert keyboard.letters_of(1)[LOWEST_C + 12] == "A"
 
 
-def test_keys_are_known_by_their_place() -> None:
+def test_keys_are_known_by_their_place():
     for platform, press, place, semitone in (
         ("linux", KeyPress("Q", 38), 0, 0),  # AZERTY: Q is where A is elsewhere
         ("linux", KeyPress("A", 24), None, None),
@@ -38,7 +34,7 @@ def test_keys_are_known_by_their_place() -> None:
         assert (keyboard.place_of(press, platform), keyboard.semitone_of(press, platform)) == (place, semitone), press
 
 
-def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
+def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing():
     levels = [REACH.turned(KeyPress(digit), 4.0) or 0.0 for digit in "123456789"]
     assert levels == sorted(levels) and (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
     softer, harder, hardest = (
@@ -49,7 +45,7 @@ def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
         assert REACH.turned(KeyPress(letter), 4.0) is keyboard.place_of(KeyPress(letter), "darwin") is None
 
 
-def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_steps_of_level() -> None:
+def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_steps_of_level():
     wide = Pluck(0.5, 4.0, "raised_cosine", 0.2)
     low, high, beyond = (REACH.pluck(*key, wide) for key in ((LOWEST_PLACE, 1), (HIGHEST_PLACE, 127), (127, 127)))
     assert (low.position, low.amplitude_mm, low.shape, low.width) == pytest.approx((0.3, 1, "raised_cosine", 0.2))
@@ -59,7 +55,7 @@ def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_s
     assert (REACH.amplitude_of(64), REACH.amplitude_of(999), REACH.velocity_of(0.0)) == (3.1623, 10, 1)
 
 
-def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
+def test_reach_is_what_a_preset_was_trained_on(small_preset):
     assert PluckRange.of(read_info(small_preset)) == REACH
     assert PluckRange.of(None).position == (0.05, 0.95)
     nylon, harp = (read_info(find_preset(name)) for name in ("studio_any_string", "studio_any_harp_c6"))
@@ -68,7 +64,7 @@ def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
     assert low_mm == 0.5 and harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
 
 
-def test_octave_and_velocity_keys_stay_within_bounds() -> None:
+def test_octave_and_velocity_keys_stay_within_bounds():
     highest, lowest = keyboard.HIGHEST_OCTAVE, keyboard.LOWEST_OCTAVE
     assert keyboard.turn(KeyPress("z"), 0, 90) == (-1, 90)
     assert keyboard.turn(KeyPress("X"), highest, 90) == (highest, 90)
@@ -77,7 +73,7 @@ def test_octave_and_velocity_keys_stay_within_bounds() -> None:
     assert velocities == [(0, 127), (0, 1), (0, 127), (0, 1)] and keyboard.turn(KeyPress("m"), 0, 5) is None
 
 
-def test_octaves_are_those_in_which_a_key_sounds_and_the_nearest_has_most_keys() -> None:
+def test_octaves_are_those_in_which_a_key_sounds_and_the_nearest_has_most_keys():
     """Compared with every octave tried; a range that no key reaches has the nearest."""
     for low in range(0, 108, 7):
         for high in (min(low + keys, 107) for keys in (0, 1, 11, 40)):

@@ -1,7 +1,5 @@
 """The keys of an instrument, played by events, in a mixer whose frames the test takes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from threading import Event, Thread
@@ -104,7 +102,7 @@ def played(sound: Any, wait: Wait) -> Iterator[Played]:
     made.notes.close()
 
 
-def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(played: Played) -> None:
+def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(played):
     for number, value in ((midi.LEGATO, 127), (midi.PORTAMENTO, 127), (midi.SLIDE_TIME, 64)):
         played.handle(ControlChange(number, value))
     places = []
@@ -120,7 +118,7 @@ def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(p
     assert sum(43.5 < place < 51.5 for place in places) > 3
 
 
-def test_a_stop_ends_strings_that_ring_in_sympathy_too(played: Played) -> None:
+def test_a_stop_ends_strings_that_ring_in_sympathy_too(played):
     played.choose(HARP.model_copy(update={"sympathy_s_kg": 1e-3}))
     for _ in range(2):  # they ring again with the next note
         played.strike(NoteOn(sum(HARP.range) // 2, 120))
@@ -131,7 +129,7 @@ def test_a_stop_ends_strings_that_ring_in_sympathy_too(played: Played) -> None:
         assert np.abs(played.hear(4_800)).max() < 1e-6
 
 
-def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Played) -> None:
+def test_a_soloed_mode_is_as_loud_as_in_the_note(played):
     """So that the other modes do not thunder when the solo ends."""
     whole, gains = played.strike(NoteOn(45, 100)).gain, []
     for ear in (replace(EAR, solo=5), Ear((0.0,)), EAR):
@@ -142,7 +140,7 @@ def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Played) -> None:
     assert gains[1] <= 1, "nothing is heard of it: no gain would help"
 
 
-def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_waits_for_no_knob(played, monkeypatch):
     begun, held, struck = Event(), Event(), list[object]()
 
     def slow(*args: Any) -> Any:
@@ -164,7 +162,7 @@ def test_a_key_waits_for_no_knob(played: Played, monkeypatch: pytest.MonkeyPatch
     assert isinstance(came[0], KeyNote)
 
 
-def test_the_last_of_many_turns_counts(played: Played) -> None:
+def test_the_last_of_many_turns_counts(played):
     struck = played.strike(NoteOn(45, 60))
     before = played.now(struck).now
     played.keys.begin_recording()
@@ -193,9 +191,7 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
         ("body", BodyChoice(name="a cello", mix=0.3), "is played without its body: the body a cello is not here"),
     ],
 )
-def test_an_instrument_that_cannot_be_played_is_reported_once(
-    played: Played, part: str, value: Any, reported: str
-) -> None:
+def test_an_instrument_that_cannot_be_played_is_reported_once(played, part, value, reported):
     made = played.strike(NoteOn(45, 60))
     played.notes.set_instrument(INSTRUMENT.model_copy(update={part: value}), EAR)
     played.settle()
@@ -210,7 +206,7 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(
         assert (again.parameters, again.ear) == (made.parameters, Ear((0.1,)))
 
 
-def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played: Played) -> None:
+def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played):
     held = Event()
     played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)
@@ -225,9 +221,7 @@ def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played
     played.strike(NoteOn(45, 60))
 
 
-def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
-    played: Played, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(played, monkeypatch):
     begun, held, computed = Event(), Event(), list[int]()
 
     def slow(self: DrumKeys, key: int) -> None:
@@ -246,9 +240,7 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
 
 @pytest.mark.parametrize("loaded", [True, False])
 @pytest.mark.parametrize("pedal", [True, False])
-def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(
-    played: Played, pedal: bool, loaded: bool
-) -> None:
+def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(played, pedal, loaded):
     held = played.strike(NoteOn(45, 60))
     for event in (ControlChange(midi.SUSTAIN, 127), NoteOff(45)) if pedal else ():
         played.handle(event)
@@ -260,7 +252,7 @@ def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(
     assert played.now(held).damped
 
 
-def test_switches_hold_for_another_instruments_player_too(played: Played) -> None:
+def test_switches_hold_for_another_instruments_player_too(played):
     switches = [ControlChange(number, 127, KEYS) for number in (midi.LEGATO, midi.TREMOLO)]
     for event in (*switches, ControlChange(midi.STRUM, 127), ControlChange(midi.RESET, 0)):
         played.handle(event)
@@ -270,7 +262,7 @@ def test_switches_hold_for_another_instruments_player_too(played: Played) -> Non
     assert played.player.at_hand == switches
 
 
-def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compared(played: Played) -> None:
+def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compared(played):
     del played.effects[:]
     wooden = INSTRUMENT.model_copy(update={"body": BodyChoice(name="guitar", mix=0.4), "mod_wheel": "room.mix"})
     for _ in range(2):
@@ -293,9 +285,7 @@ def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compa
 
 
 @pytest.mark.parametrize(("rate_hz", "channels"), [(48_000, 1), (44_100, 2)])
-def test_keys_go_out_while_the_output_stands_and_with_another_device(
-    played: Played, monkeypatch: pytest.MonkeyPatch, rate_hz: int, channels: int
-) -> None:
+def test_keys_go_out_while_the_output_stands_and_with_another_device(played, monkeypatch, rate_hz, channels):
     made = played.strike(NoteOn(45, 127))
     played.handle(ControlChange(midi.SUSTAIN, 127))
     played.hear(4_800)
@@ -315,7 +305,7 @@ def test_keys_go_out_while_the_output_stands_and_with_another_device(
     assert played.player.compiled.channel(0).pedal, "the foot is still on it"
 
 
-def test_notes_end_though_their_reports_were_missed(played: Played) -> None:
+def test_notes_end_though_their_reports_were_missed(played):
     """A window that hangs while a dense file is played asks too late."""
     notes = []
     for number in range(of.REPORTS):
@@ -327,7 +317,7 @@ def test_notes_end_though_their_reports_were_missed(played: Played) -> None:
     assert 0 < played.notes.ringing <= 20
 
 
-def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> None:
+def test_releases_and_bends_of_a_file_count_at_their_frames(played):
     off, begin = ControlChange(midi.SOUND_OFF, 0), 1_024
     events = (NoteOn(45, 90), Bend(0.5), Bend(1.0), NoteOff(45), NoteOn(45, 60), off)
     frames = (0, 4_800, 9_600, 14_400, 17_280, 24_000)
@@ -347,7 +337,7 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(played: Played) -> N
     np.testing.assert_allclose(heard, np.concatenate(expected), atol=1e-6)
 
 
-def test_a_note_that_waits_and_is_released_never_begins_and_others_do(played: Played) -> None:
+def test_a_note_that_waits_and_is_released_never_begins_and_others_do(played):
     soon = played.soon()
     one, other = (played.strike(NoteOn(key, 90), soon) for key in (45, 50))
     at_once = played.strike(NoteOn(50, 90))
@@ -375,7 +365,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     return made
 
 
-def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played: Played) -> None:
+def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played):
     played.keys.begin_recording()
     assert played.recorded() == []
     for event in (ControlChange(midi.SUSTAIN, 127), Bend(0.5), *parameter_set(0, 12, 0, 0)):
@@ -400,7 +390,7 @@ def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played
     assert not any(each.damped for each in struck) and struck[0].now.tension_n > struck[0].own.tension_n
 
 
-def test_a_full_recording_is_reported_once(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_recording_is_reported_once(played, monkeypatch):
     monkeypatch.setattr("app.playing.recorder.LONGEST_RECORDING", 3)
     played.keys.begin_recording()
     for _ in range(3):
@@ -410,7 +400,7 @@ def test_a_full_recording_is_reported_once(played: Played, monkeypatch: pytest.M
     assert len(played.reported) == 1 and "recording is full" in played.reported[0]
 
 
-def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Played, clock: SimpleNamespace) -> None:
+def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played, clock):
     played.keys.begin_recording()
     loop = NoteOn(64, 90, pluck=Pluck(0.3, 2.0))
     for event, after_s in ((NoteOn(45, 90), 0.2), (loop, 0.2), (NoteOn(50, 90), 0.25), (NoteOn(62, 90), 60.0)):
@@ -424,7 +414,7 @@ def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Played
     assert {each.event.key for each in found if isinstance(each.event, NoteOff)} == {45, 50, 57}
 
 
-def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Played, clock: SimpleNamespace) -> None:
+def test_a_file_that_is_stopped_ends_what_was_handed_over(played, clock):
     ringing = played.strike(NoteOn(45, 90))
     played.hear(4_800)
     played.keys.begin_recording()

@@ -1,7 +1,5 @@
 """The metronome's clicks, found in what a mixer gives, sample by sample."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,7 +27,7 @@ class Room:
         return np.concatenate(pieces)
 
 
-def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at_once() -> None:
+def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at_once():
     room, tempo_bpm, rate_hz = Room(), 97, 48_000
     beat_s = 60 / tempo_bpm
     for metronome, clicks in ((True, 9), (False, 6)):
@@ -45,7 +43,7 @@ def test_clicks_are_at_the_frames_of_their_beats_accented_in_each_bar_and_end_at
         assert np.abs(room.heard(3 * beat_s)).max() < 1e-4
 
 
-def test_another_device_continues_with_the_beat() -> None:
+def test_another_device_continues_with_the_beat():
     room, first = Room(), 777 + round(AHEAD_S * 48_000)
     room.metronome.begin(Meter(tempo_bpm=240, metronome=True))
     room.heard(1.1)

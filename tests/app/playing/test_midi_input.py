@@ -1,7 +1,5 @@
 """MIDI input: through JACK, of other kinds of ports, with faults in plain words; its sound; what controllers turn."""
 
-from __future__ import annotations
-
 import faulthandler
 import json
 import os
@@ -39,7 +37,7 @@ GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")
 
 
 @pytest.mark.skipif(shutil.which("jackd") is None, reason="no JACK server is installed")
-def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_path: Path) -> None:
+def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_path):
     command = [sys.executable, "-m", "tests.app.playing.test_midi_input", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=150)
     if "cannot be" in (tmp_path / "log").read_text(errors="replace") and done.returncode:
@@ -61,9 +59,7 @@ def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_pa
     ("text", "reported"),
     [(None, r"-m pip install supriya-midi"), ("raise RuntimeError('not built')", r"not built.*pip install")],
 )
-def test_a_package_that_cannot_be_loaded_has_its_remedy(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str | None, reported: str
-) -> None:
+def test_a_package_that_cannot_be_loaded_has_its_remedy(monkeypatch, tmp_path, text, reported):
     monkeypatch.delitem(sys.modules, "supriya_midi", raising=False)
     if text is None:
         monkeypatch.setitem(sys.modules, "supriya_midi", None)
@@ -102,7 +98,7 @@ def library(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
     return library
 
 
-def test_a_busy_input_is_a_message_and_leaves_no_client_and_one_of_a_name_can_be_chosen(library: Any) -> None:
+def test_a_busy_input_is_a_message_and_leaves_no_client_and_one_of_a_name_can_be_chosen(library):
     midi = MidiInput(lambda event: None)
     with pytest.raises(MidiUnavailable, match=r"Keys 0 cannot be opened \(error creating.*Another program"):
         midi.open("Keys 0")
@@ -117,9 +113,7 @@ def test_a_busy_input_is_a_message_and_leaves_no_client_and_one_of_a_name_can_be
 
 
 @pytest.mark.parametrize(("name", "system"), [("", 1), ("jack", 2), ("oss", None)])
-def test_a_variable_names_the_system(
-    library: types.SimpleNamespace, monkeypatch: pytest.MonkeyPatch, name: str, system: int | None
-) -> None:
+def test_a_variable_names_the_system(library, monkeypatch, name, system):
     monkeypatch.setenv(VARIABLE, name)
     if system is None:
         with pytest.raises(MidiUnavailable, match=r"LEARNED_STRINGS_MIDI is oss.*winmm, jack"):
@@ -129,7 +123,7 @@ def test_a_variable_names_the_system(
     assert library.systems == [system]
 
 
-def test_noise_and_a_fault_cost_one_message_and_not_the_input(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_and_a_fault_cost_one_message_and_not_the_input(monkeypatch):
     waiting = [([0xF4], 0.0), ([0x90, 60, 1], 0.0), ([0x90, 61, 1], 0.0)]
     client = types.SimpleNamespace(get_message=lambda: waiting.pop(0) if waiting else None)
     client.close_port, client.delete = lambda: None, lambda: None
@@ -159,7 +153,7 @@ class Cable:
         self.get_input_names, self.connected = lambda: ["Keys"], lambda: True
         self.close = lambda: None
 
-    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> Cable:
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> "Cable":
         self._callback = callback
         return self
 
@@ -169,7 +163,7 @@ class Cable:
         thread.join()
 
 
-def test_messages_of_an_input_are_heard(sound: Any, wait: Callable[[Callable[[], bool]], None]) -> None:
+def test_messages_of_an_input_are_heard(sound, wait):
     strings = {"polarisations": None, "sympathy_s_kg": 0.0, "damping": Damping(release_t60_s=0.15)}
     instrument = read_instrument(INSTRUMENTS / "steel_string_acoustic.json").model_copy(update=strings)
     notes, cable = Notes(sound, Sources(), find_shipped, lambda *report: pytest.fail(str(report))), Cable()
@@ -210,7 +204,7 @@ def test_messages_of_an_input_are_heard(sound: Any, wait: Callable[[Callable[[],
     notes.close()
 
 
-def test_a_taught_controller_goes_through_all_of_its_field() -> None:
+def test_a_taught_controller_goes_through_all_of_its_field():
     choices = MidiChoices()
     learned = [field for field in LEARNABLE if field in OF_CHOICES]
     for number, field in enumerate(learned, 16):
@@ -223,7 +217,7 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
     assert OF_CHOICES["speed"].value(64 / 127) == pytest.approx(0.001**0.5, rel=0.05)
 
 
-def test_a_controller_turns_every_parameter_and_macro_of_the_instrument_and_leaves_what_is_impossible() -> None:
+def test_a_controller_turns_every_parameter_and_macro_of_the_instrument_and_leaves_what_is_impossible():
     instrument = GUITAR.model_copy(update={"pickup": Pickup(points=(0.3, 0.7))})
     instrument = instrument.with_value("pluck.softest_mm", 0.001)  # which may not be above the hardest
     for field in (field for field in LEARNABLE if field in OF_INSTRUMENTS):

@@ -1,7 +1,5 @@
 """Notes: struck, switched, listened to, matched, ended; and sent to no device, but to a mixer that the test turns."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 import time
@@ -34,7 +32,7 @@ from engine.presets import load_preset, save_preset
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 from tests.app.monitors import find_shipped, hears
-from tests.app.playing.conftest import EAR, Lab
+from tests.app.playing.conftest import EAR
 
 RATE_HZ = 48_000
 QUANTUM_S = QUANTUM / RATE_HZ
@@ -45,7 +43,7 @@ def gains(note: PluckVoices) -> dict[str, float]:
     return {source: float(voice.record["wanted_gain"]) for source, voice in note.voices.items()}
 
 
-def test_a_strike_sounds_with_the_next_frame_or_its_own_and_its_voices_are_in_step(lab: Lab) -> None:
+def test_a_strike_sounds_with_the_next_frame_or_its_own_and_its_voices_are_in_step(lab):
     note, began_s = lab.strike(), lab.mixer.seconds
     assert not note.pending and lab.notes.ringing == 1, "nobody was waited for"
     out = lab.hear(0.05)
@@ -61,7 +59,7 @@ def test_a_strike_sounds_with_the_next_frame_or_its_own_and_its_voices_are_in_st
     assert second.began_frame == frame == note.began_frame + round(0.2 * RATE_HZ) and note.over
 
 
-def test_a_switch_sounds_as_if_the_other_had_been_heard_all_along(lab: Lab) -> None:
+def test_a_switch_sounds_as_if_the_other_had_been_heard_all_along(lab):
     loud = lab.pluck_of(amplitude_mm=8.0)
     model, truth = (lab.alone(loud, 0.4, name) for name in ("model", "truth"))
     note = lab.strike(loud)
@@ -76,7 +74,7 @@ def test_a_switch_sounds_as_if_the_other_had_been_heard_all_along(lab: Lab) -> N
     assert gains(note) == pytest.approx({"model": 10.0, "truth": -10.0})
 
 
-def test_plucks_ring_beside_each_other_and_are_heard_where_the_listener_is(lab: Lab) -> None:
+def test_plucks_ring_beside_each_other_and_are_heard_where_the_listener_is(lab):
     plucks = [lab.pluck_of(position=position) for position in (0.3, 0.5)]
     for pluck in plucks:
         lab.strike(pluck)
@@ -89,7 +87,7 @@ def test_plucks_ring_beside_each_other_and_are_heard_where_the_listener_is(lab: 
     np.testing.assert_allclose(out, expected[-len(out) :], atol=2e-5)
 
 
-def test_another_preset_sounds_at_its_own_rate_in_step(lab: Lab, tmp_path: Path) -> None:
+def test_another_preset_sounds_at_its_own_rate_in_step(lab, tmp_path):
     other = Path(shutil.copy(lab.bank, tmp_path / "other.safetensors"))
     lab.notes.set_monitor(hears("preset:other", "model"))
     lab.notes.choose(lab.pluck_of(others=(other,)))
@@ -102,7 +100,7 @@ def test_another_preset_sounds_at_its_own_rate_in_step(lab: Lab, tmp_path: Path)
 
 
 @pytest.mark.parametrize("which", ["bank", "small_preset"])
-def test_a_seek_begins_in_the_middle_alone(lab: Lab, which: str, request: Any) -> None:
+def test_a_seek_begins_in_the_middle_alone(lab, which, request):
     path, whole = request.getfixturevalue(which), {}
     for name in ("model", "truth"):
         lab.notes.set_monitor(hears(name))
@@ -134,7 +132,7 @@ def look(sound: Any, load: float, times: int = 1) -> None:
 
 
 @pytest.mark.parametrize(("load", "struck", "ends"), [(0.9, 6, 2), (1.5, 16, 8)])
-def test_where_the_device_has_no_time_the_oldest_notes_end(lab: Lab, load: float, struck: int, ends: int) -> None:
+def test_where_the_device_has_no_time_the_oldest_notes_end(lab, load, struck, ends):
     """Nobody polls. Bursts of other programs end none: the next callbacks lower the mean load again."""
     rings = [lab.strike() for _ in range(struck)]
     for burst in (*[0.3, 12.0, 4.0, 1.1, 0.8] * 8, 0.3, *[7.0] * (module.LOOKS - 1), 0.3, 7.0):
@@ -150,7 +148,7 @@ def test_where_the_device_has_no_time_the_oldest_notes_end(lab: Lab, load: float
     assert not rings[-1].released, "one always rings"
 
 
-def test_the_oldest_notes_end_where_there_are_too_many(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oldest_notes_end_where_there_are_too_many(lab, monkeypatch):
     monkeypatch.setattr(module, "MOST_NOTES", 3)
     struck = []
     for number in range(5):
@@ -161,7 +159,7 @@ def test_the_oldest_notes_end_where_there_are_too_many(lab: Lab, monkeypatch: py
     assert [note.over for note in struck] == [True, True, False, False, False]
 
 
-def test_stop_ends_all_without_a_click(lab: Lab, tmp_path: Path) -> None:
+def test_stop_ends_all_without_a_click(lab, tmp_path):
     struck = [lab.strike(amplitude_mm=5.0) for _ in range(2)]
     loud = lab.hear(0.1)
     lab.notes.stop()
@@ -176,7 +174,7 @@ def test_stop_ends_all_without_a_click(lab: Lab, tmp_path: Path) -> None:
     assert lab.strike(Path(shutil.copy(lab.bank, tmp_path))).pending
 
 
-def test_what_waits_hears_of_switches_and_of_stop(lab: Lab, tmp_path: Path) -> None:
+def test_what_waits_hears_of_switches_and_of_stop(lab, tmp_path):
     holding, done = threading.Event(), threading.Event()
     lab.notes.in_background(lambda: holding.wait(20) and None)
     kept, stopped = (lab.strike(Path(shutil.copy(lab.bank, tmp_path / name))) for name in "ab")
@@ -194,7 +192,7 @@ def test_what_waits_hears_of_switches_and_of_stop(lab: Lab, tmp_path: Path) -> N
     assert not lab.hear(0.1).any()
 
 
-def test_a_preset_that_cannot_be_played_is_reported_and_hinders_no_other(lab: Lab, tmp_path: Path) -> None:
+def test_a_preset_that_cannot_be_played_is_reported_and_hinders_no_other(lab, tmp_path):
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(b"damaged")
     lab.notes.set_monitor(hears("model", "preset:broken"))
@@ -213,7 +211,7 @@ def test_a_preset_that_cannot_be_played_is_reported_and_hinders_no_other(lab: La
 @pytest.mark.parametrize(
     ("loudness", "gain"), [(12.0, 1 / 12), (1 / 80, 80.0), (1 / 120, 1.0), (120.0, 1.0), (0.0, 1.0)]
 )
-def test_levels_are_matched_once_they_are_known(lab: Lab, tmp_path: Path, loudness: float, gain: float) -> None:
+def test_levels_are_matched_once_they_are_known(lab, tmp_path, loudness, gain):
     """To the truth's, without the limiter, which a loud pluck would not pass; but no more than 40 dB off."""
     preset, path = load_preset(lab.bank), tmp_path / "loud.safetensors"
     with torch.no_grad():
@@ -235,14 +233,14 @@ def test_levels_are_matched_once_they_are_known(lab: Lab, tmp_path: Path, loudne
 
 
 @pytest.mark.parametrize("seconds", [0.5, 1.5])
-def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(lab: Lab, seconds: float) -> None:
+def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(lab, seconds):
     lab.notes.set_monitor(hears("model", level_match=True))
     note = lab.strike(lab.small_preset, position=0.43, seconds=seconds)
     lab.wait(lambda: lab.notes.poll() is None and note.match is not None)
     assert note.match is not None and 0 < abs(note.match["model"] - 1.0) < 0.3
 
 
-def test_latencies_are_noted_once_a_note_unless_they_cannot_be(lab: Lab) -> None:
+def test_latencies_are_noted_once_a_note_unless_they_cannot_be(lab):
     """The clock of gestures and that of the device's calls may have two bases, or one of them none."""
     lab.strike()
     found = [lab.notes.latencies_s]
@@ -275,7 +273,7 @@ def slow_model(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(KoopmanVar, "advance", slow)
 
 
-def test_a_model_that_is_rendered_begins_when_enough_is_there(lab: Lab, slow_model: None) -> None:
+def test_a_model_that_is_rendered_begins_when_enough_is_there(lab, slow_model):
     note = lab.strike(lab.small_preset, seconds=1.2)  # blocks of a quarter: two are left when it begins
     lab.wait(lambda: note.waits_s > 0)
     lab.notes.set_monitor(hears("truth"))
@@ -290,7 +288,7 @@ def test_a_model_that_is_rendered_begins_when_enough_is_there(lab: Lab, slow_mod
 
 
 @pytest.mark.parametrize("which", ["bank", "small_preset"])
-def test_notes_ring_on_where_the_device_changes_its_rate(lab: Lab, which: str, request: Any) -> None:
+def test_notes_ring_on_where_the_device_changes_its_rate(lab, which, request):
     path = request.getfixturevalue(which)
     struck = [lab.strike(path, position=0.3 + 0.05 * number) for number in range(6)]
     lab.wait(lambda: not any(note.pending or note.unfinished for note in struck))
@@ -307,7 +305,7 @@ def test_notes_ring_on_where_the_device_changes_its_rate(lab: Lab, which: str, r
     assert lab.notes.ringing == 5
 
 
-def test_another_rate_while_a_model_is_rendered(lab: Lab, slow_model: None) -> None:
+def test_another_rate_while_a_model_is_rendered(lab, slow_model):
     note = lab.strike(lab.small_preset, seconds=0.6)
     lab.wait(lambda: note.waits_s > 0)
     lab.mixer = Mixer(44_100)
@@ -316,7 +314,7 @@ def test_another_rate_while_a_model_is_rendered(lab: Lab, slow_model: None) -> N
     assert np.abs(lab.hear(0.05)).max() > 0.01
 
 
-def test_keys_of_a_single_string_are_places_along_it_and_ring(lab: Lab) -> None:
+def test_keys_of_a_single_string_are_places_along_it_and_ring(lab):
     reach, by_hand = lab.play_string(), Pluck(0.44, 3.0)
     struck = (NoteOn(LOWEST_PLACE, 64), NoteOn(HIGHEST_PLACE, 64), NoteOn(60, 90, pluck=by_hand), PluckAt(by_hand))
     plucks = [note.request.pluck for event in struck if isinstance(note := lab.notes.handle(event), PluckVoices)]
@@ -326,7 +324,7 @@ def test_keys_of_a_single_string_are_places_along_it_and_ring(lab: Lab) -> None:
     assert np.abs(lab.hear(0.5)[-1_000:]).max() > 1e-3 and lab.notes.ringing == 4
 
 
-def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(lab: Lab) -> None:
+def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(lab):
     lab.play_string()
     frame = lab.mixer.frames + 6_400
     kept, cancelled = (lab.notes.handle(NoteOn(50, 64), Due(lab.mixer, frame + late, 0.0)) for late in (0, 20_000))
@@ -359,7 +357,7 @@ def is_loud(sound: Any) -> bool:
 
 
 @pytest.mark.parametrize(("kind", "name"), [(InstrumentPlayer, "handle"), (KeyNote, "take")])
-def test_a_key_that_fails_costs_its_own_note(lab: Lab, monkeypatch: Any, kind: type, name: str) -> None:
+def test_a_key_that_fails_costs_its_own_note(lab, monkeypatch, kind, name):
     notes = Notes(lab.sound, Sources(), find_shipped, lambda message, details: lab.reports.append((message, details)))
     notes.set_monitor(hears("model"))
     notes.set_instrument(read_instrument(INSTRUMENTS / "classical_guitar.json"), EAR)
@@ -390,9 +388,7 @@ def test_a_key_that_fails_costs_its_own_note(lab: Lab, monkeypatch: Any, kind: t
         (PluckVoices, "release", lambda notes: notes.stop()),
     ],
 )
-def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
-    lab: Lab, monkeypatch: Any, kind: type, name: str, change: Callable[[Notes], object]
-) -> None:
+def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(lab, monkeypatch, kind, name, change):
     struck = [lab.strike() for _ in range(3)]
     lab.mixer.render(4800)
     monkeypatch.setattr(kind, name, once(getattr(kind, name), at=3 if kind is Voice else 2))
@@ -405,7 +401,7 @@ def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
     assert again.began and not again.over and is_loud(lab.sound)
 
 
-def test_a_report_that_fails_stops_nothing(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_that_fails_stops_nothing(lab, monkeypatch):
     notes = Notes(lab.sound, lab.sources, lambda name: None, lambda *_: 1 / 0)  # type: ignore[arg-type, return-value]
     notes.set_monitor(hears("model"))
     notes.choose(lab.pluck_of())

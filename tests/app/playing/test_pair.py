@@ -1,7 +1,5 @@
 """Two sounds side by side: looped, in step, switched without a click."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from app.playing.pair import Pair
@@ -10,7 +8,7 @@ from engine.voices import Mixer
 RATE_HZ, FRAMES = 48_000, 4_800
 
 
-def test_what_is_selected_is_heard_again_and_again_and_switched_by_a_cross_fade_in_step() -> None:
+def test_what_is_selected_is_heard_again_and_again_and_switched_by_a_cross_fade_in_step():
     mixer, pair = made()
     pair.stop()  # nothing sounds
     pair.play()
@@ -24,7 +22,7 @@ def test_what_is_selected_is_heard_again_and_again_and_switched_by_a_cross_fade_
     assert np.abs(np.diff(faded)).max() < 1.3 * 0.2 * 2 * np.pi * 200 / RATE_HZ and len(mixer.voices) == 2
 
 
-def test_again_it_begins_at_its_start_and_what_rang_fades() -> None:
+def test_again_it_begins_at_its_start_and_what_rang_fades():
     mixer, pair = made()
     pair.play()
     mixer.render(1_920)

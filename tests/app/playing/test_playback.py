@@ -1,7 +1,5 @@
 """A list of events handed over before its time, by a clock of frames that only the playback's own thread moves."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
@@ -68,7 +66,7 @@ class Player:
         return [due.frame - self.dues[0].frame for due in self.dues]
 
 
-def test_each_event_is_handed_over_before_its_frame_and_everything_is_let_go_in_the_end() -> None:
+def test_each_event_is_handed_over_before_its_frame_and_everything_is_let_go_in_the_end():
     player, began_s = Player(1_200), time.monotonic()
     player.play((0.2001, NoteOff(60)), (0.0, NoteOn(60, 90)), (0.1, NoteOn(64, 90)))
     assert player.events == [NoteOn(60, 90), NoteOn(64, 90), NoteOff(60), *release_all([0])]
@@ -81,9 +79,7 @@ def test_each_event_is_handed_over_before_its_frame_and_everything_is_let_go_in_
 
 
 @pytest.mark.parametrize(("buffer_s", "held_up_s", "apart"), [(0.0, 0.04, 2_400), (0.1, 0.0, 12_000)])
-def test_a_thread_that_was_held_up_or_a_device_that_takes_much_at_once_keeps_the_frames(
-    buffer_s: float, held_up_s: float, apart: int
-) -> None:
+def test_a_thread_that_was_held_up_or_a_device_that_takes_much_at_once_keeps_the_frames(buffer_s, held_up_s, apart):
     player = Player(round(buffer_s * RATE_HZ) or 480, buffer_s)
     player.hinder = lambda event: player.standing.render(round(held_up_s * RATE_HZ))
     player.play(*((number * apart / RATE_HZ, NoteOn(60 + number, 90)) for number in range(6)))
@@ -91,7 +87,7 @@ def test_a_thread_that_was_held_up_or_a_device_that_takes_much_at_once_keeps_the
     assert min(player.early[:6]) > (0.02 * RATE_HZ if buffer_s else 0)
 
 
-def test_it_can_be_stopped_and_lets_go_of_every_channel_at_once(wait: Callable[[Callable[[], object]], None]) -> None:
+def test_it_can_be_stopped_and_lets_go_of_every_channel_at_once(wait):
     player = Player()
     played: list[Event] = [NoteOn(60, 90), Bend(1.0), NoteOn(64, 90, 5), Bend(-0.5, 5), NoteOn(65, 90, KEYS)]
     playback = player.play(*((0.0, event) for event in played), (600.0, NoteOff(60)), whole=False)
@@ -102,7 +98,7 @@ def test_it_can_be_stopped_and_lets_go_of_every_channel_at_once(wait: Callable[[
     assert player.came[len(played) :] == [(event, None) for event in release_all([0, 5, KEYS])]
 
 
-def test_with_another_mixer_it_goes_on_from_where_it_was() -> None:
+def test_with_another_mixer_it_goes_on_from_where_it_was():
     player, late = Player(), Mixer(44_100)
     player.hinder = lambda event: setattr(player, "standing", late if event == NoteOn(62, 90) else player.standing)
     player.play(*((0.1 * number, NoteOn(60 + number, 90)) for number in range(6)))

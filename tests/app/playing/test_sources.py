@@ -1,7 +1,5 @@
 """Presets in memory: loaded once, forgotten when others are used, and nobody waits who need not."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from pathlib import Path
@@ -30,7 +28,7 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     return read
 
 
-def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset: Path, loaded: list[Path]) -> None:
+def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset, loaded):
     made = Sources()
     assert not made.has(small_preset, RATE_HZ)
     program = made.load(small_preset).program("model", RATE_HZ)
@@ -43,8 +41,8 @@ def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset: Path,
 
 
 def test_the_presets_that_were_used_last_are_kept_and_a_damaged_one_is_named(
-    small_preset: Path, tmp_path: Path, loaded: list[Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+    small_preset, tmp_path, loaded, monkeypatch
+):
     monkeypatch.setattr(module, "KEPT_PRESETS", 2)
     first, second, third = (Path(shutil.copy(small_preset, tmp_path / f"{n}.safetensors")) for n in range(3))
     made = Sources()
@@ -63,9 +61,7 @@ def test_the_presets_that_were_used_last_are_kept_and_a_damaged_one_is_named(
     assert not made.has(broken, RATE_HZ)
 
 
-def test_what_is_there_waits_for_nothing_that_is_loaded(
-    small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_there_waits_for_nothing_that_is_loaded(small_preset, tmp_path, monkeypatch):
     made, slow = Sources(), Path(shutil.copy(small_preset, tmp_path))
     made.prepare(small_preset, RATE_HZ)
     begun, go_on = threading.Event(), threading.Event()

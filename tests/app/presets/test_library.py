@@ -1,7 +1,5 @@
 """The library and what comes into it: refreshing, searching, installing, dropped files, and figures in words."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil
@@ -11,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.player.bodies import body_names
@@ -55,7 +52,7 @@ def files(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_refresh_reports_only_when_there_are_others(library: Library, small_preset: Path, own: Path) -> None:
+def test_a_refresh_reports_only_when_there_are_others(library, small_preset, own):
     seen = reported(library.changed)
     assert (library.refresh(), library.names, seen) == ([], ["first", "second"], [])
     own.mkdir()
@@ -71,9 +68,7 @@ def test_a_refresh_reports_only_when_there_are_others(library: Library, small_pr
     assert (mine.path, mine.size_bytes) == (own / "mine.safetensors", small_preset.stat().st_size)
 
 
-def test_a_preset_of_a_taken_name_gets_a_number(
-    library: Library, small_preset: Path, own: Path, tmp_path: Path
-) -> None:
+def test_a_preset_of_a_taken_name_gets_a_number(library, small_preset, own, tmp_path):
     given = other_preset(small_preset, tmp_path / "first.safetensors")
     present, bad = [entry.path for entry in library.entries], tmp_path / "bad.safetensors"
     for data in (b"", b"no preset", small_preset.read_bytes()[:-9]):
@@ -88,9 +83,7 @@ def test_a_preset_of_a_taken_name_gets_a_number(
     assert files(own) == ["first_2.safetensors"]
 
 
-def test_a_dropped_preset_that_is_there_is_chosen(
-    library: Library, small_preset: Path, own: Path, tmp_path: Path
-) -> None:
+def test_a_dropped_preset_that_is_there_is_chosen(library, small_preset, own, tmp_path):
     dropped = receive(small_preset, library)
     assert dropped.choices == {"preset": "first"}
     assert "is the factory preset “A small string" in dropped.notice
@@ -104,7 +97,7 @@ def test_a_dropped_preset_that_is_there_is_chosen(
 
 
 @pytest.mark.parametrize("ending", ["WAV", "FLAC"])
-def test_an_export_restores_its_choices(library: Library, preset_folder: Path, tmp_path: Path, ending: str) -> None:
+def test_an_export_restores_its_choices(library, preset_folder, tmp_path, ending):
     preset = preset_folder / "second.safetensors"
     other_preset(preset, preset)
     sound = NoteSound(preset, Pluck(0.61, 2.5, "raised_cosine", 0.2), 0.7, Ear((0.22,)))
@@ -131,7 +124,7 @@ def test_an_export_restores_its_choices(library: Library, preset_folder: Path, t
     assert "seconds" not in receive(tmp_path / "d.wav", library).choices
 
 
-def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:
+def test_foreign_and_broken_files_are_one_notice(library, tmp_path):
     for name, words in (
         ("a.txt", "not a file that is used here"),
         ("a.wav", "no sound file that can be read"),
@@ -150,7 +143,7 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
     ("name", "form"),
     [("a.wave", "WAV"), ("a.BWF", "RF64"), ("a.aifc", "AIFF"), ("a.ogg", "OGG"), ("a.oga", "OGG"), ("a.opus", "OGG")],
 )
-def test_a_sound_is_taken_by_every_usual_ending(name: str, form: str, library: Library, tmp_path: Path) -> None:
+def test_a_sound_is_taken_by_every_usual_ending(name, form, library, tmp_path):
     subtype = "OPUS" if name == "a.opus" else None
     soundfile.write(tmp_path / name, 0.5 * np.sin(np.arange(24_000) / 20), 48_000, format=form, subtype=subtype)
     assert receive(tmp_path / name, library) == Dropped(sound=True)
@@ -160,7 +153,7 @@ def test_a_sound_is_taken_by_every_usual_ending(name: str, form: str, library: L
         assert receive(tmp_path / name, library).body == "a" == body_names()[-1]
 
 
-def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first() -> None:
+def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first():
     entries, _ = list_presets(SHIPPED)
     assert len({one.title for one in entries}) == len(entries) > 2
     assert [one.studio for one in entries] == sorted((one.studio for one in entries), reverse=True)
@@ -170,9 +163,7 @@ def heard(path: Path, distance_db: float) -> Heard:
     return Heard(path.stem, preset_digest(path), 4.0, distance_db, 0.0, 0.0)
 
 
-def test_a_measured_distance_comes_and_goes_with_it(
-    library: Library, preset_folder: Path, small_preset: Path
-) -> None:
+def test_a_measured_distance_comes_and_goes_with_it(library, preset_folder, small_preset):
     first, seen = preset_folder / "first.safetensors", reported(library.changed)
     assert library.entries[0].heard is None
     add_heard(preset_folder, [heard(first, 0.5)])
@@ -187,9 +178,7 @@ def test_a_measured_distance_comes_and_goes_with_it(
         assert [entry.name for entry in entries] == ["first", "second"] and 1 <= len(problems) <= 4
 
 
-def test_the_most_accurate_come_first(
-    qtbot: QtBot, library: Library, preset_folder: Path, small_preset: Path
-) -> None:
+def test_the_most_accurate_come_first(qtbot, library, preset_folder, small_preset):
     for name, title, distance_db in (("third", b"Another string", 3.0), ("fourth", b"Fourth  string", 0.1)):
         path = other_preset(small_preset, preset_folder / f"{name}.safetensors", title)
         add_heard(preset_folder, [heard(path, distance_db)])
@@ -205,7 +194,7 @@ def test_the_most_accurate_come_first(
         assert [row.name for row in listed_rows(rows, favourites, (words,), order=order)] == names.split()
 
 
-def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset_folder: Path) -> None:
+def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot, preset_folder):
     one, *_ = list_presets()[0]
     nylon = replace(one.info, title="Nylon B3, plucked")
     steel = replace(one.info, title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman")
@@ -225,7 +214,7 @@ def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset
         assert listed_rows([low, high], {"high"}, words.split(), kinds, starred) == found, (words, kinds)
 
 
-def test_figures_have_few_digits_and_the_measured_error_decides_whether_to_warn() -> None:
+def test_figures_have_few_digits_and_the_measured_error_decides_whether_to_warn():
     shares = (0.0, 1e-7, 1.2e-5, 0.0345, 0.5, 1.16)
     assert [*map(percent, shares)] == ["< 0.001 %", "< 0.001 %", "0.0012 %", "3.5 %", "50 %", "116 %"]
     outside = "decay time near 3 kHz 1.9 s is outside the trained 0.1 … 1 s"

@@ -1,7 +1,5 @@
 """A blow on a drum: what pictures, signals and errors show of it agrees with the engine, at any speed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
@@ -94,7 +92,7 @@ def true_amplitudes(modes: DrumModes, strike: Strike, frames: int) -> np.ndarray
 
 
 @pytest.mark.parametrize("instrument", [TOM, PLATE, BAR], ids=["tom", "plate", "bar"])
-def test_in_real_time_a_picture_is_the_true_motion(instrument: Instrument, helper: Executor) -> None:
+def test_in_real_time_a_picture_is_the_true_motion(instrument, helper):
     take, modes = rendered(request_of(instrument), helper), modes_in(instrument)
     head, true = take.head, true_amplitudes(modes, HARD, take.frames - 1)
     shapes = modes.shapes(head.places)[: len(head.shapes)]
@@ -116,7 +114,7 @@ def test_in_real_time_a_picture_is_the_true_motion(instrument: Instrument, helpe
     assert (picture == picture[:1]).all() if instrument is BAR else edges < 1e-5 * np.abs(picture).max()
 
 
-def test_in_slow_motion_each_mode_turns_slowly_and_decays_in_real_time(helper: Executor) -> None:
+def test_in_slow_motion_each_mode_turns_slowly_and_decays_in_real_time(helper):
     """A quiet drum is linear: each mode is v₀/ω' e^(-σt) sin(ω's t) at the speed s."""
     take, speed = rendered(request_of(TOM, 1), helper), 0.03
     omega, sigma = np.sqrt(TOM_MODES.omega**2 - TOM_MODES.sigma**2), TOM_MODES.sigma
@@ -128,7 +126,7 @@ def test_in_slow_motion_each_mode_turns_slowly_and_decays_in_real_time(helper: E
         assert np.square(found - expected).sum() <= 1e-3 * np.square(sizes).sum()
 
 
-def test_any_blocks_give_the_same(tom: BlowTake, helper: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_blocks_give_the_same(tom, helper, monkeypatch):
     monkeypatch.setattr(drum_line, "BLOCK_FRAMES", 317)
     other = rendered(request_of(TOM), helper)
     for name in ("model", "truth"):
@@ -141,7 +139,7 @@ def test_any_blocks_give_the_same(tom: BlowTake, helper: Executor, monkeypatch: 
     assert other.error_course.rel_mse == pytest.approx(tom.error_course.rel_mse, rel=1e-3)
 
 
-def test_errors_are_those_over_the_surface(tom: BlowTake) -> None:
+def test_errors_are_those_over_the_surface(tom):
     resonator, speeds = TOM_MODES.resonator(np.zeros((1, 2))), HARD.speeds(TOM_MODES)
     struck = StruckDrum(resonator, np.zeros(len(TOM_MODES)), speeds, TOM_MODES.scale**2, 0.1, "tom", TOM_MODES.drum)
     players, course = {"model": model_player(LOADED.preset.model)}, tom.error_course
@@ -153,7 +151,7 @@ def test_errors_are_those_over_the_surface(tom: BlowTake) -> None:
     assert np.abs(course.curves["level_db"]).max() < 0.01
 
 
-def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:
+def test_another_direction_changes_the_sound_alone(helper):
     job = RenderJob(request_of(TOM), lambda _: LOADED, lambda *_: None, helper)
     take = finish(job)
     before, shown = take.listened, take.motions["truth"].size_m.copy()
@@ -169,7 +167,7 @@ def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:
         assert found == pytest.approx(expected[: len(found)], abs=1e-4 * np.abs(expected).max())
 
 
-def test_another_blow_is_another_motion() -> None:
+def test_another_blow_is_another_motion():
     asked = request_of(TOM)
     others = (request_of(TOM, 126), request_of(TOM.with_value("knobs.decay", 0.5)), request_of(PLATE), None)
     for other in (*others, replace(asked, seconds=1.0), replace(asked, struck=None)):
@@ -177,7 +175,7 @@ def test_another_blow_is_another_motion() -> None:
     assert asked.same_motion(request_of(TOM))
 
 
-def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
+def test_a_preset_of_one_string_is_refused(helper):
     nylon = Loaded(load_preset(SHIPPED / "studio_nylon_b3.safetensors"))
     with pytest.raises(PresetError, match="many strings"):
         RenderJob(request_of(TOM), lambda _: nylon, lambda *_: None, helper).advance()

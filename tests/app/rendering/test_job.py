@@ -1,7 +1,5 @@
 """Pictures, flashes, errors and signals of a pluck against its sources in one piece, however a take grows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -37,7 +35,7 @@ def take(small_preset: Path) -> Take:
     return Take("small", read_info(small_preset), Pluck(0.35, 4.0), 1500 / 4000, Ear((0.5,)))
 
 
-def test_windows_are_the_engines_however_the_take_grows(take: Take) -> None:
+def test_windows_are_the_engines_however_the_take_grows(take):
     course = take.error_course
     for stop in (1, 7, 33, 34, 900, 1501):
         append_to(take, MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
@@ -51,14 +49,14 @@ def test_windows_are_the_engines_however_the_take_grows(take: Take) -> None:
 
 
 @pytest.mark.parametrize(("gain", "level_db"), [(2, 20 * np.log10(2)), (0, np.nan)])
-def test_a_louder_or_a_silent_model(take: Take, gain: int, level_db: float) -> None:
+def test_a_louder_or_a_silent_model(take, gain, level_db):
     append_to(take, gain * TRUTH, TRUTH)
     curves = take.error_course.curves
     assert curves["level_db"][0] == pytest.approx(level_db, nan_ok=True)
     assert curves["rmse"][0] == curves["mae"][0] == pytest.approx(1)
 
 
-def test_slow_motion_stays_within_a_period_of_the_playhead_and_moves_slowly() -> None:
+def test_slow_motion_stays_within_a_period_of_the_playhead_and_moves_slowly():
     places_s = np.arange(FLASH_HZ + 1) / FLASH_HZ
     times_s = Strobe(0.004, HZ, 1.0).times_s
     assert np.abs(times_s - places_s).max() <= 1 / HZ
@@ -68,7 +66,7 @@ def test_slow_motion_stays_within_a_period_of_the_playhead_and_moves_slowly() ->
 
 
 @pytest.mark.parametrize("block", [1, 7, 100, 5_000])
-def test_flashes_lie_between_the_frames_around_them_however_they_come(block: int) -> None:
+def test_flashes_lie_between_the_frames_around_them_however_they_come(block):
     rate_hz, frames, ready = 1_000, 1_001, [0]
     strobe = Strobe(0.01, HZ, 1.0)
     places_s = (-1.0, 0.0, 1.4 / FLASH_HZ, 0.999, 1.0, 9.0)
@@ -145,7 +143,7 @@ def frames_m(source: StringSource, take: Take) -> NDArray[np.float64]:
 
 
 @PRESETS
-def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render, sources: Sources) -> None:
+def test_pictures_and_flashes_are_frames_of_the_motion(preset, job, sources):
     take, loaded = finished(job(preset)), sources.load(preset)
     assert take.stride == STRIDES[preset]
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
@@ -163,9 +161,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
 
 @PRESETS
 @pytest.mark.parametrize("ear", EARS, ids=["one", "stereo velocity", "solo"])
-def test_a_signal_is_that_of_the_motion_also_where_a_point_moves_to(
-    preset: Any, ear: Ear, job: Render, sources: Sources, derivative: Callable[..., np.ndarray]
-) -> None:
+def test_a_signal_is_that_of_the_motion_also_where_a_point_moves_to(preset, ear, job, sources, derivative):
     """Up to what the truth's voice leaves out, 108 dB below the rest. It moves half-way and afterwards."""
     there, loaded = finished(job(preset, ear=ear)), sources.load(preset)
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
@@ -192,7 +188,7 @@ def test_a_signal_is_that_of_the_motion_also_where_a_point_moves_to(
         assert finished(moved) is take
 
 
-def test_while_a_point_is_dragged_all_of_the_signal_follows(job: Render) -> None:
+def test_while_a_point_is_dragged_all_of_the_signal_follows(job):
     made = job(NETWORK)
     take, seen = finished(made), set()
     for number in range(40):
@@ -205,7 +201,7 @@ def test_while_a_point_is_dragged_all_of_the_signal_follows(job: Render) -> None
 
 @PRESETS
 @pytest.mark.parametrize("blocks", [2, 1_000])
-def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, job: Render) -> None:
+def test_another_speed_shows_what_it_would_have_shown(preset, blocks, job):
     there, slower = finished(job(preset, speed=0.02)), job(preset)
     while not slower.idle and blocks:
         slower.advance()
@@ -224,7 +220,7 @@ def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, 
             np.testing.assert_allclose(shown, expected, atol=1e-6 * np.abs(there.motion_m(name)).max())
 
 
-def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources: Sources) -> None:
+def test_the_error_that_is_reported_is_that_of_every_frame(job, sources):
     take, loaded = finished(job(STUDIO)), sources.load(STUDIO)
     model, truth = (frames_m(source, take)[None, 1:] for source in (loaded.model, loaded.truth))
     sums = ErrorSums(model.shape[1])
@@ -235,7 +231,7 @@ def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources:
     assert found.rel_mae == pytest.approx(every.rel_mae, rel=0.03)
 
 
-def test_ten_seconds_take_few_megabytes(job: Render) -> None:
+def test_ten_seconds_take_few_megabytes(job):
     made = job(STUDIO, seconds=10.0, ear=EARS[1])
     made.advance()
     for name in SOURCES:

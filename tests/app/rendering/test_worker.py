@@ -1,7 +1,5 @@
 """The render worker: complete motions, the latest request wins, others come and go, faults are reported."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 import time
@@ -70,7 +68,7 @@ def heard() -> Iterator[Heard]:
     wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
 
 
-def test_the_latest_request_wins_and_is_announced_again_when_asked_for(small_preset: Path, heard: Heard) -> None:
+def test_the_latest_request_wins_and_is_announced_again_when_asked_for(small_preset, heard):
     heard.gate.clear()  # or the first could be finished before the last is submitted
     for position in (0.3, 0.35, 0.4, 0.45, 0.5):
         heard.submit(small_preset, position)
@@ -82,9 +80,7 @@ def test_the_latest_request_wins_and_is_announced_again_when_asked_for(small_pre
     assert heard.started[-2:] == heard.finished == 2 * heard.finished[:1]
 
 
-def test_a_motion_waits_for_the_sound_and_keeps_step(
-    small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_motion_waits_for_the_sound_and_keeps_step(small_preset, heard, monkeypatch):
     monkeypatch.setattr(worker_module, "IN_STEP_S", 600.0)  # not over before this is looked at
     heard.sounds, heard.hurried = False, True
     heard.submit(small_preset, seconds=8.0)
@@ -99,7 +95,7 @@ def test_a_motion_waits_for_the_sound_and_keeps_step(
     wait_until(lambda: take.complete)
 
 
-def test_a_broken_preset_is_reported_and_work_continues(small_preset: Path, tmp_path: Path, heard: Heard) -> None:
+def test_a_broken_preset_is_reported_and_work_continues(small_preset, tmp_path, heard):
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(small_preset.read_bytes()[:100])
     heard.submit(broken)
@@ -109,7 +105,7 @@ def test_a_broken_preset_is_reported_and_work_continues(small_preset: Path, tmp_
     wait_until(lambda: heard.finished)
 
 
-def test_a_runaway_model_alone_is_silenced(small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_runaway_model_alone_is_silenced(small_preset, heard, monkeypatch):
     advance = KoopmanVar.advance
 
     def faulty(
@@ -128,7 +124,7 @@ def test_a_runaway_model_alone_is_silenced(small_preset: Path, heard: Heard, mon
     assert np.abs(take.motion_m("truth")[1_000:]).max() > 1e-4
 
 
-def test_another_presets_model_moves_beside_it(small_preset: Path, tmp_path: Path, heard: Heard) -> None:
+def test_another_presets_model_moves_beside_it(small_preset, tmp_path, heard):
     """It may come later: the motion is not rendered again. One that is damaged is reported, and at rest."""
     other, broken = (tmp_path / f"{name}.safetensors" for name in ("other", "broken"))
     shutil.copy(small_preset, other)
@@ -146,7 +142,7 @@ def test_another_presets_model_moves_beside_it(small_preset: Path, tmp_path: Pat
     assert {*map(id, heard.started), *map(id, heard.finished)} == {id(take)}
 
 
-def test_another_pluck_waits_for_none(small_preset: Path, heard: Heard, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_pluck_waits_for_none(small_preset, heard, monkeypatch):
     advance = SourceLine.advance
 
     def slow(line: SourceLine, samples: int) -> None:

@@ -1,7 +1,5 @@
 """The session: validated choices, notice of what really changed, and the pluck that a preset brings."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import pytest
@@ -42,7 +40,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("field", "value"), [*BAD.items(), ("a", "noise"), ("a", "preset:"), ("a", "model ")])
-def test_a_bad_value_changes_nothing_and_is_named(field: str, value: object) -> None:
+def test_a_bad_value_changes_nothing_and_is_named(field, value):
     session = Session()
     seen, before = recorded(session), session.choices
     with pytest.raises(ValueError, match=field):
@@ -50,7 +48,7 @@ def test_a_bad_value_changes_nothing_and_is_named(field: str, value: object) -> 
     assert session.choices is before and seen == []
 
 
-def test_gestures_are_clamped_and_slots_are_switched_there_and_back() -> None:
+def test_gestures_are_clamped_and_slots_are_switched_there_and_back():
     session = Session(Choices(a="preset:other one", b="difference"))
     session.move_pluck(-3, 400)
     session.move_listening_point(7)
@@ -61,7 +59,7 @@ def test_gestures_are_clamped_and_slots_are_switched_there_and_back() -> None:
         session.switch_source()
 
 
-def test_keys_play_what_was_chosen_last() -> None:
+def test_keys_play_what_was_chosen_last():
     instrument = played_instrument(0.2)
     session = Session(Choices(instrument=instrument, string=STRING))
     session.update(preset="one")
@@ -87,7 +85,7 @@ def test_keys_play_what_was_chosen_last() -> None:
 
 @pytest.mark.parametrize("plays", ["pitch", "place", None])
 @pytest.mark.parametrize("preset", ["many", "one"])
-def test_choices_from_before_the_instrument_are_understood(plays: str | None, preset: str) -> None:
+def test_choices_from_before_the_instrument_are_understood(plays, preset):
     instrument = played_instrument(0.2)
     old = {"preset": preset, "patch": instrument.model_dump(), "string": asdict(STRING), "position": 0.4}
     choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
@@ -98,7 +96,7 @@ def test_choices_from_before_the_instrument_are_understood(plays: str | None, pr
     assert Choices.model_validate_json(choices.model_dump_json()) == choices
 
 
-def test_choices_of_two_kinds_of_instruments_are_understood() -> None:
+def test_choices_of_two_kinds_of_instruments_are_understood():
     instrument = played_instrument(0.2)
     played, beside, alone = (
         Choices.model_validate({"position": 0.4, **old})
@@ -119,7 +117,7 @@ def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
     return instrument.pickup.points, instrument.pickup.kind
 
 
-def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it() -> None:
+def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it():
     session = Session()
     session.update(played=played_instrument(0.2))
     session.update(pickup="velocity")
@@ -144,7 +142,7 @@ def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it() -> None:
     assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
 
 
-def test_a_instrument_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
+def test_a_instrument_whose_macro_moves_the_right_point_stays_in_stereo():
     macro = {"name": "Width", "targets": ({"field": "pickup.points.1", "low": 0.5, "high": 0.9},)}
     session = Session()
     session.update(played=Instrument.model_validate({**dict(played_instrument(0.2, 0.8)), "macros": (macro,)}))
@@ -159,7 +157,7 @@ LRU, FGRU = "nylon_nonlinear_gaussian_16k_lru_400", "nylon_nonlinear_gaussian_16
 LINEAR, NOISE, STUDIO = "nylon_linear_gaussian_16k_lru", "nylon_nonlinear_noise_4k_koopman", "studio_nylon_b3"
 
 
-def test_every_middle_lies_within_its_training_and_the_others_say_why_there_is_none() -> None:
+def test_every_middle_lies_within_its_training_and_the_others_say_why_there_is_none():
     for entry in LIBRARY.entries:
         info = entry.info
         if info.initial == "noise" or info.family is not None:
@@ -183,9 +181,7 @@ def test_every_middle_lies_within_its_training_and_the_others_say_why_there_is_n
         (LRU, "rounded", "gone", False),
     ],
 )
-def test_a_preset_brings_its_pluck_where_the_present_one_is_outside(
-    before: str, shape: str, chosen: str, brings: bool
-) -> None:
+def test_a_preset_brings_its_pluck_where_the_present_one_is_outside(before, shape, chosen, brings):
     found = brought_pluck(Choices(single=before, shape=shape), LIBRARY, chosen)
     entry = LIBRARY.find(chosen)
     assert found == (asdict(entry.info.middle_pluck) if brings and entry and entry.info.middle_pluck else {})

@@ -1,11 +1,7 @@
 """The sound of two slots: voices, levels, the words in which it is shown, and why it is silent."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,11 +39,11 @@ B = "preset:b"
         (hears("difference"), None, {"model": 1, B: 0}),
     ],
 )
-def test_gains_of_what_is_heard(monitor: Monitor, match: dict[str, float] | None, gains: dict[str, float]) -> None:
+def test_gains_of_what_is_heard(monitor, match, gains):
     assert {source: monitor.gain(source, gains.keys(), match) for source in gains} == pytest.approx(gains)
 
 
-def test_slots_get_voices_and_gains_are_shown_once_they_are_known() -> None:
+def test_slots_get_voices_and_gains_are_shown_once_they_are_known():
     assert Monitor().voices == ("model", "truth")
     assert Monitor(heard="b").voices == ("truth", "model")
     assert Monitor(a="difference", b=B).voices == ("model", "truth", B)
@@ -58,7 +54,7 @@ def test_slots_get_voices_and_gains_are_shown_once_they_are_known() -> None:
     assert Monitor(b="difference", difference_gain_db=12.0).gain_db("b", None) == 12
 
 
-def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small_preset: Path) -> None:
+def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small_preset):
     info = replace(read_info(small_preset), title="Steel E4, bright")
     library = Library([PresetEntry("steel_e4", small_preset, info)])
     choices = Choices(a="difference", b="preset:steel_e4", heard="b", difference_gain_db=30)
@@ -84,7 +80,7 @@ def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small
         (1e-12, "velocity", 1e9, "nm/s"),
     ],
 )
-def test_a_unit_has_few_digits(peak: float, pickup: str, factor: float, unit: str) -> None:
+def test_a_unit_has_few_digits(peak, pickup, factor, unit):
     assert readable_unit(peak, pickup) == (factor, unit)
 
 
@@ -113,14 +109,14 @@ STRINGS = {name: read_string(find_string(name)) for name in ("nylon_e2", "piano_
         ({"single": "studio_any_string", "string": STRINGS["piano_c4"], "solo": 55}, "this string has 53"),
     ],
 )
-def test_the_reason_is_named(small_preset: Path, changes: dict[str, object], words: str) -> None:
+def test_the_reason_is_named(small_preset, changes, words):
     library = Library([*list_presets(small_preset.parent)[0], *list_presets(SHIPPED)[0]])
     found = why_silent(Choices(**{"single": "small", **changes}), library)
     assert words in found
     assert bool(found) == bool(words)
 
 
-def test_a_difference_of_next_to_nothing_is_named(small_preset: Path, hear: Callable[[Take, Ear], None]) -> None:
+def test_a_difference_of_next_to_nothing_is_named(small_preset, hear):
     choices = Choices()
     take = Take("small", read_info(small_preset), Pluck(), 0.5, choices.ear)
     rest = np.zeros((take.frames, take.info.grid_points), np.float32)
@@ -138,7 +134,7 @@ def test_a_difference_of_next_to_nothing_is_named(small_preset: Path, hear: Call
         assert bool(found) == bool(words)
 
 
-def test_a_model_that_runs_away_is_reported_with_the_reason(small_preset: Path) -> None:
+def test_a_model_that_runs_away_is_reported_with_the_reason(small_preset):
     take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5, Ear((0.5,)))
     assert why_ran_away(take) == ""
     take.model_ends_s = 0.0

@@ -1,7 +1,5 @@
 """Memory returned to the system, garbage deleted in the window's thread, and threads that step back alone."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -62,19 +60,19 @@ def printed(script: str) -> str:
     return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.strip()
 
 
-def test_garbage_of_any_thread_is_deleted_in_the_windows() -> None:
+def test_garbage_of_any_thread_is_deleted_in_the_windows():
     assert printed(GARBAGE) == "{True}"
 
 
 @ON_LINUX
 @pytest.mark.parametrize(("script", "least_mib"), [(LARGE, 48), (SMALL, 32)])
-def test_large_blocks_and_free_pages_of_a_threads_heap_are_returned(script: str, least_mib: int) -> None:
+def test_large_blocks_and_free_pages_of_a_threads_heap_are_returned(script, least_mib):
     most_mib, left_mib = map(int, printed(script + USED).split())
     assert most_mib > least_mib and left_mib < 8
 
 
 @ON_LINUX
-def test_a_thread_and_what_it_starts_step_back_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thread_and_what_it_starts_step_back_and_no_other(monkeypatch):
     def niceness() -> int:
         return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
 

@@ -1,13 +1,11 @@
 """Parameters and the names of keys: values, steps, words, and numbers as they are typed anywhere."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
 
 from app.shared.key_names import key_named, note_name
-from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS, Parameter
+from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from app.shared.typed_number import begins_number, typed_number
 
 ALL = {**OF_INSTRUMENTS, **OF_CHOICES}.values()
@@ -40,7 +38,7 @@ REFUSED = {  # by unit
 }
 
 
-def test_numbers_with_either_decimal_sign_groups_and_units_are_understood_and_other_texts_refused() -> None:
+def test_numbers_with_either_decimal_sign_groups_and_units_are_understood_and_other_texts_refused():
     for (value, unit), texts in UNDERSTOOD.items():
         for text in texts:
             assert typed_number(text, unit) == pytest.approx(value), text
@@ -50,7 +48,7 @@ def test_numbers_with_either_decimal_sign_groups_and_units_are_understood_and_ot
 
 
 @pytest.mark.parametrize("parameter", ALL, ids=lambda parameter: parameter.id)
-def test_a_knob_goes_through_its_whole_range_and_back_and_reads_what_it_shows(parameter: Parameter) -> None:
+def test_a_knob_goes_through_its_whole_range_and_back_and_reads_what_it_shows(parameter):
     low, high = parameter.limits
     values = [parameter.value(share / 10) for share in range(11)]
     assert (values[0], values[-1]) == (low, pytest.approx(high))
@@ -76,14 +74,14 @@ def test_a_knob_goes_through_its_whole_range_and_back_and_reads_what_it_shows(pa
         assert parameter.words or parameter.typed(number) == parameter.typed(shown), number
 
 
-def test_shares_are_typed_in_per_cent_and_words_by_word_or_number() -> None:
+def test_shares_are_typed_in_per_cent_and_words_by_word_or_number():
     mix = OF_INSTRUMENTS["room.mix"]
     assert [mix.typed(text) for text in ("20", "20%", "20 %", "100", "0.5")] == [0.2, 0.2, 0.2, 1.0, 0.005]
     assert OF_INSTRUMENTS["tuning.transpose"].typed("2.5") is None
     assert OF_INSTRUMENTS["technique.strokes"].typed("both") == OF_INSTRUMENTS["technique.strokes"].typed("2") == 2
 
 
-def test_names_of_keys_are_read_as_they_are_written_and_in_other_spellings() -> None:
+def test_names_of_keys_are_read_as_they_are_written_and_in_other_spellings():
     assert [key_named(note_name(key)) for key in range(128)] == list(range(128))
     spellings = {"e2": 40, "F#3": 54, "Gb3": 54, "G♭3": 54, " 54 ": 54, "C-1": 0}
     assert {text: key_named(text) for text in spellings} == spellings

@@ -1,7 +1,5 @@
 """Files that a user asked for: whole or not at all, through links, and the remedy where one cannot be written."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path
@@ -11,7 +9,7 @@ import pytest
 from engine.whole_file import WriteError, result_file
 
 
-def test_the_file_appears_when_the_block_ends_and_a_link_to_it_stays(tmp_path: Path) -> None:
+def test_the_file_appears_when_the_block_ends_and_a_link_to_it_stays(tmp_path):
     path, link = tmp_path / "out.bin", tmp_path / "link"
     with result_file(path) as file:
         file.write(b"12")
@@ -35,9 +33,7 @@ def test_the_file_appears_when_the_block_ends_and_a_link_to_it_stays(tmp_path: P
         (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), WriteError, r"out\.bin: cannot be .* \(No space.*; free"),
     ],
 )
-def test_after_an_error_the_old_file_stays_and_nothing_else(
-    tmp_path: Path, error: BaseException, raised: type[BaseException], words: str
-) -> None:
+def test_after_an_error_the_old_file_stays_and_nothing_else(tmp_path, error, raised, words):
     path = tmp_path / "out.bin"
     path.write_bytes(b"old")
     with pytest.raises(raised, match=words), result_file(path) as file:
@@ -48,7 +44,7 @@ def test_after_an_error_the_old_file_stays_and_nothing_else(
 
 
 @pytest.mark.skipif(not hasattr(os, "setgid"), reason="needs POSIX limits")
-def test_a_write_that_the_system_stops_half_way_leaves_nothing(tmp_path: Path) -> None:
+def test_a_write_that_the_system_stops_half_way_leaves_nothing(tmp_path):
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -71,7 +67,7 @@ def test_a_write_that_the_system_stops_half_way_leaves_nothing(tmp_path: Path) -
         ("/dev/full", "not a file that can be replaced"),
     ],
 )
-def test_where_nothing_can_be_written_the_block_does_not_run(tmp_path: Path, place: str, words: str) -> None:
+def test_where_nothing_can_be_written_the_block_does_not_run(tmp_path, place, words):
     if place.startswith("locked") and (not hasattr(os, "geteuid") or os.geteuid() == 0):
         pytest.skip("root may write anywhere")
     if place.startswith("/dev") and not Path(place).exists():

@@ -1,7 +1,5 @@
 """The stage after each event, and steps of undo: gestures in plain words; what is only looked at is none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -52,7 +50,7 @@ def guitar() -> Instrument:
     return read_instrument(SHIPPED / "classical_guitar.json")
 
 
-def test_whatever_a_knob_turns_has_words_without_marks_and_a_macro_its_name(guitar: Instrument) -> None:
+def test_whatever_a_knob_turns_has_words_without_marks_and_a_macro_its_name(guitar):
     for field in set(ASSIGNABLE) - {"pickup.points.1"}:
         value = guitar.value(field)
         for turned in (0.9 * value + 0.011, 0.9 * value - 0.011):
@@ -67,7 +65,7 @@ def test_whatever_a_knob_turns_has_words_without_marks_and_a_macro_its_name(guit
     assert step_words({"instrument": instrument}, {"instrument": instrument.turned(0, 0.9)}) == "Damp"
 
 
-def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
+def test_back_and_forth_to_the_very_choices_and_no_further(hand):
     start = hand.session.choices
     hand.change(position=0.5, amplitude_mm=2)
     middle = hand.session.choices
@@ -83,7 +81,7 @@ def test_back_and_forth_to_the_very_choices_and_no_further(hand: Hand) -> None:
     assert hand.undone("width") == [0.06, 0.06]
 
 
-def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand) -> None:
+def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand):
     for position in (0.4, 0.41, 0.42):
         hand.change(0.9 * GATHER_S, position=position)
     hand.change(2 * GATHER_S, position=0.6)
@@ -92,7 +90,7 @@ def test_notches_of_one_field_are_one_step_until_half_a_second_passes(hand: Hand
     assert hand.undone("position") == [0.6, 0.6, 0.42, 0.35]
 
 
-def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand: Hand) -> None:
+def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand):
     for positions in ((0.4, 0.41, 0.44), (0.6, 0.5), (0.7, 0.5)):
         hand.session.hold()
         for moved, position in enumerate(positions):
@@ -102,7 +100,7 @@ def test_a_drag_is_one_step_however_long_and_one_back_to_its_start_is_none(hand:
     assert hand.undone("position") == [0.44, 0.35]
 
 
-def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Hand) -> None:
+def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand):
     seen = {"heard": "b", "loop": True, "speed": 1, "left_view": "x", "motion": False, "envelope": False}
     hand.change(volume_db=-6, **seen)
     assert not hand.session.undo_words
@@ -113,7 +111,7 @@ def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand: Han
     assert set(Choices.model_fields) > RECORDED
 
 
-def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand: Hand) -> None:
+def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand):
     session = hand.session
 
     def state() -> tuple[float, float, float]:
@@ -143,7 +141,7 @@ def pickup_of(session: Session) -> tuple[object, ...]:
     return choices.stereo, choices.pickup, choices.listen, choices.instrument and choices.instrument.pickup
 
 
-def test_what_is_played_and_where_it_is_heard_are_steps(hand: Hand, guitar: Instrument) -> None:
+def test_what_is_played_and_where_it_is_heard_are_steps(hand, guitar):
     session = hand.session
     session.update(played=guitar)
     own = pickup_of(session)
@@ -176,7 +174,7 @@ def test_what_is_played_and_where_it_is_heard_are_steps(hand: Hand, guitar: Inst
     assert (session.choices.plays_instrument, pickup_of(session)) == (True, own)
 
 
-def test_each_way_the_next_step_is_named_and_two_knobs_are_two_however_quick(hand: Hand, guitar: Instrument) -> None:
+def test_each_way_the_next_step_is_named_and_two_knobs_are_two_however_quick(hand, guitar):
     hand.change(played=guitar)
     for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
         instrument = hand.session.choices.instrument
@@ -200,7 +198,7 @@ def note(request: NoteSound = REQUEST, from_s: float = 0.0) -> Any:
     return PluckVoices(request, ("model",), from_s)
 
 
-def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it() -> None:
+def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it():
     stage = first_stage(Choices(single="one"))
     for instrument in (HARP, GUITAR):
         stage = next_stage(stage, Chosen({"played": instrument}))
@@ -212,7 +210,7 @@ def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it() -> N
     assert (stage.choices.string, stage.choices.position, stage.key) == (low.parameters, 0.2, (43, None))
 
 
-def test_the_playhead_follows_the_note_of_the_motion_until_it_is_parked() -> None:
+def test_the_playhead_follows_the_note_of_the_motion_until_it_is_parked():
     take: Any = SimpleNamespace(seconds=1.0)
     first, second = note(), note(from_s=0.4)
     stage = next_stage(first_stage(Choices(single="one")), Begun(first))

@@ -1,7 +1,5 @@
 """Widgets that are shown, and the look of the application, which is as before afterwards."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

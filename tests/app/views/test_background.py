@@ -1,7 +1,5 @@
 """Work in a thread of its own: the latest job alone, nothing of an abandoned one, and nothing left at the end."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 
@@ -41,7 +39,7 @@ def background(qtbot: QtBot, threads_begun: Callable[[], list[str]]) -> Iterator
     assert threads_begun() == []
 
 
-def test_a_job_reports_here(qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_reports_here(qtbot, background, monkeypatch):
     monkeypatch.setattr(worker, "REPORT_EVERY_S", 60.0)  # each takes a breath, which may be long
     here, seen = threading.get_ident(), []
     background.progressed.connect(lambda *values: seen.append((*values, threading.get_ident())))
@@ -59,7 +57,7 @@ def test_a_job_reports_here(qtbot: QtBot, background: Background, monkeypatch: p
     assert seen == [(0.05 * count, "words", so_far, here) for count, so_far in ((0, None), (18, 18), (19, 19))]
 
 
-def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot: QtBot, background: Background) -> None:
+def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot, background):
     endless, said, results = Endless(), threading.Event(), reported(background.finished)
     background.start(endless)
     assert endless.under_way.wait(10)
@@ -82,7 +80,7 @@ def test_the_latest_job_alone_is_heard_and_nothing_of_an_abandoned_one(qtbot: Qt
     assert progress == []
 
 
-def test_a_stopped_job_reports_its_end_and_one_may_be_waited_for(qtbot: QtBot, background: Background) -> None:
+def test_a_stopped_job_reports_its_end_and_one_may_be_waited_for(qtbot, background):
     endless, under_way, done = Endless(), threading.Event(), []
     background.start(endless)
     assert endless.under_way.wait(10)
@@ -102,7 +100,7 @@ def test_a_stopped_job_reports_its_end_and_one_may_be_waited_for(qtbot: QtBot, b
     assert done == [True]
 
 
-def test_errors_are_reported_and_the_thread_lives_on(qtbot: QtBot, background: Background) -> None:
+def test_errors_are_reported_and_the_thread_lives_on(qtbot, background):
     for error, message, has_details in (
         (PresetError("x: broken"), "x: broken", False),
         (ZeroDivisionError("none"), "Computing failed: none", True),
@@ -134,7 +132,7 @@ class Counting:
         return more
 
 
-def test_the_latest_that_grows_alone_is_kept_up_with(qtbot: QtBot, background: Background) -> None:
+def test_the_latest_that_grows_alone_is_kept_up_with(qtbot, background):
     old, new = Counting(allowed=3), Counting(allowed=4)
     for growing in (old, new):
         background.start(lambda job, growing=growing: keep_up(growing, job))

@@ -3,8 +3,6 @@
 Views are found in their modules, and given arguments by their annotations; a few have a maker here.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import itertools
@@ -221,7 +219,7 @@ def name_of(widget: QWidget) -> str:
     return str(QAccessible.queryAccessibleInterface(widget).text(QAccessible.Text.Name))
 
 
-def test_the_keyboard_alone_reaches_and_works_each_control(qtbot: QtBot, view: QWidget) -> None:
+def test_the_keyboard_alone_reaches_and_works_each_control(qtbot, view):
     wanted, reached = set(controls(view)), set[QWidget]()
     for _ in range(2 * len(wanted) + 4):
         here = QApplication.focusWidget() or view.window()
@@ -255,7 +253,7 @@ def share_of(image: QImage, *colours: str) -> float:
     return float(np.isin(pixels & 0xFFFFFF, [QColor(colour).rgb() & 0xFFFFFF for colour in colours]).mean())
 
 
-def test_all_have_names_tips_and_the_colours_of_the_theme(themes: None, qtbot: QtBot, qapp: QApplication) -> None:
+def test_all_have_names_tips_and_the_colours_of_the_theme(themes, qtbot, qapp):
     with ExitStack() as stack:
         views = {kind.__name__: stack.enter_context(shown(kind, qtbot)) for kind in VIEWS}
         for each in itertools.chain.from_iterable(map(controls, views.values())):
@@ -279,7 +277,7 @@ def test_all_have_names_tips_and_the_colours_of_the_theme(themes: None, qtbot: Q
 
 
 @pytest.mark.parametrize("size_percent", [150])
-def test_each_has_room_with_larger_text(view: QWidget) -> None:
+def test_each_has_room_with_larger_text(view):
     window = view.window()
     QApplication.processEvents()
     for text in view.findChildren(QLabel):

@@ -1,7 +1,5 @@
 """Both themes can be read, and what a file says is shown as it is: no label and no tip takes it for markup."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +8,7 @@ import pytest
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QAction, QColor
 from PySide6.QtGui import Qt as GuiQt
-from PySide6.QtWidgets import QApplication, QCheckBox, QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
-from pytestqt.qtbot import QtBot
+from PySide6.QtWidgets import QCheckBox, QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
 
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
@@ -37,7 +34,7 @@ from tests.app.places import places_in
 
 
 @pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
-def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen: theme.Theme) -> None:
+def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen):
     for ground in (chosen.background, chosen.panel, chosen.raised, chosen.ground_top, chosen.ground_bottom):
         for text in (chosen.text, chosen.faint, chosen.model, chosen.truth, chosen.warning, chosen.good):
             assert theme.contrast(text, ground) >= 4.5, (text, ground)
@@ -47,9 +44,7 @@ def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
 
 
-def test_a_theme_is_put_on_with_ticks_that_are_seen_and_maps_on_its_ground(
-    qtbot: QtBot, own_look: QApplication
-) -> None:
+def test_a_theme_is_put_on_with_ticks_that_are_seen_and_maps_on_its_ground(qtbot, own_look):
     for choice, chosen in (("dark", theme.DARK), ("light", theme.LIGHT)):
         theme.apply_theme(own_look, choice, 150)  # type: ignore[arg-type]
         assert theme.present == replace(chosen, scale=1.5)
@@ -96,7 +91,7 @@ def texts(root: QObject) -> str:
     return "\n".join([*(label.text() for label in labels), *(each.toolTip() for each in root.findChildren(QWidget))])
 
 
-def test_no_view_takes_a_files_text_for_markup(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> None:
+def test_no_view_takes_a_files_text_for_markup(qtbot, small_preset, tmp_path):
     """An instrument's name can hold no markup, for it is a file's; its other texts can."""
     words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
     path = Path("/x") / f"{EVIL}.safetensors"
@@ -131,7 +126,7 @@ def test_no_view_takes_a_files_text_for_markup(qtbot: QtBot, small_preset: Path,
     assert all("evil" in texts(view) for view in (notices, panel, instruments)), "and it is shown"
 
 
-def test_labels_are_made_in_one_place_and_show_the_text_as_it_is(qtbot: QtBot) -> None:
+def test_labels_are_made_in_one_place_and_show_the_text_as_it_is(qtbot):
     """A QLabel of its own would look at its text and guess; the preset's card alone is HTML, and escapes."""
     sources = sorted((Path(__file__).parents[3] / "app").rglob("*.py"))
     assert [each for each in sources if "QLabel(" in each.read_text("utf-8").replace("(QLabel)", "")] == []

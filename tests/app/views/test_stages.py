@@ -1,7 +1,5 @@
 """Gestures on the string and on a drum, and their pictures, in which all can be read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetrics, QImage, QPainter
-from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
 from app.session.shown import DEFAULT_SOURCES
@@ -67,7 +64,7 @@ def frame_of(mm: float = 0.0, **other_mm: float) -> StringFrame:
     return StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()})
 
 
-def test_axes_go_to_pixels_and_back() -> None:
+def test_axes_go_to_pixels_and_back():
     assert AXES.position(AXES.x(0.3)) == pytest.approx(0.3)
     assert AXES.displacement_mm(AXES.y(-2.5)) == pytest.approx(-2.5)
     curve = AXES.curve(np.array([0.0, 5.0, 0.0])).toList()
@@ -78,7 +75,7 @@ def test_axes_go_to_pixels_and_back() -> None:
     assert heights == [[-1, -2, 2, 1], [-1, -2], [1, 2]]
 
 
-def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot: QtBot, view: StringView) -> None:
+def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot, view):
     """The numbers of the scale reach beyond the string: halves of old ones would be left."""
     paints = Paints(view)
     for mm, whole in ((4.0, None), (3.9, False), (0.3, True), (0.29, False)):
@@ -89,7 +86,7 @@ def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot: QtBot, vi
         assert whole is not False or paints.rects[-1].bottom() <= AXES.bottom
 
 
-def test_the_handle_is_dragged_without_a_jump(view: StringView, plucks: list[tuple[float, float]]) -> None:
+def test_the_handle_is_dragged_without_a_jump(view, plucks):
     drags = reported(view.drag_started, view.drag_ended, view.pluck_released)
     grip = HANDLE + QPoint(5, 4)
     drag(view, grip, grip + QPoint(80, 0))
@@ -102,9 +99,7 @@ def test_the_handle_is_dragged_without_a_jump(view: StringView, plucks: list[tup
 
 
 @pytest.mark.parametrize("mm", [4.0, 0.2])  # the latter is the knob's doing
-def test_a_click_plucks_as_far_as_the_last_time_and_a_drag_sets_it(
-    view: StringView, plucks: list[tuple[float, float]], mm: float
-) -> None:
+def test_a_click_plucks_as_far_as_the_last_time_and_a_drag_sets_it(view, plucks, mm):
     released = reported(view.pluck_released)
     view.pluck_drawn.emit(0.5, mm)
     x = round(AXES.x(0.3))
@@ -120,7 +115,7 @@ def test_a_click_plucks_as_far_as_the_last_time_and_a_drag_sets_it(
     assert [to for _, to in plucks[1:]] == pytest.approx([3.0, 2.0, 0.5, 0.5], abs=0.05)
 
 
-def test_the_wheel_over_the_handle_sets_width_and_with_shift_the_shape(view: StringView) -> None:
+def test_the_wheel_over_the_handle_sets_width_and_with_shift_the_shape(view):
     steps = reported(view.width_stepped, view.shape_stepped)
     for at, turned, held, taken in (
         (HANDLE, 120, NONE, True),
@@ -132,7 +127,7 @@ def test_the_wheel_over_the_handle_sets_width_and_with_shift_the_shape(view: Str
     assert steps == [1.0, -1]
 
 
-def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view: StringView) -> None:
+def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot, view):
     resets, released = reported(view.pluck_reset), reported(view.pluck_released)
     for at, seen in ((QPoint(200, 100), (0, 2)), (HANDLE, (1, 3))):
         view.pluck_drawn.emit(0.5, 4.0)
@@ -143,7 +138,7 @@ def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view:
         assert (len(resets), len(released)) == seen, "the first click brings the handle there: twice plucked"
 
 
-def test_two_markers_are_reported_apart_and_reset_and_the_bridge_has_none(qtbot: QtBot, view: StringView) -> None:
+def test_two_markers_are_reported_apart_and_reset_and_the_bridge_has_none(qtbot, view):
     moved, resets = reported(view.listening_point_moved), reported(view.listening_point_reset)
     for points in ((0.2, 0.6), (None, None)):
         view.set_listening_points(*points)
@@ -158,7 +153,7 @@ def test_two_markers_are_reported_apart_and_reset_and_the_bridge_has_none(qtbot:
     assert resets == ["right"]
 
 
-def test_everything_by_keyboard(view: StringView) -> None:
+def test_everything_by_keyboard(view):
     view.set_listening_points(0.37, 0.7)
     for key, held, signal, values in (
         (Key.Key_Right, NONE, view.pluck_drawn, (pytest.approx(0.51), 4.0)),
@@ -177,7 +172,7 @@ def test_everything_by_keyboard(view: StringView) -> None:
         assert seen[0] == values, (key, held)
 
 
-def test_what_was_not_trained_and_the_envelope_are_seen(view: StringView) -> None:
+def test_what_was_not_trained_and_the_envelope_are_seen(view):
     plain = picture(view)
     view.set_trained(TrainedPlucks((0.3, 0.7), (1.0, 2.0)))
     shaded = picture(view)
@@ -196,7 +191,7 @@ def test_what_was_not_trained_and_the_envelope_are_seen(view: StringView) -> Non
     assert picture(view).pixel(at) != without.pixel(at)
 
 
-def test_of_two_motions_in_one_place_both_are_seen_and_of_two_that_part_the_one_there(view: StringView) -> None:
+def test_of_two_motions_in_one_place_both_are_seen_and_of_two_that_part_the_one_there(view):
     def seen(by_mm: float) -> int:
         """The number of pixels on the model's line of the truth's hue, which has more blue in it than red."""
         view.show_frame(frame_of(2.0, truth=by_mm))
@@ -209,7 +204,7 @@ def test_of_two_motions_in_one_place_both_are_seen_and_of_two_that_part_the_one_
     assert 80 < seen(0.0) < 200
 
 
-def test_the_scale_follows_the_decay_and_the_pluck_comes_back(view: StringView, plucks: list[object]) -> None:
+def test_the_scale_follows_the_decay_and_the_pluck_comes_back(view, plucks):
     rest, seen = picture(view), []
     for mm in (4.0, 1.5, 0.4, 0.05):
         view.show_frame(frame_of(mm))
@@ -235,7 +230,7 @@ class Recorder(QPainter):
 
 
 @pytest.mark.parametrize(("height", "figures"), [(300, 5), (112, 3), (90, 1)])
-def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, height: int, figures: int) -> None:
+def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot, height, figures):
     axes = StringAxes(1200, height, 5.0)
     assert len(scale(axes)) == figures
     image = QImage(1200, height, QImage.Format.Format_ARGB32)
@@ -247,7 +242,7 @@ def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, heig
 
 
 @pytest.mark.parametrize("points", [(0.10, 0.15), (0.15, 0.10), (0.0, 0.01), (0.99, 1.0), (0.5, 0.5), (0.2, 0.8)])
-def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot: QtBot, points: tuple[float, float]) -> None:
+def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot, points):
     axes = StringAxes(560, 200, 5.0)
     marks = [(axes.x(point), f"{name} {point:.2f}") for name, point in zip(("left", "right"), points, strict=True)]
     places = label_places(QFontMetrics(QFont()), marks, axes.width, axes.bottom)
@@ -270,7 +265,7 @@ def drum(show: Callable[..., DrumView]) -> DrumView:
 
 @pytest.mark.parametrize("shape", ["circle", "rectangle", "bar"])
 @pytest.mark.parametrize("heads", [1, 2])
-def test_places_lead_to_pixels_and_back(shape: str, heads: int) -> None:
+def test_places_lead_to_pixels_and_back(shape, heads):
     axes = HeadAxes(900, 320, shape, (0.4, 0.2), heads)  # type: ignore[arg-type]
     for head in range(heads):
         for place in ((0.0, 0.0), (0.5, -0.3), (-0.6, 0.7)):
@@ -283,7 +278,7 @@ def test_places_lead_to_pixels_and_back(shape: str, heads: int) -> None:
     assert (corner is None) == (shape == "circle")
 
 
-def test_a_click_strikes_there_and_with_shift_hard(qtbot: QtBot, drum: DrumView) -> None:
+def test_a_click_strikes_there_and_with_shift_hard(qtbot, drum):
     struck = reported(drum.struck)
     at = drum.axes.at(0, (0.4, -0.5)).toPoint()
     qtbot.mouseClick(drum, LEFT, pos=at)
@@ -295,7 +290,7 @@ def test_a_click_strikes_there_and_with_shift_hard(qtbot: QtBot, drum: DrumView)
     assert struck == [(*near, False), (*near, True), (*near, False)]
 
 
-def test_a_mark_is_dragged_and_reset(qtbot: QtBot, drum: DrumView) -> None:
+def test_a_mark_is_dragged_and_reset(qtbot, drum):
     drum.set_listening_points(0.3, 0.8)
     moved, reset = reported(drum.listening_point_moved), reported(drum.listening_point_reset)
     struck, axes = reported(drum.struck), drum.axes
@@ -312,7 +307,7 @@ def test_a_mark_is_dragged_and_reset(qtbot: QtBot, drum: DrumView) -> None:
     assert (reset, struck) == (["left"], [])
 
 
-def test_keys_move_the_place_the_mark_and_reset_them(drum: DrumView) -> None:
+def test_keys_move_the_place_the_mark_and_reset_them(drum):
     places, marks = reported(drum.place_moved), reported(drum.listening_point_moved)
     resets = reported(drum.place_reset, drum.listening_point_reset)
     drum.place_moved.connect(lambda *to: drum.set_place(to))
@@ -330,7 +325,7 @@ def test_keys_move_the_place_the_mark_and_reset_them(drum: DrumView) -> None:
     assert len(places) == 4, "the rim is not struck"
 
 
-def test_up_is_amber_down_is_blue_and_rest_is_the_panel(drum: DrumView) -> None:
+def test_up_is_amber_down_is_blue_and_rest_is_the_panel(drum):
     columns = np.broadcast_to(np.linspace(-1, 1, 57), (57, 57))
     for up in (1, -1):
         drum.show_frame(HeadFrame({"model": (1e-3 * up * columns).astype(np.float32)}))
@@ -349,7 +344,7 @@ def test_up_is_amber_down_is_blue_and_rest_is_the_panel(drum: DrumView) -> None:
     assert first.red() > first.blue() and second.blue() > second.red(), "each has a scale of its own"
 
 
-def test_scales_are_round_and_stay_while_they_fit_and_colours_end_there() -> None:
+def test_scales_are_round_and_stay_while_they_fit_and_colours_end_there():
     for largest, top in ((0.8e-3, 1e-3), (1e-3, 1e-3), (1.1e-3, 1.5e-3), (8e-9, 1e-8)):
         assert fitting_scale_m(largest) == pytest.approx(top)
     for largest, top in ((1.2e-3, 2e-3), (0.9e-3, 1.5e-3), (4e-3, 5e-3)):

@@ -1,7 +1,5 @@
 """Windows with a controller: of the Lab, of an instrument, and others as a test asks for them."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -51,7 +49,7 @@ class FakeBackend:
     def get_input_names(self) -> list[str]:
         return self.names
 
-    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> FakeBackend:
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> "FakeBackend":
         if self.busy:
             raise OSError("resource busy")
         self.open_name, self.callback = name, callback

@@ -1,7 +1,5 @@
 """A window as its user has it: controls are found by their names, pressed by mouse and keys, and read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar

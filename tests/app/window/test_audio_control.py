@@ -1,7 +1,5 @@
 """What becomes of a choice of output: opened, refused, saved, reported."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -68,7 +66,7 @@ def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     made.dialog.close()
 
 
-def test_a_choice_is_saved_once_it_plays_and_reported_where_it_is_refused(desk: Desk) -> None:
+def test_a_choice_is_saved_once_it_plays_and_reported_where_it_is_refused(desk):
     assert desk.opened == [(None, SoundChoice(), False)]
     desk.dialog.choice_made.emit(*WISH)
     assert desk.opened[-1] == (*WISH, False)
@@ -96,7 +94,7 @@ def test_a_choice_is_saved_once_it_plays_and_reported_where_it_is_refused(desk: 
     assert desk.tones == ["left"]
 
 
-def test_gaps_count_from_the_reset_and_frequent_ones_are_reported_once_for_a_buffer(desk: Desk) -> None:
+def test_gaps_count_from_the_reset_and_frequent_ones_are_reported_once_for_a_buffer(desk):
     assert any("4, the last at 1.5 s: device" in each for each in desk.words())
     press(desk.dialog, "Reset")
     late = Gap(7.25, "rendering", 0.0)

@@ -1,7 +1,5 @@
 """Drums in the window: chosen, struck by keys, pads and at places, seen moving, heard, recorded and exported."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,7 @@ from app.rendering import BlowTake, blow
 from app.window.controller import DRUMS_PLAYED
 from engine.presets import SHIPPED, load_preset
 from engine.values.effects import Room
-from tests.app.window.conftest import FakeBackend, Open
+from tests.app.window.conftest import Open
 from tests.app.window.driver import KEY, LEFT, Window
 from tests.app.window.panels.conftest import curves
 
@@ -60,7 +58,7 @@ def whole(w: Window) -> BlowTake:
     return take
 
 
-def test_pads_keys_and_channel_ten_strike(backend: FakeBackend, kit: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pads_keys_and_channel_ten_strike(backend, kit, monkeypatch):
     assert len(DRUMS) == 7 and set(DRUMS) <= set(kit.controller.instruments.browser.listed)
     levels: list[float] = []
     monkeypatch.setattr(kit.window.transport.meter, "show_level", lambda peak_db, limiting: levels.append(peak_db))
@@ -89,7 +87,7 @@ def test_pads_keys_and_channel_ten_strike(backend: FakeBackend, kit: Window, mon
     assert kit.said == []
 
 
-def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window) -> None:
+def test_strings_and_drums_follow_one_another_without_a_leftover(kit):
     """Each has a player and controls of its own; views of a string say that drums are played."""
     window, panel = kit.window, kit.window.instrument
     kit.change(face="lab")
@@ -129,7 +127,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit: Window) ->
     assert kit.said == []
 
 
-def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(toms: Window) -> None:
+def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(toms):
     """Its signal is what the compiled player makes of the same event, times the gain of the key; views show it."""
     view: Any = toms.controller.drum.view
     assert view.isVisible() and not toms.controller.string.isVisible()
@@ -173,7 +171,7 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(t
     assert toms.notes.ringing == 1
 
 
-def test_keys_strike_at_the_chosen_place_and_each_instrument_has_its_own(toms: Window) -> None:
+def test_keys_strike_at_the_chosen_place_and_each_instrument_has_its_own(toms):
     drum: Any = toms.controller.drum
     (x, y), timpani = TOMS.strings.drums[0].place, read_instrument(INSTRUMENTS / "timpani.json")  # type: ignore[union-attr]
     drum.view.setFocus()

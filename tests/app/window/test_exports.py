@@ -1,7 +1,5 @@
 """Playing and notes become files: as they are heard, take after take, kept until they are written, and back."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
@@ -90,7 +88,7 @@ def names(folder: Path, pattern: str = "*") -> set[str]:
     return {path.name for path in folder.glob(pattern) if path.suffix in (".wav", ".mid")}
 
 
-def test_playing_is_recorded_as_it_is_heard_and_dropped_changes_nothing(guitar: Window, tmp_path: Path) -> None:
+def test_playing_is_recorded_as_it_is_heard_and_dropped_changes_nothing(guitar, tmp_path):
     bar = guitar.window.instrument.bar
     bar.takes.choose({"count_in_bars": 2})
     guitar.key(KEY.Key_R, CONTROL)
@@ -128,7 +126,7 @@ def test_playing_is_recorded_as_it_is_heard_and_dropped_changes_nothing(guitar: 
     assert guitar.choices == before and not own_bodies().exists(), "it is neither a recipe nor a body"
 
 
-def test_a_recording_is_kept_until_it_is_saved_and_replaces_no_file_unasked(guitar: Window, tmp_path: Path) -> None:
+def test_a_recording_is_kept_until_it_is_saved_and_replaces_no_file_unasked(guitar, tmp_path):
     record(guitar)
     guitar.controller.instruments.choose("concert_harp")  # it was played by the other one
     words = latest(guitar)
@@ -165,7 +163,7 @@ def test_a_recording_is_kept_until_it_is_saved_and_replaces_no_file_unasked(guit
 
 
 @pytest.mark.parametrize("ended", [False, True])
-def test_a_recording_is_asked_about_before_the_window_closes(guitar: Window, tmp_path: Path, ended: bool) -> None:
+def test_a_recording_is_asked_about_before_the_window_closes(guitar, tmp_path, ended):
     guitar.window.instrument.bar.record.click()
     guitar.play(60)
     if ended:
@@ -190,7 +188,7 @@ def test_a_recording_is_asked_about_before_the_window_closes(guitar: Window, tmp
 
 
 @pytest.mark.parametrize("finish", [True, False])
-def test_an_export_is_asked_about_before_the_window_closes(guitar: Window, tmp_path: Path, finish: bool) -> None:
+def test_an_export_is_asked_about_before_the_window_closes(guitar, tmp_path, finish):
     """Its notes are there at once; its sound is given up, or finished first, as the user says."""
     recordings = guitar.controller.instruments.recordings
     journal = Journal.begun(recordings_folder(), datetime.now(UTC))
@@ -219,7 +217,7 @@ def test_an_export_is_asked_about_before_the_window_closes(guitar: Window, tmp_p
     assert names(tmp_path) == {"take.mid", *(["take.wav"] if finish else [])}
 
 
-def test_takes_are_written_beside_the_first(guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_takes_are_written_beside_the_first(guitar, tmp_path, monkeypatch):
     folder, menu = tmp_path / "takes", guitar.window.instrument.bar.takes
     folder.mkdir()
     (folder / f"{NAME} 2.mid").write_bytes(b"mine")
@@ -257,7 +255,7 @@ def test_takes_are_written_beside_the_first(guitar: Window, tmp_path: Path, monk
     save(guitar, tmp_path / "elsewhere.wav")
 
 
-def test_a_take_is_played_again_with_the_knobs_that_were_turned(guitar: Window, tmp_path: Path) -> None:
+def test_a_take_is_played_again_with_the_knobs_that_were_turned(guitar, tmp_path):
     instrument = guitar.instrument
     guitar.window.instrument.bar.record.click()
     guitar.play(64, hold=True)
@@ -280,9 +278,7 @@ def test_a_take_is_played_again_with_the_knobs_that_were_turned(guitar: Window, 
     assert guitar.instrument.name == "Concert harp"
 
 
-def test_a_counted_take_is_one_without_clicks(
-    guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_counted_take_is_one_without_clicks(guitar, tmp_path, monkeypatch):
     clock, now_s, bar = SimpleNamespace(monotonic=lambda: now_s), 1000.0, guitar.window.instrument.bar
     monkeypatch.setattr(recorder, "time", clock)
     monkeypatch.setattr(playback, "time", clock)
@@ -333,9 +329,7 @@ def open_sampler(w: Window) -> ExportDialog:
     return dialog_of(w)
 
 
-def test_a_sampler_is_written_while_keys_play(
-    guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sampler_is_written_while_keys_play(guitar, tmp_path, monkeypatch):
     dialog, begun = open_sampler(guitar), threading.Event()
     assert not dialog.isModal() and open_sampler(guitar) is dialog
     guitar.choose("concert_harp")

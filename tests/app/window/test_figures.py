@@ -1,7 +1,5 @@
 """What is shown becomes files and the clipboard's: pictures that look like it, and its numbers."""
 
-from __future__ import annotations
-
 import csv
 from io import StringIO
 from itertools import cycle
@@ -22,7 +20,6 @@ from app.instruments.library import read_instrument
 from app.views import theme
 from tests.app.gestures import drag
 from tests.app.places import choose_files
-from tests.app.window.conftest import Open
 from tests.app.window.driver import KEY, PLAIN, SHIFT, Window
 
 RIGHT = Qt.MouseButton.RightButton
@@ -84,7 +81,7 @@ def table(text: str) -> Table:
     return dict(zip(heading, map(np.array, values), strict=True))
 
 
-def test_every_figure_is_saved_with_its_numbers(lab: Window, themed: Any, tmp_path: Path, chosen: list[str]) -> None:
+def test_every_figure_is_saved_with_its_numbers(lab, themed, tmp_path, chosen):
     themed("light")
     lab.wait_for_take()
     lab.performance.seek(0.1)
@@ -117,9 +114,7 @@ def test_every_figure_is_saved_with_its_numbers(lab: Window, themed: Any, tmp_pa
     assert lab.controller.settings().files.folders["figure"] == tmp_path == Path(chosen[-1]).parent
 
 
-def test_files_have_the_numbers_at_the_command(
-    lab: Window, tmp_path: Path, chosen: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_have_the_numbers_at_the_command(lab, tmp_path, chosen, monkeypatch):
     lab.wait_for_take()
     present: Any = lab.performance.take
     waveform, space_time, string = (lab.panel(key) for key in ("waveform", "space_time", "string"))
@@ -180,9 +175,7 @@ def test_files_have_the_numbers_at_the_command(
     QApplication.activePopupWidget().close()
 
 
-def test_a_drum_is_saved_and_what_cannot_be_is_said(
-    opened: Open, tmp_path: Path, chosen: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drum_is_saved_and_what_cannot_be_is_said(opened, tmp_path, chosen, monkeypatch):
     toms = read_instrument(INSTRUMENTS / "tuned_toms.json")
     w = opened("studio_any_string", face="lab", instrument=toms, a="model", b="truth", heard="a", speed=0.02)
     w.wait_for_keys()

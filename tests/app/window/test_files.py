@@ -1,7 +1,5 @@
 """Files out of the window and back: dragged, copied, saved as, opened again, shown in their folder."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,7 @@ from app.window.settings import load_settings
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
 from tests.app.places import choose_files
-from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, Window, press
+from tests.app.window.driver import CONTROL, KEY, LEFT, SHIFT, press
 from tests.app.window.test_exports import NAME, dialog_of, record, save
 
 AWAY = QPoint(60, 60)
@@ -47,7 +45,7 @@ def dropped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     return drags
 
 
-def test_what_is_dragged_is_what_would_be_exported(guitar: Window, tmp_path: Path, dropped: list[Path]) -> None:
+def test_what_is_dragged_is_what_would_be_exported(guitar, tmp_path, dropped):
     def exported(name: str) -> bytes:
         guitar.controller.exports.open("note")
         save(guitar)
@@ -99,9 +97,7 @@ def test_what_is_dragged_is_what_would_be_exported(guitar: Window, tmp_path: Pat
     assert not any(file.exists() for file in dropped), "they are removed with the process"
 
 
-def test_copied_files_are_bounded(
-    guitar: Window, tmp_path: Path, dropped: list[Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_copied_files_are_bounded(guitar, tmp_path, dropped, monkeypatch):
     monkeypatch.setattr("app.window.drag_out.LARGEST_BYTES", 200_000)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     clipboard = QGuiApplication.clipboard()
@@ -143,7 +139,7 @@ def test_copied_files_are_bounded(
     assert not any(tmp_path.glob(".learned-strings-files*"))
 
 
-def test_an_instrument_is_saved_anywhere(guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_instrument_is_saved_anywhere(guitar, tmp_path, monkeypatch):
     shown: list[str] = []
     monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: shown.append(url.toLocalFile()) or True)
     guitar.window.action["reveal"].trigger()
@@ -184,7 +180,7 @@ def test_an_instrument_is_saved_anywhere(guitar: Window, tmp_path: Path, monkeyp
     assert said[-1] == f"{file} is not there any more."
 
 
-def test_recent_files_are_listed_until_they_are_gone(guitar: Window, tmp_path: Path) -> None:
+def test_recent_files_are_listed_until_they_are_gone(guitar, tmp_path):
     song, scale = tmp_path / "a & b.mid", tmp_path / "third.scl"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(0.1, NoteOff(60))], guitar.instrument))
     scale.write_text("! third.scl\nThirds\n 3\n!\n5/4\n3/2\n2/1\n")
@@ -210,7 +206,7 @@ def test_recent_files_are_listed_until_they_are_gone(guitar: Window, tmp_path: P
     assert load_settings(tmp_path / "settings.json")[0].files.recent == (instrument, scale)
 
 
-def test_folders_are_remembered_by_kind(lab: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_are_remembered_by_kind(lab, tmp_path, monkeypatch):
     places, there = FilePlaces(), tmp_path / "there"
     there.mkdir()
     (there / "a.wav").touch()

@@ -3,8 +3,6 @@
 No instrument has any part in it, whichever was played before.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +193,7 @@ def exported(w: Window) -> Samples:
     return soundfile.read(path, always_2d=True)[0]
 
 
-def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(held: Window) -> None:
+def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(held):
     """A model of each kind and its truth, in A, in B and blind, after all instruments with sympathy or an amplifier.
 
     By default files have that too; of the slowest kinds, which are rendered as others are, none is written here.
@@ -220,7 +218,7 @@ def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_playe
         assert_same(heard(held, "a"), rendered(held, "model"), f"after {name}")
 
 
-def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rendered(held: Window) -> None:
+def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rendered(held):
     """Also from the same points, where a model that is rendered ahead was heard through another pick-up before."""
     for kind in ("lru", "koopman_var"):
         choose(held, KINDS[kind])
@@ -247,7 +245,7 @@ def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rend
     assert_heard_as_rendered(held, "of a single string")
 
 
-def test_the_lab_says_what_is_heard_and_how_far_it_was_trained(held: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_lab_says_what_is_heard_and_how_far_it_was_trained(held, monkeypatch):
     """A match and an error are of what is chosen, not of the preset before."""
     label, outside, warned = held.window.through_label, held.window.outside_label, [("", False)]
     view = held.controller.string.view
@@ -304,7 +302,7 @@ def sounds(w: Window) -> bool:
     return any(voice.sounding for voice in w.controller.sound.mixer.voices)
 
 
-def test_the_test_has_the_sound_for_itself(paired: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_test_has_the_sound_for_itself(paired, tmp_path, monkeypatch):
     """Keys are silent meanwhile; a pedal that is lifted then is up afterwards, a fader moves the sound afterwards."""
     levels, taken, handle = list[tuple[float, bool]](), list[object](), paired.notes.handle
     monkeypatch.setattr(paired.window.transport.meter, "show_level", lambda *level: levels.append(level))

@@ -1,9 +1,6 @@
 """The instrument in the window: keys and plucks by hand play it, knobs change it, files and names keep it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import mido
@@ -30,7 +27,7 @@ from app.window.settings import load_settings
 from app.window.song import events_from
 from engine.pluck import SHAPES, Pluck
 from tests.app.player.seen import Seen, sounding
-from tests.app.window.conftest import PADS, FakeBackend
+from tests.app.window.conftest import PADS
 from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, SHIFT, Window, choose
 
 HARP = read_instrument(INSTRUMENTS / "concert_harp.json")
@@ -56,7 +53,7 @@ def turn(w: Window, field: str, value: object) -> None:
     w.window.instrument.knobs.changed.emit(field, value)
 
 
-def test_keys_play_pitches_or_places_and_the_window_shows_the_string(guitar: Window) -> None:
+def test_keys_play_pitches_or_places_and_the_window_shows_the_string(guitar):
     strip = guitar.window.instrument
     pitches, places = strip.plays.menu().actions()
     assert strip.knobs.facts.accessibleDescription().startswith(
@@ -92,7 +89,7 @@ def test_keys_play_pitches_or_places_and_the_window_shows_the_string(guitar: Win
     assert strip.plays.text().startswith("Keys play notes") and guitar.choices.plays_instrument
 
 
-def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_preset(guitar: Window) -> None:
+def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_preset(guitar):
     guitar.play(52)
     guitar.wait_for_string()
     shown, other = guitar.choices.string, next(each for each in SHAPES if each != guitar.choices.shape)
@@ -117,7 +114,7 @@ def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_prese
     assert guitar.session.stage.struck is None and isinstance(guitar.pluck(), PluckVoices)
 
 
-def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar: Window) -> None:
+def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar):
     bar = guitar.window.instrument.bar
     guitar.choose("toy_wires")  # C3 to D♯6
     for key, octave, words in ((KEY.Key_Z, 0, "Lowest"), (KEY.Key_X, 3, "Highest")):
@@ -136,7 +133,7 @@ def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar:
         assert instrument != "slack_bass" or QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
 
 
-def test_knobs_and_transport_change_the_instrument_and_undo_takes_them_back(guitar: Window) -> None:
+def test_knobs_and_transport_change_the_instrument_and_undo_takes_them_back(guitar):
     history, start, knobs = guitar.session, guitar.choices, guitar.window.instrument.knobs
     for value in (2.0, 99.0):  # the latter is beyond its bounds
         turn(guitar, "knobs.stiffness", value)
@@ -180,7 +177,7 @@ def test_knobs_and_transport_change_the_instrument_and_undo_takes_them_back(guit
     assert stereo.isChecked() and "stays in stereo: its macro Width" in guitar.window.notices.text
 
 
-def test_a_instrument_is_saved_renamed_compared_and_deleted(guitar: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch):
     instruments, bar, asked = guitar.controller.instruments, guitar.window.instrument.bar, list[str]()
     names = ["AC/DC", "My Bass.", "Classical guitar", "Mine", "Yours"]
 
@@ -224,7 +221,7 @@ def test_a_instrument_is_saved_renamed_compared_and_deleted(guitar: Window, monk
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
 
 
-def test_the_browser_of_instruments_is_searched_without_playing_and_plays_what_is_there(guitar: Window) -> None:
+def test_the_browser_of_instruments_is_searched_without_playing_and_plays_what_is_there(guitar):
     instruments = guitar.controller.instruments
     guitar.wait(guitar.window.isActiveWindow)
     instruments.toggle()
@@ -249,7 +246,7 @@ def test_the_browser_of_instruments_is_searched_without_playing_and_plays_what_i
     guitar.wait(lambda: guitar.struck[-1].instrument == HARP)
 
 
-def test_dropped_songs_are_played_without_drums_and_have_a_transport(guitar: Window, tmp_path: Path) -> None:
+def test_dropped_songs_are_played_without_drums_and_have_a_transport(guitar, tmp_path):
     song, strip = tmp_path / "song.mid", guitar.window.song
     pedal, late = TimedEvent(0.5, ControlChange(64, 127)), TimedEvent(30.0, NoteOff(52))
     begin = [TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(0.0, NoteOn(52, 90))]
@@ -280,7 +277,7 @@ def test_dropped_songs_are_played_without_drums_and_have_a_transport(guitar: Win
     assert "song.mid" in guitar.said[-1]
 
 
-def test_a_dropped_instrument_is_added_once(guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dropped_instrument_is_added_once(guitar, tmp_path, monkeypatch):
     file, names = tmp_path / "from a friend.json", []
     tuned = HARP.model_copy(update={"level_db": HARP.level_db - 2})
     for instrument in (tuned, tuned, HARP, tuned.model_copy(update={"description": "Another"})):
@@ -300,7 +297,7 @@ def test_a_dropped_instrument_is_added_once(guitar: Window, tmp_path: Path, monk
     assert guitar.instrument == mine and "not added to your library" in guitar.window.notices.text
 
 
-def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Window) -> None:
+def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar):
     tip = guitar.window.outside_label.toolTip
 
     def turned(decay: float, brightness: float, beyond: bool) -> None:
@@ -319,7 +316,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Windo
     guitar.wait(lambda: not tip())
 
 
-def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restored(guitar: Window) -> None:
+def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restored(guitar):
     key, string, low = sum(HARP.range) // 2, Strings(HARP).of_key(sum(HARP.range) // 2), Strings(HARP).of_key(43)
     assert string is not None and low is not None
     guitar.choose("concert_harp")
@@ -346,7 +343,7 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     assert guitar.pluck().event.key == 43, "the string that was restored"
 
 
-def test_notes_of_midi_choose_places_and_presets(backend: FakeBackend, guitar: Window, tmp_path: Path) -> None:
+def test_notes_of_midi_choose_places_and_presets(backend, guitar, tmp_path):
     """Also on the string of the key that was struck last, and while the window is busy."""
     instruments, second = guitar.controller.inputs, guitar.controller.library.names.index("second")
     guitar.play(52)
@@ -378,7 +375,7 @@ def test_notes_of_midi_choose_places_and_presets(backend: FakeBackend, guitar: W
     assert load_settings(tmp_path / "settings.json")[0].midi == learned
 
 
-def test_the_menu_and_the_key_name_the_steps_of_undo_and_a_lost_release_ends_a_drag(lab: Window) -> None:
+def test_the_menu_and_the_key_name_the_steps_of_undo_and_a_lost_release_ends_a_drag(lab):
     menu, knob = lab.window.menu, lab.window.transport.knobs["position"]
     lab.wait(lab.window.isActiveWindow)
     lab.change(width=0.2)

@@ -1,7 +1,5 @@
 """The Lab: gestures and keys change the session, the session picture and sound; notes sound in their own time."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable
@@ -64,7 +62,7 @@ def gains(note: PluckVoices) -> dict[str, float]:
     return {name: gain / (match.get(name, 1.0) or 1.0) for name, gain in wanted.items()}
 
 
-def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one(lab: Window) -> None:
+def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one(lab):
     view, knobs = lab.controller.string.view, lab.window.transport.knobs
     lab.change(seconds=3.0)
     lab.wait_for_take()
@@ -104,7 +102,7 @@ def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one
     lab.wait(lambda: all(each.over for each in lab.struck))
 
 
-def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(lab: Window) -> None:
+def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(lab):
     lab.wait_for_take()
     lab.key(KEY.Key_Space)
     lab.wait(lambda: lab.performance.playing)
@@ -131,7 +129,7 @@ def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(
     assert lab.session.undo_words == words
 
 
-def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, Any]) -> None:
+def test_slots_are_chosen_heard_drawn_and_named(lab, shown):
     slots, views = lab.window.transport.slots, (lab.panel("waveform"), lab.panel("spectrum"))
     lab.wait_for_take()
     for panel in views:
@@ -178,7 +176,7 @@ def test_slots_are_chosen_heard_drawn_and_named(lab: Window, shown: dict[str, An
     assert lab.choices.source_heard == "truth" and not lab.choices.difference
 
 
-def test_a_window_with_faults_says_so(lab: Window, opened: Open, preset_folder: Path, tmp_path: Path) -> None:
+def test_a_window_with_faults_says_so(lab, opened, preset_folder, tmp_path):
     """And remembers what was chosen, where it can be written."""
     window = lab.window
     lab.wait(lambda: "without sound" in window.notices.text)
@@ -243,7 +241,7 @@ def turn_after(w: Window, note: object) -> Any:
     return w.notes.latest
 
 
-def test_the_playhead_is_that_of_the_note_that_was_struck_last(sounding: Window) -> None:
+def test_the_playhead_is_that_of_the_note_that_was_struck_last(sounding):
     performance, mixer = sounding.performance, sounding.controller.sound.mixer
     performance.seek(0.25)  # nothing rings
     assert performance.position_s == 0.25 and sounding.rings == []
@@ -272,7 +270,7 @@ def test_the_playhead_is_that_of_the_note_that_was_struck_last(sounding: Window)
 
 
 @pytest.mark.parametrize("preset", ["bank", "first"])
-def test_a_loop_begins_each_turn_at_its_frame_with_the_pluck_that_is_chosen(sounding: Window, preset: str) -> None:
+def test_a_loop_begins_each_turn_at_its_frame_with_the_pluck_that_is_chosen(sounding, preset):
     """Also where its note has fallen silent, after a seek and after a pluck; switched off, it rings out."""
     sounding.change(preset=preset, loop=True)
     sounding.wait(lambda: sounding.performance.ready)
@@ -299,7 +297,7 @@ def test_a_loop_begins_each_turn_at_its_frame_with_the_pluck_that_is_chosen(soun
     assert sounding.notes.latest is turn and not turn.over
 
 
-def test_how_long_a_model_is_waited_for_is_shown(sounding: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_how_long_a_model_is_waited_for_is_shown(sounding, monkeypatch):
     advance = KoopmanVar.advance
 
     def slow(model: KoopmanVar, state: Any, steps: int, readout: Any = None) -> Any:
@@ -325,11 +323,11 @@ def test_how_long_a_model_is_waited_for_is_shown(sounding: Window, monkeypatch: 
         ([], None, ""),
     ],
 )
-def test_an_error_that_grew_is_put_into_words(errors: list[float], own: float | None, words: str) -> None:
+def test_an_error_that_grew_is_put_into_words(errors, own, words):
     assert words in growth_words(errors, own) and bool(growth_words(errors, own)) == bool(words)
 
 
-def test_a_preset_is_plucked_as_trained_and_a_pluck_by_hand_stays_while_models_are_compared(opened: Open) -> None:
+def test_a_preset_is_plucked_as_trained_and_a_pluck_by_hand_stays_while_models_are_compared(opened):
     known, same, noise = (f"nylon_nonlinear_{name}" for name in KNOWN)
     lab = opened(known, same, noise, face="lab", preset=noise, position=0.1)
     before, middle = lab.choices.pluck, Pluck(0.5, 5.5, "gaussian", 0.06)

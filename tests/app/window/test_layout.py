@@ -1,7 +1,5 @@
 """The window as a place: walked through by keys, on two faces, in any size and text, with files over it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -22,7 +20,6 @@ from PySide6.QtWidgets import (
     QTabBar,
     QWidget,
 )
-from pytestqt.qtbot import QtBot
 
 from app.shared.typed_number import typed_number
 from app.views import theme
@@ -36,8 +33,7 @@ from app.views.controls.sideways import Sideways
 from app.window.main_window import COMPILING, LOADING, MainWindow
 from tests.app.gestures import reported
 from tests.app.places import choose_files
-from tests.app.window.conftest import Open
-from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, Window, by_arrows, find, fits, names_of, tab_stops
+from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, by_arrows, find, fits, names_of, tab_stops
 
 ROOT = Path(__file__).parents[3]
 LONG = "A fault in words that are long enough for two lines where the window is narrow. " * 2
@@ -45,7 +41,7 @@ COPY = Qt.DropAction.CopyAction
 Theme = Callable[..., None]
 
 
-def test_the_window_shows_without_the_engine(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_window_shows_without_the_engine(qtbot, monkeypatch):
     code = (
         "import sys, app.window.main, app.window.main_window\n"
         "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
@@ -71,7 +67,7 @@ def test_the_window_shows_without_the_engine(qtbot: QtBot, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("face", ["play", "lab"])
-def test_the_tab_key_visits_everything_as_the_eye_does_and_returns(opened: Open, face: str) -> None:
+def test_the_tab_key_visits_everything_as_the_eye_does_and_returns(opened, face):
     """All of it has a name for a screen reader, and a tip."""
     lab = opened("studio_any_string", face=face)
     lab.choose("steel_string_acoustic")
@@ -97,7 +93,7 @@ def test_the_tab_key_visits_everything_as_the_eye_does_and_returns(opened: Open,
     assert {parts[place] for place in met} == {part for part in parts if part.isVisible()}
 
 
-def test_enter_presses_what_tab_went_to_and_plucks_otherwise(lab: Window) -> None:
+def test_enter_presses_what_tab_went_to_and_plucks_otherwise(lab):
     loop, plot = lab.find(QAbstractButton, "Loop"), lab.panel("waveform").plot
     lab.wait_for_take()
     lab.tab_to(loop)
@@ -119,7 +115,7 @@ def test_enter_presses_what_tab_went_to_and_plucks_otherwise(lab: Window) -> Non
     lab.wait(lambda: lab.struck and not ring.isVisible())
 
 
-def test_every_action_is_in_the_menu_by_its_key_and_the_look_is_chosen_there(lab: Window, themed: Theme) -> None:
+def test_every_action_is_in_the_menu_by_its_key_and_the_look_is_chosen_there(lab, themed):
     window = lab.window
     window.menu.aboutToShow.connect(lambda: QTimer.singleShot(0, window.menu.close))
     with lab.qtbot.waitSignal(window.menu.aboutToHide):
@@ -142,7 +138,7 @@ def test_every_action_is_in_the_menu_by_its_key_and_the_look_is_chosen_there(lab
     assert lab.controller.settings().look.size_percent == 150
 
 
-def test_each_face_shows_its_areas_and_low_windows_share_their_height(guitar: Window) -> None:
+def test_each_face_shows_its_areas_and_low_windows_share_their_height(guitar):
     window, strip, stage = guitar.window, guitar.window.instrument, guitar.controller.string
     window.notices.report("A notice")
     guitar.key(KEY.Key_F8)
@@ -191,7 +187,7 @@ def test_each_face_shows_its_areas_and_low_windows_share_their_height(guitar: Wi
         assert tuple(part.isVisible() for part in (strip.keys, strip.bar, strip.knobs)) == seen, height
 
 
-def test_files_are_dropped_and_opened_with_all_of_their_names(lab: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_dropped_and_opened_with_all_of_their_names(lab, monkeypatch):
     (sign,), taken, data = lab.window.findChildren(DropSign), list[Path](), QMimeData()
     lab.window.file_dropped.disconnect()
     lab.window.file_dropped.connect(taken.append)
@@ -251,7 +247,7 @@ def is_there(window: MainWindow, control: QWidget) -> bool:
 
 
 @pytest.mark.parametrize("face", ["play", "lab"])
-def test_no_control_is_lost_in_a_small_window(guitar: Window, themed: Theme, face: str) -> None:
+def test_no_control_is_lost_in_a_small_window(guitar, themed, face):
     """Nor does a notice cover the header, nor a neighbour the words beside the octave."""
     window, bar = guitar.window, guitar.window.instrument.bar
     window.show_keys(False)
@@ -287,7 +283,7 @@ def test_no_control_is_lost_in_a_small_window(guitar: Window, themed: Theme, fac
                 guitar.wait(lambda at=label, px=needed: not at.isVisible() or at.width() >= px)
 
 
-def test_the_overflow_menu_does_what_its_buttons_do(guitar: Window, themed: Theme) -> None:
+def test_the_overflow_menu_does_what_its_buttons_do(guitar, themed):
     window, bar = guitar.window, guitar.window.instrument.bar
 
     def entries(more: Overflow) -> dict[str, QAction]:
@@ -311,7 +307,7 @@ def test_the_overflow_menu_does_what_its_buttons_do(guitar: Window, themed: Them
     assert window.shows_keys is not shown
 
 
-def test_every_knob_reads_what_it_shows(guitar: Window) -> None:
+def test_every_knob_reads_what_it_shows(guitar):
     guitar.change(face="lab")
     guitar.wait(lambda: guitar.choices.string is not None)
     knobs = [knob for knob in guitar.window.findChildren(Knob) if knob.isEnabled() and not knob.isHidden()]

@@ -1,7 +1,5 @@
 """The real start, in processes of their own: a window opens, renders, closes, is killed, or says what is wrong."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -13,7 +11,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.export.journal import Journal, left_journals
 from app.instruments.library import SHIPPED as INSTRUMENTS
@@ -155,7 +152,7 @@ def ended(program: str, folder: Path, *words: object, **environment: str) -> tup
     return child.returncode, printed.splitlines(), errors
 
 
-def test_files_are_taken_at_the_start_no_note_of_a_song_is_lost_and_no_thread_stays(tmp_path: Path) -> None:
+def test_files_are_taken_at_the_start_no_note_of_a_song_is_lost_and_no_thread_stays(tmp_path):
     """And what an earlier run left is offered."""
     song, left = tmp_path / "song.mid", tmp_path / "left"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.1, NoteOn(57, 90))]))
@@ -172,7 +169,7 @@ def test_files_are_taken_at_the_start_no_note_of_a_song_is_lost_and_no_thread_st
 
 @posix
 @pytest.mark.parametrize("end", [KILL, signal.SIGTERM])
-def test_what_is_recorded_while_the_process_ends_is_left_whole(tmp_path: Path, end: signal.Signals) -> None:
+def test_what_is_recorded_while_the_process_ends_is_left_whole(tmp_path, end):
     with begun(START + RECORDING, tmp_path) as child:
         try:
             assert child.stdout is not None
@@ -209,7 +206,7 @@ def test_what_is_recorded_while_the_process_ends_is_left_whole(tmp_path: Path, e
 
 @posix
 @pytest.mark.parametrize("number", SIGNALS)
-def test_each_signal_that_asks_to_end_is_taken_by_the_event_loop(qtbot: QtBot, number: signal.Signals) -> None:
+def test_each_signal_that_asks_to_end_is_taken_by_the_event_loop(qtbot, number):
     before, asked = signal.getsignal(number), []
     with asked_to_end(lambda: asked.append(signal.getsignal(number))):
         os.kill(os.getpid(), number)
@@ -217,7 +214,7 @@ def test_each_signal_that_asks_to_end_is_taken_by_the_event_loop(qtbot: QtBot, n
     assert asked == [before], "a second one has its usual effect"
 
 
-def test_a_fault_of_any_thread_is_logged(qtbot: QtBot, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_any_thread_is_logged(qtbot, log, monkeypatch):
     monkeypatch.setattr(sys, "excepthook", lambda *fault: None)  # the runner's own would take it for the test's
     monkeypatch.setattr(threading, "excepthook", lambda fault: None)
     notices, before = NoticeBar(), sys.excepthook
@@ -244,12 +241,12 @@ def test_a_fault_of_any_thread_is_logged(qtbot: QtBot, log: Path, monkeypatch: p
     assert len(sizes) == 1 + OLDER_KEPT and max(sizes) <= LARGEST_BYTES + 300_000
 
 
-def test_a_crash_in_compiled_code_leaves_where_it_was(log: Path, tmp_path: Path) -> None:
+def test_a_crash_in_compiled_code_leaves_where_it_was(log, tmp_path):
     assert ended(CRASH, tmp_path)[0] != 0
     assert "Segmentation fault" in log.with_suffix(".crash").read_text() or sys.platform == "win32"
 
 
-def test_an_engine_that_cannot_be_loaded_is_shown_and_garbage_is_collected(log: Path, tmp_path: Path) -> None:
+def test_an_engine_that_cannot_be_loaded_is_shown_and_garbage_is_collected(log, tmp_path):
     _, lines, errors = ended(START + BROKEN, tmp_path)
     assert lines[:1] == ["True True True"], errors
     assert "libtorch.so" in log.read_text("utf-8")
@@ -257,12 +254,12 @@ def test_an_engine_that_cannot_be_loaded_is_shown_and_garbage_is_collected(log: 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a screen")
 @pytest.mark.parametrize("display", ["", ":987"])
-def test_without_a_screen_there_is_one_line(display: str, log: Path, tmp_path: Path) -> None:
+def test_without_a_screen_there_is_one_line(display, log, tmp_path):
     status, _, errors = ended(COMMAND, tmp_path, QT_QPA_PLATFORM="", DISPLAY=display, WAYLAND_DISPLAY="")
     (line,) = errors.splitlines()
     assert status == 1 and "screen" in line
 
 
-def test_output_that_is_not_utf8_prints_what_it_can(tmp_path: Path) -> None:
+def test_output_that_is_not_utf8_prints_what_it_can(tmp_path):
     status, lines, _ = ended(COMMAND, tmp_path, "models", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert status == 0 and any("koopman" in line for line in lines)

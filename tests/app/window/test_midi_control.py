@@ -1,7 +1,5 @@
 """MIDI in the window: inputs come and go, notes are played at once, and controllers are assigned in the dialog."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Callable
@@ -27,7 +25,7 @@ from tests.app.window.driver import LEFT, choose, find
 LISTEN = "Assign a controller to listen"
 
 
-def test_an_input_is_found_again_and_releases_its_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_input_is_found_again_and_releases_its_keys(monkeypatch):
     backend, heard, released = FakeBackend(), list[Event](), list[Event]()
     midi = MidiInput(heard.append, lambda: backend, released.append)
     midi.open("Pads:Pads 31:0")
@@ -102,7 +100,7 @@ def desk(qtbot: QtBot) -> Callable[..., Desk]:
     return make
 
 
-def test_notes_are_played_in_the_thread_that_brings_them(qtbot: QtBot, desk: Callable[..., Desk]) -> None:
+def test_notes_are_played_in_the_thread_that_brings_them(qtbot, desk):
     """The window may be busy with anything; a taught controller turns what it was taught, and is not played."""
     keys = desk(controllers={"width": 74})
     events = [NoteOn(60, 90, 3), Bend(-1.0, 3), ControlChange(64, 127, 3), NoteOff(60, 3)]
@@ -119,7 +117,7 @@ def test_notes_are_played_in_the_thread_that_brings_them(qtbot: QtBot, desk: Cal
 
 
 @pytest.mark.parametrize("change", ["another", "none", "close", "notes"])
-def test_keys_that_an_input_holds_are_released_with_it(desk: Callable[..., Desk], change: str) -> None:
+def test_keys_that_an_input_holds_are_released_with_it(desk, change):
     """And nothing of that is learned, or taken for a controller that somebody moved."""
     keys = desk(controllers={"width": 74})
     keys.backend.send(NoteOn(60, 90, 2), Bend(-1.0, 2))
@@ -140,9 +138,7 @@ def test_keys_that_an_input_holds_are_released_with_it(desk: Callable[..., Desk]
 
 
 @pytest.mark.parametrize("number", [64, 101, 123])
-def test_a_controller_is_learned_unless_it_has_a_function(
-    qtbot: QtBot, desk: Callable[..., Desk], number: int
-) -> None:
+def test_a_controller_is_learned_unless_it_has_a_function(qtbot, desk, number):
     """The dialog says why, and another one is still waited for; a pedal that an earlier version assigned is one."""
     choices = MidiChoices.model_validate_json(f'{{"controllers": {{"width": {number}, "volume_db": 7}}}}')
     keys = desk(controllers=choices.controllers)
@@ -167,9 +163,7 @@ def test_a_controller_is_learned_unless_it_has_a_function(
         assert learn.isChecked() == waits
 
 
-def test_inputs_and_instrument_are_shown(
-    qtbot: QtBot, desk: Callable[..., Desk], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_inputs_and_instrument_are_shown(qtbot, desk, monkeypatch):
     keys = desk(port="Strings")
     box = find(keys.dialog, QComboBox, "MIDI input")
     assert "not connected" in keys.said[0]

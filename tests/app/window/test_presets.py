@@ -1,10 +1,7 @@
 """Presets, scales and bodies: chosen in the browser, stepped through, dropped on the window."""
 
-from __future__ import annotations
-
 import math
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +58,7 @@ def groups(browser: Browser) -> dict[str, int]:
     return {line: sum(row.heading == line for row in rows) for line in lines if isinstance(line, str)}
 
 
-def test_a_search_filters_the_steps(lab: Window, browser: Browser, preset_folder: Path, small_preset: Path) -> None:
+def test_a_search_filters_the_steps(lab, browser, preset_folder, small_preset):
     bar, search = lab.window.presets, browser.search
     lab.key(KEY.Key_X, on=browser.list)
     assert (lab.choices.heard, search.text()) == ("a", "x"), "keys of the window rest"
@@ -100,9 +97,7 @@ def test_a_search_filters_the_steps(lab: Window, browser: Browser, preset_folder
         assert browser.isHidden() or (search.text() == "" and "third" in browser.listed), "it was just added"
 
 
-def test_favourites_come_first(
-    lab: Window, browser: Browser, preset_folder: Path, small_preset: Path, tmp_path: Path
-) -> None:
+def test_favourites_come_first(lab, browser, preset_folder, small_preset, tmp_path):
     """The headings are passed over by arrows and page keys, which go through both groups in the listed order."""
     assert {path.stem for path in preset_files()} >= set(FIRST_FAVOURITES)
     shutil.copy(small_preset, preset_folder / "studio_zither.safetensors")
@@ -133,8 +128,8 @@ def test_favourites_come_first(
 
 
 def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(
-    lab: Window, preset_folder: Path, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    lab, preset_folder, small_preset, tmp_path, monkeypatch
+):
     own, new, wav = tmp_path / "own", tmp_path / "new.safetensors", tmp_path / "a.wav"
     own.mkdir()
     shutil.copy(small_preset, own / "mine.safetensors")
@@ -163,7 +158,7 @@ def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(
         assert words in lab.window.notices.text and lab.choices == choices
 
 
-def test_scales_and_mappings_tune_the_instrument_in_either_order(guitar: Window, tmp_path: Path) -> None:
+def test_scales_and_mappings_tune_the_instrument_in_either_order(guitar, tmp_path):
     """A mapping joins a scale: alone its degrees would name steps of twelve equal ones in higher octaves."""
 
     def written(name: str, text: str) -> Path:
@@ -210,7 +205,7 @@ def effects(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return heard
 
 
-def test_short_sounds_are_bodies(effects: list[Any], guitar: Window, tmp_path: Path) -> None:
+def test_short_sounds_are_bodies(effects, guitar, tmp_path):
     """One that comes back is heard again, though the instrument names it all the time."""
     before, box, start = guitar.instrument, guitar.window.instrument.bar.body, guitar.choices
 
@@ -271,7 +266,7 @@ def dialog_of(w: Window, file: Path) -> LearnDialog:
     return dialog
 
 
-def test_a_note_is_learned_compared_kept_and_played(guitar: Window, note: Path) -> None:
+def test_a_note_is_learned_compared_kept_and_played(guitar, note):
     dialog = dialog_of(guitar, note)
     assert dialog.string.isChecked() and dialog.name.text() == "Low string"
     assert dialog.length_m.text() == dialog.gauge_mm.text() == "assumed"
@@ -333,8 +328,8 @@ def hot() -> Samples:
     ],
 )
 def test_the_dialog_says_what_a_sound_is_and_that_is_done_all_the_same(
-    guitar: Window, tmp_path: Path, sound: Callable[[], Samples], is_string: bool | None, words: str, notice: str
-) -> None:
+    guitar, tmp_path, sound, is_string, words, notice
+):
     """What is only unusual is a warning; a silent recording can only be a body."""
     samples, rate_hz = sound()
     soundfile.write(tmp_path / "sound.wav", samples, rate_hz, "FLOAT")

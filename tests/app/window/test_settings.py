@@ -1,7 +1,5 @@
 """Settings survive a round trip and a kill; any file lets the app start, and loses no more than what is wrong."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -12,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject
-from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
@@ -33,7 +30,7 @@ def load(path: Path, text: str | bytes) -> tuple[Settings, str]:
     return load_settings(path)
 
 
-def test_settings_survive_a_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_survive_a_round_trip(tmp_path, monkeypatch):
     path = tmp_path / "new folder" / "settings.json"
     monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(path))
     assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
@@ -62,7 +59,7 @@ def test_settings_survive_a_round_trip(tmp_path: Path, monkeypatch: pytest.Monke
         ('{"look": {"face": "light"}}', Settings(look=Look(theme="light"))),  # of version 0.1
     ],
 )
-def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path: Path, text: str, expected: Settings) -> None:
+def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path, text, expected):
     assert load(tmp_path / "settings.json", text) == (expected, "")
 
 
@@ -87,7 +84,7 @@ def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path: Path, tex
     ],
     ids=lambda text: repr(text[:24]),
 )
-def test_a_broken_file_is_set_aside(tmp_path: Path, text: str | bytes, names: str) -> None:
+def test_a_broken_file_is_set_aside(tmp_path, text, names):
     path = tmp_path / "settings.json"
     settings, notice = load(path, text)
     assert names in notice and notice.isprintable() and len(notice) <= 500
@@ -99,7 +96,7 @@ def test_a_broken_file_is_set_aside(tmp_path: Path, text: str | bytes, names: st
     assert load_settings(path) == (settings, "")
 
 
-def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
+def test_a_wrong_field_loses_no_more_than_itself(tmp_path):
     """What is dropped for one fault is not there for the next, and may be necessary where it was."""
     path = tmp_path / "settings.json"
     settings, notice = load(
@@ -120,7 +117,7 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
         assert "choices.string" in notice or not is_there
 
 
-def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(qtbot: QtBot, tmp_path: Path) -> None:
+def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(qtbot, tmp_path):
     """The test says when the saver looks."""
     owner, now = QObject(), Settings()
 
@@ -177,7 +174,7 @@ application.exec()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
-def test_a_kill_loses_nothing_that_rested(tmp_path: Path) -> None:
+def test_a_kill_loses_nothing_that_rested(tmp_path):
     path = tmp_path / "settings.json"
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)]) as process:
         end_s = time.monotonic() + 60

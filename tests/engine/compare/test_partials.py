@@ -33,7 +33,7 @@ def ten_modes(seconds: float = 2.0) -> tuple[Array, Array, Array]:
     return time_s, np.array(LINEAR_HZ), np.linspace(1, 3, 10)
 
 
-def test_detuning_level_and_decay_are_what_they_were_made() -> None:
+def test_detuning_level_and_decay_are_what_they_were_made():
     time_s, hz, sigma = ten_modes()
     cents, level_db = 2.0, 1.5
     detuned = hz * 2 ** (cents / 1200)
@@ -58,7 +58,7 @@ def test_detuning_level_and_decay_are_what_they_were_made() -> None:
 
 
 @pytest.mark.parametrize("cycles", [-0.4, -0.25, 0.125, 0.45])
-def test_a_phase_is_reported_with_its_sign_below_and_above_half_the_rate(cycles: float) -> None:
+def test_a_phase_is_reported_with_its_sign_below_and_above_half_the_rate(cycles):
     time_s, hz, sigma = ten_modes(0.5)
     truth = partial(time_s, hz, sigma)
     found = errors(partial(time_s, hz, sigma, 0.5, 0.1 + cycles).real, truth, (0, 0.5))
@@ -69,7 +69,7 @@ def test_a_phase_is_reported_with_its_sign_below_and_above_half_the_rate(cycles:
     assert flat.cents[0, 0, RESOLVED] == pytest.approx(-3, abs=0.005)  # although its alias is sharp
 
 
-def test_a_glide_is_reported_of_truth_and_prediction() -> None:
+def test_a_glide_is_reported_of_truth_and_prediction():
     """Frequencies that fall in a straight line, the prediction's further: between the thirds' middles two thirds."""
     time_s, hz, sigma = ten_modes(1)
 
@@ -89,7 +89,7 @@ def test_a_glide_is_reported_of_truth_and_prediction() -> None:
     assert found.weighted(0).glide_error_cents == pytest.approx(predicted - true, rel=0.02)
 
 
-def test_a_t60_needs_a_decay() -> None:
+def test_a_t60_needs_a_decay():
     time_s, hz, sigma = ten_modes(1)
     sigma[0], sigma[1] = 0.1, 0.3  # 0.9 and 2.6 dB a second
     truth = partial(time_s, hz, sigma)
@@ -102,7 +102,7 @@ def test_a_t60_needs_a_decay() -> None:
     assert found.by_mode(0)[1].t60_error_percent == math.inf
 
 
-def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
+def test_predictions_that_are_silent_weak_or_not_numbers():
     time_s, hz, sigma = ten_modes(1)
     truth = partial(time_s, hz, sigma)
     broken = truth.real.copy()
@@ -119,7 +119,7 @@ def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
     assert found.weighted(1).level_db == math.inf
 
 
-def test_blocks_join_to_the_whole() -> None:
+def test_blocks_join_to_the_whole():
     time_s, hz, sigma = ten_modes(1)
     truth, predicted = partial(time_s, hz, sigma), partial(time_s, 1.001 * hz, sigma).real
     length = segment_frames(RATE_HZ, LINEAR_HZ[0])
@@ -132,7 +132,7 @@ def test_blocks_join_to_the_whole() -> None:
     assert trajectories.cents.shape == (2, 1, 10)
 
 
-def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circles() -> None:
+def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circles():
     eigenvalues, spacing_s = resonator_of(STRING, 10).eigenvalues(), 1 / 16_000
     expected = np.linspace(1, 2, 10) * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
     around = [(expected * np.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
@@ -150,7 +150,7 @@ def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circl
     assert roundness[1] > 1.01
 
 
-def test_a_partial_is_reported_of_while_it_is_there() -> None:
+def test_a_partial_is_reported_of_while_it_is_there():
     """None where it never was, is under the floor, or where there is no whole segment."""
     time_s, hz, sigma = ten_modes(2)
     levels = np.ones(10)

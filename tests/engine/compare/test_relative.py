@@ -1,8 +1,6 @@
 """Relative errors and spectral distances by hand; what an ear finds on sums of decaying partials."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +21,7 @@ from engine.compare.spectra import FLOOR_DB, log_spectral_distance, spectral_dis
         ([[1.0, 1.0]], [[0.0, 0.0]], math.inf, math.inf),
     ],
 )
-def test_errors_by_hand(predicted: list[Any], truth: list[Any], rel_mse: float, rel_mae: float) -> None:
+def test_errors_by_hand(predicted, truth, rel_mse, rel_mae):
     error = relative_error(torch.tensor([predicted]), torch.tensor([truth]))
     assert (error.rel_mse, error.rel_mae) == pytest.approx((rel_mse, rel_mae))
     with pytest.raises(ValueError, match="differ in shape"):
@@ -45,7 +43,7 @@ def same(found: RelativeError, predicted: torch.Tensor, truth: torch.Tensor) -> 
     return (found.rel_mse, found.rel_mae) == pytest.approx((expected.rel_mse, expected.rel_mae))
 
 
-def test_windows_frames_trajectories_and_batches_have_their_own_errors() -> None:
+def test_windows_frames_trajectories_and_batches_have_their_own_errors():
     predicted, truth, sums = motions(5, 50, 3)
     assert same(sums.total(), predicted, truth) and same(sums.of(range(5)), predicted, truth)
     assert same(sums.total(20), predicted[:, :20], truth[:, :20])
@@ -75,7 +73,7 @@ def test_windows_frames_trajectories_and_batches_have_their_own_errors() -> None
 
 
 @pytest.mark.parametrize("rows_first", [True, False])
-def test_trajectories_are_known_again_in_blocks(rows_first: bool) -> None:
+def test_trajectories_are_known_again_in_blocks(rows_first):
     predicted, truth, whole = motions(5, 30, 3)
     sums = ErrorSums(30)
     parts, blocks = ((0, 2), (2, 5)), ((0, 7), (7, 20), (20, 30))
@@ -97,7 +95,7 @@ def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSum
     return sums
 
 
-def test_a_standard_error_is_that_of_a_ratio_of_sums() -> None:
+def test_a_standard_error_is_that_of_a_ratio_of_sums():
     """A quarter is ten times as loud: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
     shares, loudness = [0.01, 0.01, 0.01, 0.2] * 100, [1.0, 1.0, 1.0, 10.0] * 100
     sums = spoilt(shares, loudness)
@@ -124,7 +122,7 @@ def test_a_standard_error_is_that_of_a_ratio_of_sums() -> None:
         assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
 
 
-def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> None:
+def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone():
     predicted, truth = np.random.default_rng(3).normal(size=(2, 12, 30, 4))
     whole, alone = ErrorSums(30, edges=[20, 10, 90]), ErrorSums(10)
     for first in (0, 7, 14, 21, 28):  # blocks that cross the edges
@@ -137,7 +135,7 @@ def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> 
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e200])
-def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> None:
+def test_what_is_no_number_is_an_infinite_error_from_then_on(value):
     predicted, truth, _ = motions(3, 10, 2)
     predicted[1, 5:] = value
     sums = ErrorSums(10)
@@ -153,7 +151,7 @@ def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> No
 
 
 @pytest.mark.parametrize("of", [np.asarray, torch.tensor])
-def test_an_error_to_signal_ratio(of: Callable[..., Any]) -> None:
+def test_an_error_to_signal_ratio(of):
     truth = of([3.0, -4.0])
     assert error_to_signal(truth, truth) == 0
     assert error_to_signal(of([3.0, -3.0]), truth) == pytest.approx(1 / 25)
@@ -165,7 +163,7 @@ def sine(hz: float, samples: int = 4000, phase: float = 0.0) -> np.ndarray:
     return np.sin(2 * math.pi * hz * np.arange(samples) / 4000 + phase)[None]
 
 
-def test_spectra_hear_a_gain_exactly_a_frequency_and_no_phase() -> None:
+def test_spectra_hear_a_gain_exactly_a_frequency_and_no_phase():
     noise = np.random.default_rng(0).standard_normal((3, 5000), np.float32)
     convergence, log_db = spectral_distances(2 * noise, noise)
     assert convergence.tolist() == pytest.approx([1, 1, 1])
@@ -180,7 +178,7 @@ def test_spectra_hear_a_gain_exactly_a_frequency_and_no_phase() -> None:
         assert float(spectral_distances(3 * sound, sound)[0][0]) == pytest.approx(2)
 
 
-def test_spectra_of_silence_and_of_what_is_no_number() -> None:
+def test_spectra_of_silence_and_of_what_is_no_number():
     silence = np.zeros((1, 600))
     assert [float(value[0]) for value in spectral_distances(silence, silence)] == [0, 0]
     assert float(spectral_distances(sine(500, 600), silence)[0][0]) == math.inf
@@ -193,7 +191,7 @@ def test_spectra_of_silence_and_of_what_is_no_number() -> None:
         assert [float(v[0]) for v in spectral_distances(silence + value, sine(500, 600))] == [math.inf, math.inf]
 
 
-def test_a_log_spectral_distance_is_a_gain_above_the_floor() -> None:
+def test_a_log_spectral_distance_is_a_gain_above_the_floor():
     noise = np.random.default_rng(0).standard_normal(5000)
     assert log_spectral_distance(noise, 2 * noise) == pytest.approx(20 * math.log10(2))
     assert log_spectral_distance(noise[:100], noise[:100] / 2) == pytest.approx(20 * math.log10(2), rel=0.05)
@@ -223,7 +221,7 @@ def errors(model: np.ndarray, truth: np.ndarray | None = None):
     return audible_errors(model, string() if truth is None else truth, RATE_HZ, PARTIALS_HZ, 0.25)
 
 
-def test_the_truth_itself_has_no_errors_whatever_its_phase_and_level() -> None:
+def test_the_truth_itself_has_no_errors_whatever_its_phase_and_level():
     same = errors(string())
     assert (same.distance_db, same.level_db, same.rise_db, same.split_cents) == (0, 0, 0, None)
     assert same.pitch_cents == 0
@@ -234,7 +232,7 @@ def test_the_truth_itself_has_no_errors_whatever_its_phase_and_level() -> None:
 
 
 @pytest.mark.parametrize("cents", (-40.0, -13.0, 3.0, 13.0))
-def test_a_detuned_string_is_reported_in_cents_and_only_so(cents: float) -> None:
+def test_a_detuned_string_is_reported_in_cents_and_only_so(cents):
     found = errors(string(cents))
     assert found.pitch_cents == pytest.approx(cents, abs=0.1)
     assert (found.split_cents, found.rise_db) == (None, 0)
@@ -243,7 +241,7 @@ def test_a_detuned_string_is_reported_in_cents_and_only_so(cents: float) -> None
 
 
 @pytest.mark.parametrize("change_db", (-8.0, -2.0, 5.0))
-def test_a_level_that_changes_is_reported_against_the_truths(change_db: float) -> None:
+def test_a_level_that_changes_is_reported_against_the_truths(change_db):
     """A rise is one of the model's own level: the string's own decay is faster, or there is none."""
     found = errors(drifting(change_db) * string())
     assert found.level_db == pytest.approx(change_db, abs=0.01)
@@ -255,7 +253,7 @@ def test_a_level_that_changes_is_reported_against_the_truths(change_db: float) -
 
 
 @pytest.mark.parametrize("cents", (6.0, 22.0, 40.0))
-def test_two_pitches_where_the_truth_has_one_are_reported_with_their_distance(cents: float) -> None:
+def test_two_pitches_where_the_truth_has_one_are_reported_with_their_distance(cents):
     both = string() + 0.5 * string(cents)
     found = errors(both)
     assert found.split_cents == pytest.approx(cents, abs=0.5)
@@ -264,7 +262,7 @@ def test_two_pitches_where_the_truth_has_one_are_reported_with_their_distance(ce
     assert errors(both, both).split_cents is None
 
 
-def test_what_is_not_heard_does_not_count_and_silence_is_finite() -> None:
+def test_what_is_not_heard_does_not_count_and_silence_is_finite():
     """A string that rests beside its place, and what lies far below the loudest."""
     hiss, silent = 1e-6 * np.random.default_rng(0).standard_normal(len(TIME_S)), np.zeros_like(TIME_S)
     for beside in (0.05, hiss):
@@ -277,7 +275,7 @@ def test_what_is_not_heard_does_not_count_and_silence_is_finite() -> None:
     assert np.isfinite(errors(string(), silent).distance_db)
 
 
-def test_sounds_of_two_lengths_and_too_short_ones_are_refused() -> None:
+def test_sounds_of_two_lengths_and_too_short_ones_are_refused():
     with pytest.raises(ValueError, match="differ in shape"):
         errors(string()[:-1])
     with pytest.raises(ValueError, match="less than a frame"):
@@ -286,7 +284,7 @@ def test_sounds_of_two_lengths_and_too_short_ones_are_refused() -> None:
     assert (found.pitch_cents, found.split_cents) == (None, None)  # whose partials cannot be made
 
 
-def test_a_level_is_a_sines_amplitude_whatever_it_rests_on() -> None:
+def test_a_level_is_a_sines_amplitude_whatever_it_rests_on():
     time_s = np.arange(RATE_HZ // 2) / RATE_HZ
     for hz in (247.0, 1003.3):
         assert heard_level_db(1e-3 * np.sin(2 * np.pi * hz * time_s) + 0.1, RATE_HZ) == pytest.approx(-60, abs=0.1)

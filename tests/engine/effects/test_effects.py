@@ -39,7 +39,7 @@ def mixer_with(effects: Effects | None, samples: Samples | None = None) -> Mixer
 
 
 @pytest.mark.parametrize("block", [1, 63, 64, 65, 4097])
-def test_blocks_of_any_size_are_the_same_samples(block: int) -> None:
+def test_blocks_of_any_size_are_the_same_samples(block):
     samples, effects = noise(8000), response(5000, 2)
     whole, parts = mixer_with(effects, samples), mixer_with(effects, samples)
     found = np.concatenate([parts.render(min(block, 8000 - first)) for first in range(0, 8000, block)])
@@ -59,13 +59,13 @@ CHOICES = [
 
 
 @pytest.mark.parametrize("effects", CHOICES, ids=range(len(CHOICES)))
-def test_a_body_and_a_room_are_the_convolution_without_delay_after_the_amplifier(effects: Effects) -> None:
+def test_a_body_and_a_room_are_the_convolution_without_delay_after_the_amplifier(effects):
     """Up to the longest, of six seconds less a frame."""
     samples = noise(min(320_000, max(30_000, 2 * len(effects.impulse(RATE_HZ)))))
     np.testing.assert_allclose(through(effects, samples), apply(effects, samples), atol=1e-6)
 
 
-def test_what_has_no_mix_is_left_out_and_all_rings_out_within_its_tail() -> None:
+def test_what_has_no_mix_is_left_out_and_all_rings_out_within_its_tail():
     samples = noise(5000)
     for effects in (None, Effects(), Effects(Body(0.0), Room(0.0), Amp(0.0))):
         np.testing.assert_array_equal(through(effects, samples), samples)
@@ -78,7 +78,7 @@ def test_what_has_no_mix_is_left_out_and_all_rings_out_within_its_tail() -> None
     assert found[tail - 2000 : tail].any() and np.abs(found[tail:]).max() < 1e-12
 
 
-def test_a_mono_body_is_one_of_equal_sides_and_one_of_a_single_frame_keeps_its_balance_and_sign() -> None:
+def test_a_mono_body_is_one_of_equal_sides_and_one_of_a_single_frame_keeps_its_balance_and_sign():
     mono = np.random.default_rng(0).standard_normal((100, 1))
     for room in (None, Room(0.4, 0.5)):  # as wide behind it
         one, two = (Effects(Body(0.7, impulse=Impulse(each, RATE_HZ)), room) for each in (mono, mono.repeat(2, 1)))
@@ -99,7 +99,7 @@ def way(frames: int, begin: int) -> Signal:
 
 
 @pytest.mark.parametrize("at_frame", [WINDOW, 10_000, 10_048, 10_239])
-def test_another_response_is_faded_to_and_what_was_played_rings_on(at_frame: int) -> None:
+def test_another_response_is_faded_to_and_what_was_played_rings_on(at_frame):
     samples, frames = noise(20_000), 30_000
     one, other = response(9000, 1, 3), response(12_000, 2, 4)
     mixer = mixer_with(one, samples)
@@ -113,7 +113,7 @@ def test_another_response_is_faded_to_and_what_was_played_rings_on(at_frame: int
     np.testing.assert_allclose(found, before + (after - before) * way(frames, begin), atol=1e-6)
 
 
-def test_effects_come_and_go_by_a_fade_and_leave_every_sample_as_it_was() -> None:
+def test_effects_come_and_go_by_a_fade_and_leave_every_sample_as_it_was():
     samples, frames = noise(60_000), 60_000
     mixer = mixer_with(None, samples)
     first = mixer.render(1000)
@@ -132,7 +132,7 @@ def test_effects_come_and_go_by_a_fade_and_leave_every_sample_as_it_was() -> Non
 
 
 @pytest.mark.parametrize("sounding", [True, False])
-def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding: bool) -> None:
+def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding):
     samples = noise(60_000)
     mixer = mixer_with(response(500, 1, 0), samples if sounding else None)
     mixer.render(640)
@@ -148,7 +148,7 @@ def test_of_many_wishes_the_last_alone_is_heard_and_kept(sounding: bool) -> None
         np.testing.assert_allclose(found[6 * WINDOW :], expected[6 * WINDOW :], atol=1e-6)
 
 
-def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_again() -> None:
+def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_again():
     """At rest, other effects and none are there at once."""
     samples, effects, other = noise(5000), response(7000, 2), response(100, 1, 9)
     mixer = mixer_with(effects, samples)
@@ -170,14 +170,14 @@ def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_again() -> N
 
 
 @pytest.mark.parametrize("gain", [1e-25, 1e-310])
-def test_what_is_too_soft_to_be_sound_is_silence(gain: float) -> None:
+def test_what_is_too_soft_to_be_sound_is_silence(gain):
     mixer = mixer_with(response(5000))
     mixer.add(wet(noise(40_000), gain))
     assert not mixer.render(20_000).any()
 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf, 1e9])
-def test_what_is_no_sound_does_not_stay_in_it(value: float) -> None:
+def test_what_is_no_sound_does_not_stay_in_it(value):
     samples, effects = noise(20_000), response(4000, 2)
     mixer = mixer_with(effects, samples)
     first = mixer.render(640)
@@ -189,7 +189,7 @@ def test_what_is_no_sound_does_not_stay_in_it(value: float) -> None:
     np.testing.assert_allclose(found, apply(effects, heard), atol=1e-6)
 
 
-def test_volume_and_limiter_come_after_it_and_one_channel_is_the_mean_of_both() -> None:
+def test_volume_and_limiter_come_after_it_and_one_channel_is_the_mean_of_both():
     samples, effects = noise(20_000), response(2000, 2)
     expected = 0.25 * apply(effects, samples)
     for channels in (1, 2):
@@ -226,7 +226,7 @@ def spectrum(sound: Signal) -> Signal:
 
 
 @pytest.mark.parametrize("drive_db", [6.0, 20.0, FULL_DB])
-def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
+def test_harmonics_are_those_of_its_shape(drive_db):
     """By a sum over one period of x/√(1 + x²), which knows neither filters nor rates."""
     periods, sound = tone(1_000, 0.1)
     found = spectrum(amplified(sound, drive_db))
@@ -243,7 +243,7 @@ def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000])
-def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz: int) -> None:
+def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz):
     periods, sound = tone(5_000, 1.0, rate_hz=rate_hz)
     found = spectrum(amplified(sound, FULL_DB, rate_hz=rate_hz))
     harmonic = np.zeros(len(found), bool)
@@ -253,7 +253,7 @@ def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz: int) -> None:
 
 
 @pytest.mark.parametrize("drive_db", [1.0, 12.0, FULL_DB])
-def test_a_nominal_level_is_kept_another_changes_no_drive_and_tone_tilts(drive_db: float) -> None:
+def test_a_nominal_level_is_kept_another_changes_no_drive_and_tone_tilts(drive_db):
     _, sound = tone(1_000, amplifier.NOMINAL)
     found, gain = amplified(sound, drive_db, 3.0), 10 ** (6 / 20)
     plain = amplified(sound, drive_db)
@@ -265,7 +265,7 @@ def test_a_nominal_level_is_kept_another_changes_no_drive_and_tone_tilts(drive_d
         assert 20 * np.log10(bright / plain) == pytest.approx(sign * 6, abs=1.5)
 
 
-def test_a_drive_of_0_leaves_every_sample_and_is_switched_without_a_click() -> None:
+def test_a_drive_of_0_leaves_every_sample_and_is_switched_without_a_click():
     sound = tone(200, 0.1, 64 * QUANTUM)[1].astype(np.float32)
     mixer, parts = mixer_with(Effects(amp=Amp()), sound), []
     for drive_db, quanta in ((0.0, 10), (6.0, 30), (0.0, 24)):
@@ -278,6 +278,6 @@ def test_a_drive_of_0_leaves_every_sample_and_is_switched_without_a_click() -> N
         assert np.array_equal(found[frames], sound[frames]) == same
 
 
-def test_through_the_amplifier_silence_stays_silence_after_what_was_driven() -> None:
+def test_through_the_amplifier_silence_stays_silence_after_what_was_driven():
     sound = np.concatenate([tone(200, 1.0, 4_800)[1], np.zeros((RATE_HZ, 2))])
     assert np.abs(amplified(sound, FULL_DB)[-2_400:]).max() < 1e-5

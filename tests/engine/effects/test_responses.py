@@ -30,7 +30,7 @@ def noise(frames: int, channels: int = 2) -> Array:
     ("frames", "from_hz", "to_hz"),
     [(300, 48_000, 44_100), (1, 44_100, 48_000), (777, 31_337, 96_000), (50, 96_000, 8_000)],
 )
-def test_another_rate_has_the_fourier_series_with_as_much_silence(frames: int, from_hz: int, to_hz: int) -> None:
+def test_another_rate_has_the_fourier_series_with_as_much_silence(frames, from_hz, to_hz):
     given = noise(frames)
     ratio = Fraction(to_hz / from_hz).limit_denominator(1000)
     units = -(-frames // ratio.denominator)
@@ -45,9 +45,7 @@ def test_another_rate_has_the_fourier_series_with_as_much_silence(frames: int, f
 
 
 @pytest.mark.parametrize(("body_mix", "room_mix"), [(1.0, 0.0), (0.3, 0.0), (0.0, 0.6), (0.7, 0.4), (1.0, 1.0)])
-def test_a_mix_has_the_level_of_the_noise_that_goes_in_also_of_two_in_series(
-    body_mix: float, room_mix: float
-) -> None:
+def test_a_mix_has_the_level_of_the_noise_that_goes_in_also_of_two_in_series(body_mix, room_mix):
     """Its power at octaves that count alike is 1, in the mean of both channels."""
     rate_hz, body, room = 8_000, noise(900), noise(1_300)
     weights = responses.weights_of(responses.powers_of(body, room, rate_hz), body_mix, room_mix)
@@ -82,7 +80,7 @@ FROZEN = {
 
 
 @pytest.mark.parametrize("name", FROZEN)
-def test_sounds_are_as_they_were(name: str) -> None:
+def test_sounds_are_as_they_were(name):
     kind, *values = name.split()
     if kind == "room":
         found = room_response(float(values[0]), int(values[1]))
@@ -104,7 +102,7 @@ def spectrum(body: Body, rate_hz: int) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000])
 @pytest.mark.parametrize("size", [0.5, 1.0, 1.6])
-def test_the_lowest_modes_are_at_their_frequencies(size: float, rate_hz: int) -> None:
+def test_the_lowest_modes_are_at_their_frequencies(size, rate_hz):
     frequency_hz, found = spectrum(Body(size=size), rate_hz)
     for mode in BODIES["guitar"].lowest[:2]:  # the strong ones, alone in their range
         expected_hz = mode.frequency_hz / size
@@ -113,7 +111,7 @@ def test_the_lowest_modes_are_at_their_frequencies(size: float, rate_hz: int) ->
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_each_body_has_its_modes_rings_out_and_names_its_sources(name: str) -> None:
+def test_each_body_has_its_modes_rings_out_and_names_its_sources(name):
     wood = BODIES[name]
     lowest_hz = [mode.frequency_hz for mode in wood.lowest]
     assert lowest_hz == sorted(lowest_hz) and len(lowest_hz) >= 4
@@ -128,7 +126,7 @@ def test_each_body_has_its_modes_rings_out_and_names_its_sources(name: str) -> N
     assert np.exp(-decay[: len(lowest_hz)] * wood.seconds).max() < 0.05  # what is cut is faint
 
 
-def test_an_impulse_of_ones_own_that_is_stretched_too_long_is_faded_out() -> None:
+def test_an_impulse_of_ones_own_that_is_stretched_too_long_is_faded_out():
     long = Impulse(noise(2 * 48_000, 1), 48_000)
     found = Body(size=2.0, impulse=long).response(48_000)
     assert len(found) == 3 * 48_000 and abs(found[-1, 0]) < 1e-12
@@ -145,7 +143,7 @@ def t60_s(response: Array, band_hz: tuple[float, float], rate_hz: int) -> float:
 
 
 @pytest.mark.parametrize("wanted_s", [0.3, 0.8, 1.5, 3.0])
-def test_it_rings_as_long_as_asked_and_shorter_where_it_is_high(wanted_s: float) -> None:
+def test_it_rings_as_long_as_asked_and_shorter_where_it_is_high(wanted_s):
     for side in room_response(wanted_s, 48_000).T:
         middle_s = t60_s(side, (400.0, 630.0), 48_000)
         assert middle_s == pytest.approx(wanted_s, rel=0.12)
@@ -167,9 +165,7 @@ PLUG_IN_BODIES = {
 
 @pytest.mark.parametrize("kind", PLUG_IN_BODIES)
 @pytest.mark.parametrize(("rate_hz", "size", "t60_s"), [(48_000, 1.0, 0.3), (44_100, 1.37, 0.2), (8_000, 0.5, 0.5)])
-def test_a_plug_in_has_the_responses_of_the_app_within_its_memory(
-    kind: str, rate_hz: int, size: float, t60_s: float
-) -> None:
+def test_a_plug_in_has_the_responses_of_the_app_within_its_memory(kind, rate_hz, size, t60_s):
     """Noise and samples are whole numbers in it."""
     body, needs = PLUG_IN_BODIES[kind], np.zeros(len(NEEDS), np.int64)
     memory, whole = body_memory(body), np.rint(room_noise() / prepared.NOISE_UNIT).astype(np.int32)
@@ -232,7 +228,7 @@ def measured_db(sound: Array) -> float:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_gain_brings_a_sound_to_the_wanted_level(seed: int) -> None:
+def test_the_gain_brings_a_sound_to_the_wanted_level(seed):
     omega, sigma, heard = drawn(seed)
     gain = loudness.gain(sound_of(omega, sigma, heard), len(omega), 1, NO_BODY, 0.0)
     assert measured_db(gain * samples(omega, sigma, heard, 0.5)) == pytest.approx(of.WANTED_DB, abs=0.2)
@@ -244,7 +240,7 @@ def test_the_gain_brings_a_sound_to_the_wanted_level(seed: int) -> None:
 
 @pytest.mark.parametrize("mix", [0.3, 1.0])
 @pytest.mark.parametrize("name", ["guitar", "harp"])
-def test_it_does_so_through_a_body(name: str, mix: float) -> None:
+def test_it_does_so_through_a_body(name, mix):
     """The level through the body is that of its steady state: an onset takes a body some hundredths of a second."""
     curves = curves_of(Body(name=name))
     impulse = Effects(Body(mix, name=name)).impulse(RATE_HZ)
@@ -261,7 +257,7 @@ def test_it_does_so_through_a_body(name: str, mix: float) -> None:
 
 @pytest.mark.parametrize("swings", [False, True])
 @pytest.mark.parametrize(("mix", "off_db", "mean_db"), [(0.0, 1.5, 1.0), (0.8, 4.0, 2.0)])
-def test_the_peak_is_nearly_the_highest_sample(mix: float, off_db: float, mean_db: float, swings: bool) -> None:
+def test_the_peak_is_nearly_the_highest_sample(mix, off_db, mean_db, swings):
     """It is looked for in the first period alone; through a body it is an estimate."""
     curves = curves_of(Body(name="guitar")) if mix else NO_BODY
     impulse = Effects(Body(mix)).impulse(RATE_HZ) if mix else np.ones((1, 1))
@@ -278,7 +274,7 @@ def test_the_peak_is_nearly_the_highest_sample(mix: float, off_db: float, mean_d
     assert np.abs(off).max() < off_db
 
 
-def test_silence_has_a_gain_of_one_and_gains_and_peaks_have_bounds() -> None:
+def test_silence_has_a_gain_of_one_and_gains_and_peaks_have_bounds():
     omega, sigma, heard = drawn(0)
     assert loudness.gain(sound_of(omega, sigma, 0 * heard), len(omega), 1, NO_BODY, 0.0) == 1.0
     for factor, gain_db in ((1e-9, of.GAIN_RANGE_DB[1]), (1e9, of.GAIN_RANGE_DB[0])):
@@ -290,7 +286,7 @@ def test_silence_has_a_gain_of_one_and_gains_and_peaks_have_bounds() -> None:
     assert [loudness.looked_at(28, 88, number) for number in range(loudness.LOOKED_AT)] == [28, 43, 58, 73, 88]
 
 
-def test_a_body_on_one_side_is_levelled_as_its_mirror_image() -> None:
+def test_a_body_on_one_side_is_levelled_as_its_mirror_image():
     samples = np.random.default_rng(0).uniform(-1, 1, (2_000, 1)) * np.geomspace(1, 1e-3, 2_000)[:, None]
     sides = (np.hstack([samples, 0 * samples]), np.hstack([0 * samples, samples]))
     left, right = (curves_of(Body(impulse=Impulse(side, 48_000))) for side in sides)

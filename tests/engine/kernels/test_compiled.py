@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numba
 import numpy as np
-import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.cpu import CPUContext
@@ -36,7 +35,7 @@ from tests.engine.sounds import EAR, PLUCK, RATE_HZ
 READ = "read engine/kernels/numba_internals.py beside its source"
 
 
-def test_numba_is_the_one_whose_internals_were_read_and_what_stays_is_called_as_it_was() -> None:
+def test_numba_is_the_one_whose_internals_were_read_and_what_stays_is_called_as_it_was():
     installed = ".".join(numba.__version__.split(".")[:2])
     assert installed == numba_internals.VERSION, f"Numba is {numba.__version__}: {READ}, then raise VERSION"
     for kept, parameters in (
@@ -49,7 +48,7 @@ def test_numba_is_the_one_whose_internals_were_read_and_what_stays_is_called_as_
         assert list(inspect.signature(kept).parameters) == parameters, f"{kept.__qualname__}: {READ}"
 
 
-def test_a_function_is_compiled_for_its_callers_once_for_all_numbers_and_for_python_where_that_calls_it() -> None:
+def test_a_function_is_compiled_for_its_callers_once_for_all_numbers_and_for_python_where_that_calls_it():
     options = {**COMPILED, "cache": False}
 
     @njit(**options)
@@ -88,9 +87,7 @@ def printed(code: str, *arguments: str, **environment: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its_source_changed(
-    tmp_path: Path,
-) -> None:
+def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its_source_changed(tmp_path):
     """Of what is loaded only machine code was kept: it is compiled again for a caller that is compiled."""
     places = [tmp_path / name / "engine" / "package" for name in ("first", "second")]
     for place in places:
@@ -119,7 +116,7 @@ REPORT = (
 )
 
 
-def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_the_compiler() -> None:
+def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_the_compiler():
     code = (
         "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)\n"
         "from engine.models._ssm_kernel import stream; from engine.truth._splitting_kernel import advance\n"
@@ -128,7 +125,7 @@ def test_all_compiled_functions_are_kept_in_one_folder_which_is_known_without_th
     assert printed(code) == ["False", "True"]
 
 
-def test_the_users_own_folder_is_used_and_without_any_it_is_compiled_and_not_kept(tmp_path: Path) -> None:
+def test_the_users_own_folder_is_used_and_without_any_it_is_compiled_and_not_kept(tmp_path):
     code = "from engine.kernels import cache; from engine.kernels.compiled import config, tanh\n" + REPORT
     found = printed(code + "print(config.CACHE_DIR)", NUMBA_CACHE_DIR=str(tmp_path))
     assert found == [str(tmp_path), "True", "False", "None", "True", "1", "1", str(tmp_path)]
@@ -136,7 +133,7 @@ def test_the_users_own_folder_is_used_and_without_any_it_is_compiled_and_not_kep
     assert printed(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
 
 
-def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody(tmp_path: Path) -> None:
+def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody(tmp_path):
     """What a killed run left there goes at the next start."""
     killed = printed(READ_ONLY + REPORT + "import os; os._exit(0)", TMPDIR=str(tmp_path))
     assert killed[1:] == ["True", "False", "None", "True", "1", "1"]
@@ -146,12 +143,12 @@ def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_no
     assert not list(tmp_path.iterdir())
 
 
-def test_every_kind_of_voice_and_compiled_model_runs() -> None:
+def test_every_kind_of_voice_and_compiled_model_runs():
     warm.voices()
     warm.models()
 
 
-def test_what_is_published_lies_between_two_fences() -> None:
+def test_what_is_published_lies_between_two_fences():
     """x86 keeps the order of writes by itself, so that only the code can be looked at."""
     uncached = njit(**{**COMPILED, "cache": False})(publish.py_func)
     uncached(np.zeros(4, np.int64), 2, 7)
@@ -161,7 +158,7 @@ def test_what_is_published_lies_between_two_fences() -> None:
     assert steps == ["fence seq_cst", "store i64 %arg.whole", "fence seq_cst"]
 
 
-def test_what_a_device_shall_see_is_published_when_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_device_shall_see_is_published_when_it_is_there(monkeypatch):
     """The numbers that show samples, voices, places and responses to its thread change in no other way."""
     published: list[tuple[int, int]] = []  # slot and number, while nothing of it is written
     monkeypatch.setattr(memory_module, "publish", lambda slots, slot, whole: published.append((slot, whole)))

@@ -25,7 +25,7 @@ def ask(mixer: Mixer, frames: int, flags: int = 0, now_s: float = 0.0) -> Sample
     return out.reshape(frames, mixer.channels)
 
 
-def test_below_the_ceiling_every_sample_is_as_it_was_given_and_late_by_the_limiter() -> None:
+def test_below_the_ceiling_every_sample_is_as_it_was_given_and_late_by_the_limiter():
     one, other = noise(5000), noise(5000)[::-1].copy()
     mixer = mixer_of(voice_of(one), voice_of(other, 0.5), limited=True)
     expected = one.astype(np.float64) + 0.5 * other
@@ -38,7 +38,7 @@ def test_below_the_ceiling_every_sample_is_as_it_was_given_and_late_by_the_limit
 
 
 @pytest.mark.parametrize("channels", [1, 2, 4])
-def test_a_file_is_not_limited_and_channels_are_the_mean_or_the_first_two(channels: int) -> None:
+def test_a_file_is_not_limited_and_channels_are_the_mean_or_the_first_two(channels):
     samples, mixer = 10 * noise(1000), Mixer(RATE_HZ, channels, limited=False)
     mixer.add(voice_of(samples))
     found = mixer.render(1000)
@@ -48,7 +48,7 @@ def test_a_file_is_not_limited_and_channels_are_the_mean_or_the_first_two(channe
     assert mixer.output_latency_s == 0.0
 
 
-def test_the_volume_glides_and_arrives() -> None:
+def test_the_volume_glides_and_arrives():
     mixer = mixer_of(voice_of(np.full((48_000, 2), 0.5, np.float32)))
     mixer.render(640)
     mixer.set_volume(0.2)
@@ -63,7 +63,7 @@ def test_the_volume_glides_and_arrives() -> None:
 
 @pytest.mark.parametrize("rate_hz", [44_100, 192_000])
 @pytest.mark.parametrize(("side", "sounds"), [("left", (1, 0)), ("right", (0, 1)), ("both", (1, 1))])
-def test_the_tone_sounds_on_its_side_for_a_second(side: str, sounds: tuple[int, int], rate_hz: int) -> None:
+def test_the_tone_sounds_on_its_side_for_a_second(side, sounds, rate_hz):
     """Its fades last 20 ms at any rate."""
     mixer = Mixer(rate_hz, limited=False)
     mixer.sound_tone(side)
@@ -74,7 +74,7 @@ def test_the_tone_sounds_on_its_side_for_a_second(side: str, sounds: tuple[int, 
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])
-def test_what_is_no_number_is_silence(value: float) -> None:
+def test_what_is_no_number_is_silence(value):
     """A gain that is not a number gets past the voices' own guard."""
     other = noise(1000)
     mixer = mixer_of(voice_of(noise(64), value), voice_of(other), limited=True)
@@ -87,7 +87,7 @@ def test_what_is_no_number_is_silence(value: float) -> None:
     assert float(wild.record["limiter"]) <= LARGEST_LEVEL  # is soon forgotten
 
 
-def test_voices_of_one_hand_over_begin_with_one_frame_and_say_when_the_device_had_it() -> None:
+def test_voices_of_one_hand_over_begin_with_one_frame_and_say_when_the_device_had_it():
     mixer, voices = Mixer(RATE_HZ), [voice_of(noise(3000, level=0.1)) for _ in range(5)]
     for voice in voices:
         voice.set_struck(2.0)
@@ -103,7 +103,7 @@ def test_voices_of_one_hand_over_begin_with_one_frame_and_say_when_the_device_ha
     assert voices[0].seconds == 128 / RATE_HZ
 
 
-def test_an_underflow_counts_as_a_gap_where_something_sounds_and_the_latest_are_reported() -> None:
+def test_an_underflow_counts_as_a_gap_where_something_sounds_and_the_latest_are_reported():
     mixer = Mixer(RATE_HZ)
     ask(mixer, 480, UNDERFLOW)  # the very first call: nothing was missed
     ask(mixer, 480, UNDERFLOW, now_s=0.01)
@@ -122,7 +122,7 @@ def test_an_underflow_counts_as_a_gap_where_something_sounds_and_the_latest_are_
     assert mixer.new_gaps() == []
 
 
-def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over() -> None:
+def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over():
     voices = [voice_of(noise(2000, level=0.001)) for _ in range(MOST_VOICES + 3)]
     mixer = mixer_of(*voices)
     mixer.render(64)
@@ -137,7 +137,7 @@ def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over() 
     assert not again.over
 
 
-def test_ended_voices_are_forgotten_the_others_go_on_and_another_rate_is_refused() -> None:
+def test_ended_voices_are_forgotten_the_others_go_on_and_another_rate_is_refused():
     lasting = noise(20_000)
     mixer = mixer_of(voice_of(noise(640)), voice_of(lasting), voice_of(noise(64)))
     mixer.render(6400)
@@ -186,7 +186,7 @@ def gain_of(found: Samples, sound: Samples) -> Signal:
 
 
 @pytest.mark.parametrize("name", LOUD)
-def test_nothing_exceeds_the_ceiling_and_the_gain_of_both_sides_has_neither_jumps_nor_corners(name: str) -> None:
+def test_nothing_exceeds_the_ceiling_and_the_gain_of_both_sides_has_neither_jumps_nor_corners(name):
     """Its slope changes by a small part of itself from frame to frame, down to the peak and up again."""
     sound = LOUD[name]
     found = limited(sound)
@@ -201,7 +201,7 @@ def test_nothing_exceeds_the_ceiling_and_the_gain_of_both_sides_has_neither_jump
         np.testing.assert_allclose(*(found.astype(float)[loud] / sound[loud]).T, rtol=1e-5)
 
 
-def test_it_begins_no_earlier_than_it_looks_reports_what_it_did_and_the_gain_returns() -> None:
+def test_it_begins_no_earlier_than_it_looks_reports_what_it_did_and_the_gain_returns():
     begin, sound = 6400, burst(6400)
     mixer = mixer_of(voice_of(sound), limited=True)
     first = mixer.render(6000)
@@ -222,7 +222,7 @@ def test_it_begins_no_earlier_than_it_looks_reports_what_it_did_and_the_gain_ret
     np.testing.assert_array_equal(limited(sound)[-RATE_HZ // 2 :], sound[-RATE_HZ // 2 :])
 
 
-def test_a_device_is_given_what_a_file_is_in_blocks_of_any_size() -> None:
+def test_a_device_is_given_what_a_file_is_in_blocks_of_any_size():
     called, rendered = (mixer_of(voice_of(LOUD["noise"][6000:9000]), limited=True) for _ in range(2))
     sizes = [256, 1, 63, 480, *[1] * 65, 935]
     blocks = [ask(called, frames, now_s=number / 100) for number, frames in enumerate(sizes)]

@@ -159,7 +159,7 @@ KERNELS: dict[str, tuple[Any, Any, Callable[[], ArrayLike], float, float]] = {
 
 
 @pytest.mark.parametrize("name", KERNELS)
-def test_compiled_it_is_plain_python_and_the_oracle(name: str) -> None:
+def test_compiled_it_is_plain_python_and_the_oracle(name):
     function, use, oracle, rtol, atol = KERNELS[name]
     if isinstance(function, Dispatcher):
         fast, plain = function, function.py_func
@@ -172,7 +172,7 @@ def test_compiled_it_is_plain_python_and_the_oracle(name: str) -> None:
     np.testing.assert_allclose(found, np.asarray(oracle(), float), rtol=rtol, atol=atol)
 
 
-def test_a_string_that_is_stopped_has_its_pitch() -> None:
+def test_a_string_that_is_stopped_has_its_pitch():
     """It is slackened by a fifth and stopped at 300 Hz, and has its modes below 20 kHz."""
     out = np.zeros(8)
     assert strings.stop(np.array(STEEL.row), np.ones(8), 0.9, 300.0, np.empty(8), out)
@@ -190,7 +190,7 @@ def touched(node: int, modes: int, pairs: int = 0) -> Signal:
 
 
 @pytest.mark.parametrize("node", [2, 3, 5])
-def test_a_touch_adds_the_rates_of_the_modes_that_it_couples(node: int) -> None:
+def test_a_touch_adds_the_rates_of_the_modes_that_it_couples(node):
     """q'' + 2R/(ρAℓ) φ φᵀ q' + ω² q = 0, with φ the modes at the finger: all its eigenvalues, of the lowest modes."""
     modes, mass = 80, FLEXIBLE.mass_per_length_kg_m
     omega = np.array([FLEXIBLE.undamped_frequency(mode) for mode in range(1, modes + 1)])
@@ -209,7 +209,7 @@ def test_a_touch_adds_the_rates_of_the_modes_that_it_couples(node: int) -> None:
 
 
 @pytest.mark.parametrize("string", [StringParameters(), STEEL, replace(STEEL, youngs_modulus_pa=0.0)])
-def test_a_resonator_and_a_string_are_those_of_the_kernels(string: StringParameters) -> None:
+def test_a_resonator_and_a_string_are_those_of_the_kernels(string):
     resonator, found = resonator_of(string, 60), np.empty(4 * 60)
     strings.rows(string.row, 60, 0, 1.0, (0.0, 0.0), (0.0, 0.0, 0.0), found)
     own = np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch])
@@ -222,7 +222,7 @@ def test_a_resonator_and_a_string_are_those_of_the_kernels(string: StringParamet
 
 
 @pytest.mark.parametrize(("place", "value"), [(of.LENGTH, 1e-3), (of.TENSION, 0.0), (of.D1, -1.0), (of.AREA, np.nan)])
-def test_what_parameters_refuse_is_impossible_and_what_does_not_swing_is_overdamped(place: int, value: float) -> None:
+def test_what_parameters_refuse_is_impossible_and_what_does_not_swing_is_overdamped(place, value):
     changed = np.array(STEEL.row)
     changed[[of.MOMENT, of.MODULUS, of.D1, of.D3]] = 0.0
     assert strings.possible(changed)
@@ -246,7 +246,7 @@ def rung(force: Signal, omega: Signal, sigma: Signal, lost: Signal, played: bool
     return out
 
 
-def test_a_partial_of_strings_that_ring_with_others_is_driven_as_by_dop853() -> None:
+def test_a_partial_of_strings_that_ring_with_others_is_driven_as_by_dop853():
     """q̈ + 2σ q̇ + ω² q = -2 σ_b Ḟ: what the bridge's motion drives, of a note that decays a little beside it."""
     omega, sigma, lost = 2 * np.pi * 220.0, 2.0, 0.5
     driver, time_s = complex(-3.0, 2 * np.pi * 220.4), np.arange(24_000) / RATE_HZ
@@ -261,7 +261,7 @@ def test_a_partial_of_strings_that_ring_with_others_is_driven_as_by_dop853() -> 
     assert np.square(found - wanted).sum() < 1e-3 * np.square(wanted).sum()
 
 
-def test_nothing_rings_up_and_a_played_string_is_stopped() -> None:
+def test_nothing_rings_up_and_a_played_string_is_stopped():
     """Not where the input is as bad as it can be: a tone of full scale at the resonance of all, for a long time."""
     draw = np.random.default_rng(1)
     sigma = draw.uniform(0.5, 4, 40)

@@ -104,14 +104,14 @@ class ModelLaws:
         with torch.no_grad():
             return Motion(model, released(), model(released(), sum(cls.blocks)))
 
-    def test_it_has_as_many_parameters_as_are_stated_and_can_be_built_without_memory(self) -> None:
+    def test_it_has_as_many_parameters_as_are_stated_and_can_be_built_without_memory(self):
         with torch.device("meta"):
             model = build_model(self.name)
         assert count_parameters(model) == self.count
         assert all(tensor.is_meta for tensor in model.parameters())
 
     @torch.no_grad()
-    def test_it_is_the_reference_vector_on_both_routes(self) -> None:
+    def test_it_is_the_reference_vector_on_both_routes(self):
         if self.reference is None:
             pytest.skip("its source has none")
         arrays = {name: torch.from_numpy(array) for name, array in np.load(REFERENCES / f"{self.name}.npz").items()}
@@ -127,9 +127,7 @@ class ModelLaws:
         torch.testing.assert_close(precise.to(expected), expected, rtol=0, atol=self.reference)
 
     @torch.no_grad()
-    def test_any_splitting_into_blocks_is_the_same_motion_also_where_a_state_is_gone_on_from_twice(
-        self, motion: Motion
-    ) -> None:
+    def test_any_splitting_into_blocks_is_the_same_motion_also_where_a_state_is_gone_on_from_twice(self, motion):
         state, parts = motion.model.encode(motion.released), []
         for steps in self.blocks:
             motion.model.advance(state, 30)
@@ -138,12 +136,12 @@ class ModelLaws:
         assert relative(torch.cat(parts, 1), motion.whole) < self.near
 
     @torch.no_grad()
-    def test_a_frame_does_not_depend_on_those_after_it_nor_on_other_strings(self, motion: Motion) -> None:
+    def test_a_frame_does_not_depend_on_those_after_it_nor_on_other_strings(self, motion):
         for row, released in enumerate(motion.released):
             assert relative(motion.model(released[None], 50), motion.whole[row : row + 1, :50]) < self.near
 
     @torch.no_grad()
-    def test_no_string_moves_nowhere(self, motion: Motion) -> None:
+    def test_no_string_moves_nowhere(self, motion):
         """A batch of none: empty arrays, by every way."""
         model, none = motion.model, motion.released[:0]
         _, state = model.advance(model.encode(none), 40)
@@ -153,7 +151,7 @@ class ModelLaws:
             assert model(none, 40).shape == (0, 40, POINTS)
 
     @torch.no_grad()
-    def test_listening_is_the_grid_at_that_point(self, motion: Motion) -> None:
+    def test_listening_is_the_grid_at_that_point(self, motion):
         weights, total = listening_weights([0.37, 0.123], POINTS), sum(self.blocks)
         state, parts = motion.model.encode(motion.released), []
         for steps in (total // 3, total - total // 3):
@@ -162,7 +160,7 @@ class ModelLaws:
         assert relative(torch.cat(parts, 1), motion.whole @ weights.to(motion.whole)) < 2 * self.near
 
     @torch.no_grad()
-    def test_some_frames_are_those_of_all(self, motion: Motion) -> None:
+    def test_some_frames_are_those_of_all(self, motion):
         """From any state, of any of the next frames, none among them, and the state after them continues the same."""
         model = motion.model
         if not model.any_frame:
@@ -175,7 +173,7 @@ class ModelLaws:
             torch.testing.assert_close(some, expected, rtol=0, atol=self.near * float(motion.whole.abs().max()))
             done += steps
 
-    def test_training_takes_the_same_path_and_a_gradient_reaches_every_weight(self, motion: Motion) -> None:
+    def test_training_takes_the_same_path_and_a_gradient_reaches_every_weight(self, motion):
         model = motion.model
         model.zero_grad()
         found = model(motion.released, 300)
@@ -187,7 +185,7 @@ class ModelLaws:
         assert all(gradients[name].isfinite().all() for name in gradients.keys() - unreached)
 
     @torch.no_grad()
-    def test_phases_stay_exact_after_a_million_steps(self) -> None:
+    def test_phases_stay_exact_after_a_million_steps(self):
         """Latents of eigenvalues that do not decay, against extended precision."""
         model = self.stirred()
         if not isinstance(model, DiagonalModel):
@@ -207,7 +205,7 @@ class ModelLaws:
                 assert float((found[0] - expected).abs().max()) < near
 
     @torch.no_grad()
-    def test_eigenvalues_lie_inside_the_unit_circle(self) -> None:
+    def test_eigenvalues_lie_inside_the_unit_circle(self):
         """As the model starts; and whatever the weights, where it promises so."""
         model = self.made()
         assert all(float(log.real.max()) <= 0 for log in model.log_eigenvalues())
@@ -222,14 +220,14 @@ class ModelLaws:
             radii = model.latents(model.encode(released()).origin, torch.tensor([0, 1000, 10_000_000])).abs()
             assert bool((radii.diff(dim=1) <= 0).all())
 
-    def test_the_seed_decides_all(self) -> None:
+    def test_the_seed_decides_all(self):
         for how in model_class(self.name).initialisations:
             first, again, other = (self.made(how, seed).state_dict() for seed in (1, 1, 2))
             assert all(torch.equal(first[name], again[name]) for name in first)
             assert self.drawn == any(not torch.equal(first[name], other[name]) for name in first)
 
     @torch.no_grad()
-    def test_a_start_that_knows_the_string_at_rest_moves_as_it(self) -> None:
+    def test_a_start_that_knows_the_string_at_rest_moves_as_it(self):
         amplitudes = 0.3 * torch.randn(2, MODES, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
         state, times_s = ModalState.at_rest(amplitudes), torch.arange(401).double() / LINEAR.rate_hz
         truth = to_grid(solve_linear(LINEAR.resonator, state, times_s), POINTS)
@@ -237,13 +235,13 @@ class ModelLaws:
             found = self.made(how, physics=LINEAR).double()(truth[:, 0], 400)
             assert float((found - truth[:, 1:]).norm() / truth[:, 1:].norm()) < error, how
 
-    def test_a_string_without_losses_can_be_started_from(self) -> None:
+    def test_a_string_without_losses_can_be_started_from(self):
         string = StringParameters(damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
         physics = Physics(resonator_of(string, MODES, grid_points=POINTS), 16_000, SCALE_M)
         for how in model_class(self.name).initialisations:
             assert all(part.isfinite().all() for part in self.made(how, physics=physics).state_dict().values())
 
-    def test_impossible_sizes_and_starts_are_named(self) -> None:
+    def test_impossible_sizes_and_starts_are_named(self):
         kind = MODELS[self.name][1]
         for field in dataclasses.fields(kind):
             if isinstance(field.default, tuple | int | float) and not isinstance(field.default, bool):
@@ -256,7 +254,7 @@ class ModelLaws:
             with pytest.raises(ValueError, match=words):
                 self.made(next(iter(self.linear)), **sizes)
 
-    def test_a_preset_of_it_renders_what_the_model_does(self, preset_file: Path, tmp_path: Path) -> None:
+    def test_a_preset_of_it_renders_what_the_model_does(self, preset_file, tmp_path):
         model, path = self.stirred(), tmp_path / f"{self.name}.safetensors"
         info = replace(
             read_info(preset_file),

@@ -20,7 +20,7 @@ from tests.engine.models.laws import subclasses
 from tests.engine.sounds import relative
 
 
-def test_every_model_has_its_laws_tested() -> None:
+def test_every_model_has_its_laws_tested():
     for path in Path(__file__).parent.glob("test_*.py"):
         importlib.import_module(f"tests.engine.models.{path.stem}")
     assert {kind.name for kind in subclasses() if hasattr(kind, "name")} == MODELS.keys()
@@ -29,9 +29,7 @@ def test_every_model_has_its_laws_tested() -> None:
 @pytest.mark.parametrize("shape", [(32, 100), (3200,), (2053,), (4, 8)], ids=["images", "parts", "a prime", "few"])
 @pytest.mark.parametrize("has_bias", [True, False])
 @pytest.mark.parametrize("parted", [True, False])
-def test_a_product_in_parts_is_torchs_with_its_gradients(
-    shape: tuple[int, ...], has_bias: bool, parted: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_product_in_parts_is_torchs_with_its_gradients(shape, has_bias, parted, monkeypatch):
     monkeypatch.setattr("engine.models._dense.PARTED_ON", ("cpu",) if parted else ())
     generator = torch.Generator().manual_seed(0)
     sizes = (*shape, 101), (64, 101), *([(64,)] if has_bias else [])
@@ -77,7 +75,7 @@ def error(name: str, sizes: dict[str, Any], how: str, steps: int, stiffening: fl
     return relative(found, drum.to_grid(SplittingSolver(drum, 8_000).solve(ModalState.at_rest(q), steps)[:, 1:]))
 
 
-def test_models_start_as_a_linear_membrane_and_averaging_follows_its_stiffening() -> None:
+def test_models_start_as_a_linear_membrane_and_averaging_follows_its_stiffening():
     for name, sizes in (("dmd", {"rank": 18}), ("lru", {"state_size": 16, "layers": 1})):
         assert error(name, sizes, "physics", 800) < 0.05  # a release from rest, to about σ/ω
     assert error("koopman_integrated", {"state_size": 9}, "averaging", 800) < 0.05

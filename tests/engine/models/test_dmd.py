@@ -57,7 +57,7 @@ def assert_same_eigenvalues(model: DMD, expected: np.ndarray, tolerance: float) 
 @pytest.mark.parametrize(
     ("lags", "rank", "tension_modulated"), [(1, 10, True), (2, 50, False), (2, 30, True), (3, 40, True)]
 )
-def test_it_is_pydmds(lags: int, rank: int, tension_modulated: bool) -> None:
+def test_it_is_pydmds(lags, rank, tension_modulated):
     """PyDMD takes one sequence, or pairs of snapshots: ours of many trajectories are the pairs within each."""
     data = trajectories(tension_modulated=tension_modulated)
     theirs = pydmd.HankelDMD(svd_rank=rank, d=lags, exact=True).fit(data[0].numpy().T)
@@ -74,7 +74,7 @@ def test_it_is_pydmds(lags: int, rank: int, tension_modulated: bool) -> None:
 
 
 @torch.no_grad()
-def test_it_finds_the_linear_string_and_follows_others_of_it() -> None:
+def test_it_finds_the_linear_string_and_follows_others_of_it():
     """Table 3 b: a relative MSE of 0.0000, on strings that were not fitted."""
     half = np.exp(resonator_of(STRING, MODES).eigenvalues() / RATE_HZ)
     assert_same_eigenvalues(fitted(), np.concatenate([half, half.conj()]), 1e-7)
@@ -83,7 +83,7 @@ def test_it_finds_the_linear_string_and_follows_others_of_it() -> None:
 
 
 @torch.no_grad()
-def test_a_growing_mode_is_found_and_not_clipped() -> None:
+def test_a_growing_mode_is_found_and_not_clipped():
     growing = trajectories(200) * 1.1 ** torch.arange(201, dtype=torch.float64)[:, None]
     model = DMD.fit(growing, DMDConfiguration())
     assert float(model.log_eigenvalues()[0].real.max()) > 0 > float(fitted().log_eigenvalues()[0].real.max())
@@ -91,7 +91,7 @@ def test_a_growing_mode_is_found_and_not_clipped() -> None:
 
 
 @torch.no_grad()
-def test_modes_that_the_data_do_not_hold_vanish() -> None:
+def test_modes_that_the_data_do_not_hold_vanish():
     """A rank of 50 on two modes: rounding is not fitted, and silence gives silence."""
     two_modes = to_grid(to_modes(trajectories()[:1], 2), 101).float()
     model = DMD.fit(two_modes, DMDConfiguration())
@@ -109,7 +109,7 @@ def test_modes_that_the_data_do_not_hold_vanish() -> None:
         (torch.full((1, 9, 101), torch.nan), "not finite"),
     ],
 )
-def test_impossible_data_and_ranks_are_named(data: torch.Tensor, words: str) -> None:
+def test_impossible_data_and_ranks_are_named(data, words):
     with pytest.raises(ValueError, match=words):
         DMD.fit(data, DMDConfiguration())
     with pytest.raises(ValueError, match="rank must be at most lags times grid_points, 20, not 50"):

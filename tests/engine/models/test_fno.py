@@ -35,7 +35,7 @@ class FourierLaws(ModelLaws):
 
     @pytest.mark.parametrize("points", [1, 2, 3, 10, 101])
     @torch.no_grad()
-    def test_the_kernel_agrees_with_the_rollout(self, points: int) -> None:
+    def test_the_kernel_agrees_with_the_rollout(self, points):
         model, start = self.stirred(grid_points=points, width=8), drawn(2, points)
         fast, state = model.advance(model.encode(start), 50)
         exact, last = model.double().advance(FieldState(model.encode(start.double()).hidden), 50)
@@ -45,9 +45,7 @@ class FourierLaws(ModelLaws):
     @pytest.mark.parametrize(
         ("points", "kept_bytes"), [(1, 10**9), (2, 50_000), (3, 10**9), (10, 50_000), (101, 50_000)]
     )
-    def test_what_learns_agrees_with_the_definition(
-        self, points: int, kept_bytes: int, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_what_learns_agrees_with_the_definition(self, points, kept_bytes, monkeypatch):
         """Frames, last state and every gradient; also where steps are computed again for want of memory."""
         monkeypatch.setattr("engine.models.fno.KEPT_BYTES", kept_bytes)
         model, found = self.stirred(grid_points=points).double(), []
@@ -72,7 +70,7 @@ class FourierLaws(ModelLaws):
         for expected, fast in zip(*found, strict=True):
             torch.testing.assert_close(fast, expected, rtol=1e-9, atol=1e-12)
 
-    def test_its_papers_start_is_uniform_and_positive(self) -> None:
+    def test_its_papers_start_is_uniform_and_positive(self):
         for module in self.made().modules():
             for name, tensor in module.state_dict().items() if isinstance(module, FourierConvolution) else ():
                 largest = 1 / 36 if name == "weight" else 1 / 6
@@ -92,7 +90,7 @@ class TestFGRU(FourierLaws):
         return (1 - z) * hidden + z * convolved(model.h_layer, r * hidden).tanh()
 
     @torch.no_grad()
-    def test_no_weights_make_it_grow(self) -> None:
+    def test_no_weights_make_it_grow(self):
         """Each step is a mean of the field and of a tanh."""
         model = self.stirred(width=2)
         for parameter in model.parameters():

@@ -15,7 +15,7 @@ from engine.models.integrated_phase import GAIN_LIMIT, IntegratedPhase
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
-from tests.engine.models.laws import PHYSICS, POINTS, ModelLaws, Motion, relative, released
+from tests.engine.models.laws import PHYSICS, POINTS, ModelLaws, relative, released
 from tests.engine.tensors import listening_weights, to_grid, to_modes
 from training.data.draws import draw_noise
 
@@ -46,7 +46,7 @@ class TestIntegratedPhase(ModelLaws):
 
     @torch.no_grad()
     @pytest.mark.parametrize("sizes", variants, ids=str)
-    def test_it_is_a_plain_quadrature(self, sizes: dict[str, Any]) -> None:
+    def test_it_is_a_plain_quadrature(self, sizes):
         """The definition, with the network's integral by the trapezoid rule at every hundredth of a sample."""
         model = self.stirred(**sizes | {"node_spacing": 4}).double()
         c, start = model.configuration, released(1).double()
@@ -78,7 +78,7 @@ class TestIntegratedPhase(ModelLaws):
         assert relative(model(start, 60)[0], model.decode(expected)) < 1e-6
 
     @torch.no_grad()
-    def test_its_phases_stay_exact_after_a_million_steps(self) -> None:
+    def test_its_phases_stay_exact_after_a_million_steps(self):
         """Without coupling, a render there and random access against a phase reduced in two parts."""
         model = self.made("physics")
         model.nu_log.fill_(math.log(1e-7))
@@ -93,7 +93,7 @@ class TestIntegratedPhase(ModelLaws):
             then = type(state)(state.origin, 1_000_000, state.integral)
             assert relative(model.advance(then, 300, readout)[0][0], exact) < 1e-5
 
-    def test_random_access_and_rendering_have_the_same_gradients(self, motion: Motion) -> None:
+    def test_random_access_and_rendering_have_the_same_gradients(self, motion):
         """Finite ones, also for a latent that is exactly zero."""
         model, frames = copy.deepcopy(motion.model).double(), torch.tensor([3, 50, 200])
         start = released(1).double()
@@ -113,7 +113,7 @@ class TestIntegratedPhase(ModelLaws):
                 assert relative(gradients[1][name], gradient) < 1e-3, name
 
     @torch.no_grad()
-    def test_no_weights_let_it_grow(self) -> None:
+    def test_no_weights_let_it_grow(self):
         """|z(t)| ≤ |z(0)| e^{b - σt}; a render keeps to it within 8/27 of b between its segments."""
         for scale in (1.0, 30.0, 1e3):
             model = self.made("random", grid_points=101)
@@ -144,7 +144,7 @@ def averaged(how: str = "averaging", rate_hz: int = 4_000, adiabatic: bool = Fal
 
 @torch.no_grad()
 @pytest.mark.parametrize("high", [3, 8])
-def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period(high: int) -> None:
+def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period(high):
     """The error of averaging alone is of first order in ΔT/T₀, with modulation of second."""
     errors: dict[bool, list[float]] = {False: [], True: []}
     for strength in (1.0, 0.5):
@@ -164,7 +164,7 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
 
 
 @torch.no_grad()
-def test_the_action_keeps_the_phase_long_after_the_start() -> None:
+def test_the_action_keeps_the_phase_long_after_the_start():
     """Energies that decay from the first amplitudes, not from the actions, mistake the frequency for good."""
     noise, rate_hz = draw_noise(2, 101, torch.Generator().manual_seed(0)), 4_000
     amplitudes = to_modes(torch.from_numpy(noise), 10)

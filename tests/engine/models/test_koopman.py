@@ -26,7 +26,7 @@ class TestKoopman(ModelLaws):
     }
 
     @torch.no_grad()
-    def test_its_mixing_layer_is_linear_behind_the_encoder(self) -> None:
+    def test_its_mixing_layer_is_linear_behind_the_encoder(self):
         mixed, plain = (self.made(mixing_layer=mixing).double() for mixing in (True, False))
         weights = mixed.state_dict()
         weight, bias = (weights.pop(f"encoder.3.{name}") for name in ("weight", "bias"))
@@ -35,7 +35,7 @@ class TestKoopman(ModelLaws):
         plain.load_state_dict(weights)
         assert relative(mixed(released().double(), 200), plain(released().double(), 200)) < 1e-12
 
-    def test_the_starts_lie_where_they_should(self) -> None:
+    def test_the_starts_lie_where_they_should(self):
         radius = torch.exp(-self.made().nu_log.detach().exp())
         assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
         physical, linear = self.made("physics", state_size=32), PHYSICS.log_eigenvalues

@@ -39,7 +39,7 @@ class TestKoopmanTension(ModelLaws):
 
     @pytest.mark.parametrize("seed", range(3))
     @torch.no_grad()
-    def test_any_weights_stay_bounded_and_fall_silent(self, seed: int) -> None:
+    def test_any_weights_stay_bounded_and_fall_silent(self, seed):
         model, generator = self.made("series"), torch.Generator().manual_seed(seed)
         for curve in model.parameters():
             curve.copy_(10.0 ** torch.randint(-2, 30, (), generator=generator) * torch.randn(4, generator=generator))
@@ -85,7 +85,7 @@ def error(model: KoopmanTension, string: StringParameters, pulled_m: Tensor, rat
 
 
 @pytest.mark.parametrize(("string", "modes"), [(NYLON, 57), (STEEL, 40)], ids=["nylon", "steel"])
-def test_what_backward_error_analysis_knows_is_worth_two_orders(string: StringParameters, modes: int) -> None:
+def test_what_backward_error_analysis_knows_is_worth_two_orders(string, modes):
     kicks, series = (
         error(made(string, modes, how), string, pluck_m(string, modes, 0.3), 48_000, 2_400)
         for how in ("kicks", "series")
@@ -95,7 +95,7 @@ def test_what_backward_error_analysis_knows_is_worth_two_orders(string: StringPa
 
 
 @torch.no_grad()
-def test_another_string_takes_what_was_learned_and_latents_to_spare_rest() -> None:
+def test_another_string_takes_what_was_learned_and_latents_to_spare_rest():
     other = made(NYLON, 25).for_resonator(Physics(resonator_of(STEEL, 40), 48_000, 1e-3))
     displacement = (pluck_m(STEEL, 40, 0.1) / 1e-3).float()
     assert torch.equal(other(displacement, 100), made(STEEL, 40)(displacement, 100))
@@ -105,7 +105,7 @@ def test_another_string_takes_what_was_learned_and_latents_to_spare_rest() -> No
 
 
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 44_100, 96_000])
-def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
+def test_any_rate_is_the_truth_at_that_rate(rate_hz):
     """Phases between nodes stay where the curves were learned."""
     model = made(NYLON, 25).for_resonator(Physics(resonator_of(NYLON, 25), rate_hz, 1e-3))
     assert error(model, NYLON, pluck_m(NYLON, 25, 0.2), rate_hz, rate_hz // 20) < 1e-8
@@ -116,7 +116,7 @@ def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
     assert float(phases[-1]) <= model.configuration.highest_phase + 1e-12
 
 
-def test_a_hard_pluck_with_its_stretch_in_high_modes_takes_more_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hard_pluck_with_its_stretch_in_high_modes_takes_more_nodes(monkeypatch):
     model = made(NYLON, 25, rate_hz=16_000)
     nodes = error(model, NYLON, modes_alike_m(0.5), 16_000, 1_600)
     assert nodes < 1e-4
@@ -125,7 +125,7 @@ def test_a_hard_pluck_with_its_stretch_in_high_modes_takes_more_nodes(monkeypatc
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
+def test_soft_and_hard_plucks_go_together(compiled):
     model = made(NYLON, 25, rate_hz=16_000)
     plucks = torch.cat([modes_alike_m(0.5), pluck_m(NYLON, 25, 0.1), modes_alike_m(0.2), pluck_m(NYLON, 25, 0.01)])
     start = (plucks / 1e-3).float()
@@ -149,9 +149,7 @@ def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
     ids=["low", "low and narrow", "nylon"],
 )
 @torch.no_grad()
-def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
-    string: StringParameters, modes: int, pluck: Pluck, frames: int, allowed: float
-) -> None:
+def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(string, modes, pluck, frames, allowed):
     """Relative MSE with a tension rise of 50 %; speeds as they are instead of w: 1e-7 to 1e-4 in a second."""
     model, steps = made(string, modes), 16_000
     solver = SplittingSolver(resonator_of(string, modes), 48_000)
@@ -165,7 +163,7 @@ def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
 
 
 @torch.no_grad()
-def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() -> None:
+def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed():
     """It swings as far as one that was pulled so: what bounds it is the energy, not the displacement it begins at."""
     model, resonator = made(NYLON, 25, rate_hz=16_000), resonator_of(NYLON, 25)
     amplitudes = to_modes(modes_alike_m(0.5), resonator.modes)
@@ -180,7 +178,7 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
 
 @torch.no_grad()
 @pytest.mark.parametrize("kind", [torch.float64, torch.float32])
-def test_the_precision_is_the_models_own(kind: torch.dtype, request: pytest.FixtureRequest) -> None:
+def test_the_precision_is_the_models_own(kind, request):
     """Not that of tensors that are made without one, which a program may set for itself."""
     displacement, model = pluck_m(NYLON, 25, 0.4) / 1e-3, made(NYLON, 25)
     request.addfinalizer(lambda: torch.set_default_dtype(torch.float32))

@@ -24,16 +24,14 @@ class StateSpaceLaws(ModelLaws):
                 if weight.is_floating_point():
                     weight.uniform_(0.5, 1.5, generator=generator)
 
-    def test_training_normalises_over_batch_and_time(self) -> None:
+    def test_training_normalises_over_batch_and_time(self):
         model = self.made().train()
         model(released(), 40).square().mean().backward()
         assert all(block.normalization.running_mean.any() for block in model.layers)
         assert all(tensor.grad is None or tensor.grad.isfinite().all() for tensor in model.parameters())
 
     @torch.no_grad()
-    def test_what_is_folded_for_rendering_follows_the_weights_and_is_kept_in_a_motion(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_what_is_folded_for_rendering_follows_the_weights_and_is_kept_in_a_motion(self, monkeypatch):
         """It is folded once, as the rendering begins, and nothing of it stays in the model."""
         model, folds, fold = self.stirred(), [], GatedBlock.fold
         monkeypatch.setattr(GatedBlock, "fold", lambda block: folds.append(block) or fold(block))
@@ -59,7 +57,7 @@ class TestLRU(StateSpaceLaws):
     reference_sizes: ClassVar = {"grid_points": 11, "state_size": 8, "layers": 2}
 
     @torch.no_grad()
-    def test_its_papers_start_lies_in_the_ring_with_its_gamma(self) -> None:
+    def test_its_papers_start_lies_in_the_ring_with_its_gamma(self):
         for block in self.made().layers:
             radius = torch.exp(-block.seq.nu_log.exp())
             assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
@@ -75,7 +73,7 @@ class TestS5(StateSpaceLaws):
     stable = False
 
     @torch.no_grad()
-    def test_its_papers_start_is_hippo_in_blocks_with_steps_in_range(self) -> None:
+    def test_its_papers_start_is_hippo_in_blocks_with_steps_in_range(self):
         for block in self.made().layers:
             seq = block.seq
             torch.testing.assert_close(seq.Lambda_im, hippo_normal(8)[0].imag[:4].repeat(4).float())
@@ -89,7 +87,7 @@ class TestS5(StateSpaceLaws):
             assert float(layer.log_step.exp().min()) == pytest.approx(smallest, rel=0.5)
 
     @torch.no_grad()
-    def test_an_eigenvalue_outside_is_reported_with_its_pair_and_its_state_is_whole_blocks(self) -> None:
+    def test_an_eigenvalue_outside_is_reported_with_its_pair_and_its_state_is_whole_blocks(self):
         model = self.made()
         model.layers[1].seq.Lambda_re[2] = 0.3
         assert int((torch.cat(model.log_eigenvalues()).real > 0).sum()) == 2
@@ -97,7 +95,7 @@ class TestS5(StateSpaceLaws):
             self.made(state_size=100, hippo_blocks=16)
 
 
-def test_hippo_is_normal_up_to_its_rank_one_part() -> None:
+def test_hippo_is_normal_up_to_its_rank_one_part():
     """A_nk = -√(2n+1)√(2k+1) below the diagonal, -(n+1) on it; plus p pᵀ with p_n = √(n+½) it is normal."""
     n = torch.arange(8, dtype=torch.float64)
     root = torch.sqrt(2 * n + 1)
@@ -120,13 +118,13 @@ def random_recurrence(steps: int) -> tuple[Tensor, Tensor, Tensor]:
 
 
 @pytest.mark.parametrize("steps", [1, 34])
-def test_the_adjoint_is_the_derivative(steps: int) -> None:
+def test_the_adjoint_is_the_derivative(steps):
     inputs = tuple(tensor[..., :1].clone().requires_grad_() for tensor in random_recurrence(steps))
     assert torch.autograd.gradcheck(recur, inputs)
     assert torch.autograd.gradcheck(lambda a, x: evolve(a, x, steps, torch.complex128), inputs[1:])
 
 
-def test_phases_of_both_stay_exact_after_a_million_steps() -> None:
+def test_phases_of_both_stay_exact_after_a_million_steps():
     log_eigenvalues = torch.tensor([-1e-7 + 0.3j, -1e-8 + 3.1j], dtype=torch.complex128)
     state, done = torch.ones(1, 2, dtype=torch.complex128), 0
     for steps in (1000, 1, 997, 2) * 500:

@@ -132,7 +132,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_wrong_or_hostile_file_is_refused_in_one_line_that_names_it(preset_file: Path, name: str) -> None:
+def test_a_wrong_or_hostile_file_is_refused_in_one_line_that_names_it(preset_file, name):
     fault = FAULTS[name]
     if fault.many:
         shutil.copy(find_preset("studio_any_string"), preset_file)
@@ -145,7 +145,7 @@ def test_a_wrong_or_hostile_file_is_refused_in_one_line_that_names_it(preset_fil
         assert str(preset_file) in reported and len(reported) <= 500 and reported.isprintable()
 
 
-def test_round_trip_bit_for_bit_and_a_model_that_is_not_finite_is_not_saved(preset_file: Path) -> None:
+def test_round_trip_bit_for_bit_and_a_model_that_is_not_finite_is_not_saved(preset_file):
     preset, again = load_preset(preset_file), preset_file.with_name("again")
     before = preset_file.read_bytes()
     assert preset.info == read_info(preset_file)
@@ -161,7 +161,7 @@ def test_round_trip_bit_for_bit_and_a_model_that_is_not_finite_is_not_saved(pres
     assert {path.name for path in preset_file.parent.iterdir()} == {preset_file.name, "again"}
 
 
-def test_other_files_are_refused_and_names_are_found(tmp_path: Path, preset_file: Path) -> None:
+def test_other_files_are_refused_and_names_are_found(tmp_path, preset_file):
     save_file({"x": torch.zeros(3)}, tmp_path / "foreign")
     torch.save({"x": torch.zeros(3)}, tmp_path / "pickled")
     with (tmp_path / "huge").open("wb") as file:
@@ -180,7 +180,7 @@ def test_other_files_are_refused_and_names_are_found(tmp_path: Path, preset_file
         find_preset("nonsense")
 
 
-def test_shipped_presets_are_better_than_the_paper() -> None:
+def test_shipped_presets_are_better_than_the_paper():
     """Table 2a of the paper, Koopman_var, Gaussian, 4000 steps: relative MAE 0.0977 at 4 kHz, 0.0888 at 16 kHz."""
     wanted = ("koopman_var", "gaussian", 4000, True)
     infos = [read_info(path) for path in preset_files()]
@@ -189,7 +189,7 @@ def test_shipped_presets_are_better_than_the_paper() -> None:
     assert found[4_000] <= 0.0977 and found[16_000] <= 0.0888
 
 
-def test_loading_presets_does_not_load_torchs_compiler() -> None:
+def test_loading_presets_does_not_load_torchs_compiler():
     """It takes a second and more, and a start of the app would wait for it; an operation on a meta tensor may."""
     script = (
         "import sys; from engine.presets import load_preset, preset_files, read_info\n"
@@ -201,7 +201,7 @@ def test_loading_presets_does_not_load_torchs_compiler() -> None:
 
 
 @pytest.mark.parametrize("name", ["studio_any_string", "studio_any_harp_c6", "studio_any_nylon_e4"])
-def test_a_model_of_many_strings_was_trained_in_rises_of_tension(name: str) -> None:
+def test_a_model_of_many_strings_was_trained_in_rises_of_tension(name):
     """No peak: a loose string was pulled further than a tense one. Widths are those of each shape."""
     info, pluck = read_info(find_preset(name)), Pluck(0.3, 4.0, "raised_cosine", 0.2)
     assert (info.trained_range.peak_m, info.trained_range.tension_rise) == (None, 0.5)
@@ -238,9 +238,7 @@ TENSE = {"tension_rise": 0.01}
         ("piano_c2", {}, Pluck(0.3, 1.0, "triangular"), ("decay time near 3 kHz",)),
     ],
 )
-def test_plucks_and_strings_outside_training_are_reported(
-    small_preset: Path, name: str, changed: dict[str, Any], pluck: Pluck, words: tuple[str, ...]
-) -> None:
+def test_plucks_and_strings_outside_training_are_reported(small_preset, name, changed, pluck, words):
     info = read_info(small_preset if name == "small" else find_preset(f"studio_any_{name}"))
     initial = "pluck" if changed is ANY_SHAPE else info.initial
     info = replace(info, initial=initial, trained_range=replace(info.trained_range, **changed))

@@ -34,7 +34,7 @@ MOVES_M = 1e-9  # 140 dB below
 
 
 @pytest.mark.parametrize("path", preset_files(), ids=lambda path: path.stem)
-def test_a_shipped_preset_sounds_as_it_did_when_it_was_shipped_and_falls_silent(path: Path) -> None:
+def test_a_shipped_preset_sounds_as_it_did_when_it_was_shipped_and_falls_silent(path):
     """Where one is added or trained again: add what the message shows to shipped.json."""
     digest, preset = preset_digest(path), shipped(path.stem)
     source, info = ModelSource(preset), preset.info
@@ -95,22 +95,20 @@ def ranged(initial: str, half_width: Any, width: Any, widths: Any) -> tuple[dict
         ranged("pluck", [0.04, 0.15], [0.04, 0.3], {"gaussian": [0.04, 0.15], "raised_cosine": [0.08, 0.3]}),
     ],
 )
-def test_an_older_version_becomes_the_present_one_without_change_of_its_own(
-    old: dict[str, Any], new: dict[str, Any]
-) -> None:
+def test_an_older_version_becomes_the_present_one_without_change_of_its_own(old, new):
     kept = copy.deepcopy(old)
     assert migrated(old) == {**new, "format_version": FORMAT_VERSION}
     assert old == kept
 
 
 @pytest.mark.parametrize("wrong", [None, 5, "wide", [1], {"half_width": "wide"}, {"half_width": [1]}, {}])
-def test_what_is_no_range_is_left_to_the_reader(wrong: Any) -> None:
+def test_what_is_no_range_is_left_to_the_reader(wrong):
     for data in ({"trained_range": wrong}, {"trained_range": {}, "family": wrong}):
         assert migrated({"format_version": 4, **data})["format_version"] == FORMAT_VERSION
 
 
 @pytest.mark.parametrize("version", [None, 0, -1, "1", True, 1.0, FORMAT_VERSION + 1])
-def test_other_versions_are_refused(version: Any) -> None:
+def test_other_versions_are_refused(version):
     remedy = "update the program" if version == FORMAT_VERSION + 1 else "get the preset again"
     with pytest.raises(UnknownVersion, match=remedy):
         migrated({"format_version": version})
@@ -118,7 +116,7 @@ def test_other_versions_are_refused(version: Any) -> None:
         migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
 
 
-def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset: Path, preset_file: Path) -> None:
+def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset, preset_file):
     def age(facts: dict[str, Any]) -> None:
         del facts["knows"]
         facts["model_configuration"]["input"] = "displacement"
@@ -136,7 +134,7 @@ STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1
 TOML = "".join(f"{name} = {value}\n" for name, value in asdict(STEEL).items())
 
 
-def test_a_steel_string_is_played_by_the_same_preset() -> None:
+def test_a_steel_string_is_played_by_the_same_preset():
     many = shipped("studio_any_string")
     preset = of_string(many, STEEL, 44_100)
     assert preset.info.rate_hz == 44_100
@@ -159,12 +157,12 @@ def test_a_steel_string_is_played_by_the_same_preset() -> None:
         (KNOWING, {}, "choose a preset of many strings"),
     ],
 )
-def test_an_impossible_string_or_a_preset_of_one_is_refused(name: str, changed: dict[str, float], words: str) -> None:
+def test_an_impossible_string_or_a_preset_of_one_is_refused(name, changed, words):
     with pytest.raises(PresetError, match=words):
         of_string(shipped(name), replace(StringParameters(), **changed))
 
 
-def test_a_string_file_is_read_and_may_describe_its_string(tmp_path: Path) -> None:
+def test_a_string_file_is_read_and_may_describe_its_string(tmp_path):
     file = tmp_path / "steel.toml"
     for described, words in (("", ""), ('description = """\nOf 7850\n kg/m³."""\n', "Of 7850 kg/m³.")):
         file.write_text(described + TOML, encoding="utf-8")
@@ -186,7 +184,7 @@ def test_a_string_file_is_read_and_may_describe_its_string(tmp_path: Path) -> No
         ("", r"length_m, area_m2, .*, tension_n are missing; .*gives all of length_m, area_m2,"),
     ],
 )
-def test_a_wrong_string_file_is_named(tmp_path: Path, text: str, words: str) -> None:
+def test_a_wrong_string_file_is_named(tmp_path, text, words):
     file = tmp_path / "wrong.toml"
     file.write_text(text)
     with pytest.raises(SchemaError, match=words) as caught:
@@ -201,7 +199,7 @@ NAMES = sorted(path.stem for path in STRINGS.glob("*.toml"))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_shipped_string_is_a_preset_with_what_was_learned_at_its_pitch(name: str) -> None:
+def test_every_shipped_string_is_a_preset_with_what_was_learned_at_its_pitch(name):
     """Inside the family, except those whose files say what is beyond."""
     many = shipped("studio_any_string")
     string = read_string(find_string(name))

@@ -15,7 +15,7 @@ from engine.resonators.drum import bending_nm, modes_of, stretching_n_m
 from engine.resonators.surface import Surface, modes_below, tools
 from engine.strike import Strike
 from engine.truth import ModalState, SplittingSolver, solve_dop853
-from engine.values.drum import SHAPES, DrumParameters, DrumShape, Mallet
+from engine.values.drum import SHAPES, DrumParameters, Mallet
 
 TOM = DrumParameters(uneven=0.004)
 PLATE = DrumParameters("rectangle", 0.3, 0.2, 6e-4, 7850, 2e11, 0.3, tension_n_m=0)
@@ -40,7 +40,7 @@ def lowest(drum: DrumParameters) -> dict[tuple[int, int], float]:
     return found
 
 
-def test_membrane_and_plate_in_closed_form_and_pairs_that_are_split() -> None:
+def test_membrane_and_plate_in_closed_form_and_pairs_that_are_split():
     first = 2.404826 / (0.33 / 2) * math.sqrt(1500 / TOM.mass_kg_m2) / (2 * math.pi)
     assert lowest(TOM)[0, 1] == pytest.approx(first, rel=1e-3)
     kappa = (math.pi / 0.3) ** 2 + (math.pi / 0.2) ** 2
@@ -50,7 +50,7 @@ def test_membrane_and_plate_in_closed_form_and_pairs_that_are_split() -> None:
     assert omega[4] / omega[3] == pytest.approx(1.004, rel=1e-4)
 
 
-def test_tension_of_the_stretch_is_bergers() -> None:
+def test_tension_of_the_stretch_is_bergers():
     """C (1/A) ∫|∇w|² dA, by differences on a grid."""
     modes, side = modes_of(PLATE, 1500), 201
     grid = np.stack(np.meshgrid(*(np.linspace(-1, 1, side),) * 2, indexing="ij"), axis=-1)
@@ -63,7 +63,7 @@ def test_tension_of_the_stretch_is_bergers() -> None:
     assert float(resonator.relative_tension_rise(q)) * at_rest == pytest.approx(expected, rel=0.02)
 
 
-def test_air_and_a_kettle_shift_a_single_head_as_measured() -> None:
+def test_air_and_a_kettle_shift_a_single_head_as_measured():
     """Without air the ratios would be 1.34, 1.66, 1.98 and 2.29; a kettle raises the first mode."""
     found, vacuum = lowest(HEAD), lowest(replace(HEAD, air_kg_m3=0.0))
     for mode, measured_hz in MEASURED_HZ.items():
@@ -77,7 +77,7 @@ def test_air_and_a_kettle_shift_a_single_head_as_measured() -> None:
 
 
 @pytest.mark.parametrize("shape", ["circle", "rectangle", "bar"])
-def test_the_integral_of_the_air_has_converged(shape: DrumShape, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_integral_of_the_air_has_converged(shape, monkeypatch):
     drum = replace(TOM, shape=shape, width_m=0.33 if shape == "circle" else 0.2, air_kg_m3=1.2)
     few = modes_of(drum, 1_000)
     monkeypatch.setattr(surface, "POINTS", 8 * surface.POINTS)
@@ -85,7 +85,7 @@ def test_the_integral_of_the_air_has_converged(shape: DrumShape, monkeypatch: py
     np.testing.assert_allclose(few.omega, many.omega, rtol=1e-6)
 
 
-def test_a_shell_lowers_the_first_mode_to_that_of_a_measured_tom() -> None:
+def test_a_shell_lowers_the_first_mode_to_that_of_a_measured_tom():
     """142 Hz where (1,1) has 305 Hz (Rossing, see bench/drums.py); its size is not known, toms are alike."""
     for size_m, tension_n_m, shell_m in ((0.254, 1497, 0.165), (0.305, 2301, 0.203), (0.356, 3337, 0.203)):
         open_head = DrumParameters(length_m=size_m, width_m=size_m, tension_n_m=tension_n_m, air_kg_m3=1.2)
@@ -97,7 +97,7 @@ def test_a_shell_lowers_the_first_mode_to_that_of_a_measured_tom() -> None:
         assert found[2, 1] == flat[2, 1]
 
 
-def test_the_column_of_a_deep_shell_is_finite() -> None:
+def test_the_column_of_a_deep_shell_is_finite():
     """Also where a mode meets the column's resonance, it has a mass, and loses energy."""
     for shell_m in np.linspace(0.02, 2, 100):
         modes = modes_of(replace(TOM, air_kg_m3=1.2, shell_m=float(shell_m)), 2_000)
@@ -107,7 +107,7 @@ def test_the_column_of_a_deep_shell_is_finite() -> None:
 
 @pytest.mark.parametrize("drum", [TOM, PLATE, replace(HEAD, length_m=0.3, width_m=0.3)])
 @pytest.mark.parametrize("blow", [True, False])
-def test_solver_against_the_oracle(drum: DrumParameters, blow: bool) -> None:
+def test_solver_against_the_oracle(drum, blow):
     modes = modes_of(drum, 900, most=24)
     resonator = modes.resonator(np.zeros((1, 2)))
     v = Strike((0.3, 0.2), 4.0, Mallet(contact_s=0.002)).speeds(modes)
@@ -120,7 +120,7 @@ def test_solver_against_the_oracle(drum: DrumParameters, blow: bool) -> None:
     assert float((found - expected).norm() / expected.norm()) < 1e-9
 
 
-def test_what_the_drum_does_not_tell_is_refused() -> None:
+def test_what_the_drum_does_not_tell_is_refused():
     modes = modes_of(TOM, 500)
     with pytest.raises(ValueError, match="do not follow from displacement at 2 places"):
         modes.resonator(np.zeros((2, 2))).to_modes(np.zeros(2))
@@ -141,7 +141,7 @@ CIRCLE, RECTANGLE = surface_of("circle", 0.4, 0.4), surface_of("rectangle", 0.4,
 
 
 @pytest.mark.parametrize("own", [CIRCLE, RECTANGLE], ids=["circle", "rectangle"])
-def test_shapes_are_orthonormal_and_their_transforms_are_the_integrals(own: Surface) -> None:
+def test_shapes_are_orthonormal_and_their_transforms_are_the_integrals(own):
     places, angle = GRID[np.hypot(*GRID.T) <= 1] if own.round else GRID, 0.4
     shapes = own.shapes(places)
     gram = shapes @ shapes.T / len(places)
@@ -158,14 +158,14 @@ def test_shapes_are_orthonormal_and_their_transforms_are_the_integrals(own: Surf
     np.testing.assert_allclose(whole, 1, atol=2e-3)
 
 
-def test_the_mean_over_a_disc() -> None:
+def test_the_mean_over_a_disc():
     place, radius = np.array([0.3, -0.2]), 0.02
     expected = CIRCLE.shapes(GRID[np.hypot(*GRID.T) <= 1] * (radius / 0.2) + place).mean(1)
     spread = [kernel.spread(each * radius, tools()) for each in CIRCLE.wavenumber]
     assert np.allclose(CIRCLE.shapes(place[None])[:, 0] * spread, expected, atol=2e-3)
 
 
-def test_bessel_functions_their_table_and_zeros_are_scipys() -> None:
+def test_bessel_functions_their_table_and_zeros_are_scipys():
     for x in (0.0, 1e-5, 2e-4, 0.3, 5.0, 77.7, 280.0):
         all_orders = np.empty(300)
         assert kernel.bessels(x, all_orders) == pytest.approx(scipy.special.struve(1, x), abs=1e-14)
@@ -181,7 +181,7 @@ def test_bessel_functions_their_table_and_zeros_are_scipys() -> None:
     np.testing.assert_allclose(rows[kernel.SLOPE], scipy.special.jvp(rows[kernel.M], rows[kernel.Z]), atol=1e-13)
 
 
-def test_the_air_at_a_circle_is_the_integral_with_scipys_functions() -> None:
+def test_the_air_at_a_circle_is_the_integral_with_scipys_functions():
     low, ka, points = np.ascontiguousarray(modes_below("circle", 1.0, 16.0)[:, ::7]), 3.3, 4096
     found: Array = np.empty((2, low.shape[1]))
     kernel.air_at(np.array([0.0, 2.0, 2.0]), low, ka, 256, found, np.empty(low.shape[1] + kernel.ORDERS))

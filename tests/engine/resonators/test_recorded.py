@@ -1,7 +1,6 @@
 """A recorded string's modes: its own at its pitch, the law and the smooth decay far from it."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +36,7 @@ def recorded() -> RecordedString:
     )
 
 
-def test_at_its_pitch_it_has_the_notes_own_modes_far_away_the_law_and_the_smooth_decay() -> None:
+def test_at_its_pitch_it_has_the_notes_own_modes_far_away_the_law_and_the_smooth_decay():
     resonator, law = recorded().resonator(STRING, 6), resonator_of(STRING, 3)
     cents = 1200 * np.log2(resonator.omega / np.repeat(law.omega, 2))
     assert np.allclose(cents, [5, 6, -3, -1, 2, 5], atol=1e-6)
@@ -53,7 +52,7 @@ def test_at_its_pitch_it_has_the_notes_own_modes_far_away_the_law_and_the_smooth
     assert np.allclose(resonator.sigma[::2], 2 * law.sigma, rtol=1e-6)
 
 
-def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
+def test_no_partial_is_damped_by_more_than_half_its_frequency():
     lossy = replace(STRING, damping_d1_kg_m_s=0.03)
     fast = replace(recorded(), ratio=(20.0, 2.0, 20.0), second_ratio=(0.5, 1.0, 4.0))
     resonator, law = fast.resonator(lossy, 6), resonator_of(lossy, 3)
@@ -62,7 +61,7 @@ def test_no_partial_is_damped_by_more_than_half_its_frequency() -> None:
     assert resonator.sigma[2:5] / law.sigma[[1, 1, 2]] == pytest.approx([4, 4, 40], rel=1e-6)
 
 
-def test_a_displacement_is_shared_by_both_polarisations_and_one_tension() -> None:
+def test_a_displacement_is_shared_by_both_polarisations_and_one_tension():
     """In the truth against DOP853, at velocities that glide; learned curves are as accurate as in one direction."""
     resonator, wide = (recorded().resonator(STRING, modes) for modes in (24, 120))
     shape, rate_hz = resonator.shapes[0], 48_000
@@ -86,7 +85,7 @@ def test_a_displacement_is_shared_by_both_polarisations_and_one_tension() -> Non
         assert relative(moved @ heard, true @ heard) ** 2 < 1e-6
 
 
-def test_the_recorded_note_glides_to_its_pitch() -> None:
+def test_the_recorded_note_glides_to_its_pitch():
     sound = NOTE.sound()
     assert len(sound) == NOTE.frames and not sound[: NOTE.onset].any()
     assert np.isfinite(sound).all()
@@ -99,7 +98,7 @@ def test_the_recorded_note_glides_to_its_pitch() -> None:
     assert hz(30_000, 44_000) == pytest.approx(246.9, abs=0.2)
 
 
-def test_at_another_rate_it_is_the_same_sound_without_what_lies_above_half_of_it() -> None:
+def test_at_another_rate_it_is_the_same_sound_without_what_lies_above_half_of_it():
     hz, ones = (1_000.0, 5_000.0, 6_000.0, 10_000.0, 20_000.0), (1.0,) * 5
 
     def note(count: int) -> RecordedNote:
@@ -115,7 +114,7 @@ SAMPLES = np.random.default_rng(0).standard_normal(2_500)
 ATTACK = RecordedAttack.of(SAMPLES, 48_000)
 
 
-def test_it_is_written_and_read_and_an_attack_is_kept_whole() -> None:
+def test_it_is_written_and_read_and_an_attack_is_kept_whole():
     assert [len(row) for row in ATTACK.rows] == [1_000, 1_000, 500]
     assert np.corrcoef(ATTACK.samples, SAMPLES)[0, 1] > 0.9999
     assert np.sum(ATTACK.samples**2) / 48_000 == pytest.approx(1)
@@ -135,6 +134,6 @@ def test_it_is_written_and_read_and_an_attack_is_kept_whole() -> None:
         *((ATTACK, "rows", rows) for rows in ([[0, 0]], [[99_999]], [[1] * 1_000] * 10)),
     ],
 )
-def test_what_is_no_recorded_string_is_refused(good: Any, field: str, value: Any) -> None:
+def test_what_is_no_recorded_string_is_refused(good, field, value):
     with pytest.raises(SchemaError):
         read(type(good), write(good) | {field: value}, "metadata")

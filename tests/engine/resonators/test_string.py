@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ STRING = StringParameters()
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 0.0, 0.0, 75.0)
 
 
-def test_it_is_the_papers_b3_and_harmonic_without_stiffness_and_solves_its_equation() -> None:
+def test_it_is_the_papers_b3_and_harmonic_without_stiffness_and_solves_its_equation():
     assert undamped_frequencies(STRING, 1)[0] / (2 * math.pi) == pytest.approx(246.94, abs=0.5)
     frequencies = undamped_frequencies(StringParameters(second_moment_m4=0), 5)
     np.testing.assert_allclose(frequencies / frequencies[0], np.arange(1, 6))
@@ -32,7 +31,7 @@ def test_it_is_the_papers_b3_and_harmonic_without_stiffness_and_solves_its_equat
     assert float((np.abs(residual) / np.abs(s) ** 2).max()) < 1e-14
 
 
-def test_relative_tension_rise_is_the_stretch_of_the_shape() -> None:
+def test_relative_tension_rise_is_the_stretch_of_the_shape():
     """EA/2ℓ ∫ y'² dx / T₀ by quadrature of a shape with three modes."""
     amplitudes, eta = np.array([3e-3, -1e-3, 2e-3]), wavenumbers(STRING, 3)
     x = np.linspace(0, STRING.length_m, 20_001)
@@ -42,7 +41,7 @@ def test_relative_tension_rise_is_the_stretch_of_the_shape() -> None:
     assert float(resonator_of(STRING, 3).relative_tension_rise(amplitudes)) == pytest.approx(expected, rel=1e-6)
 
 
-def test_losses_have_their_limits() -> None:
+def test_losses_have_their_limits():
     """Friction gives all partials one quality, bending that of stiff ones; air by hand of a thin string."""
     flexible, stiff = replace(STEEL, youngs_modulus_pa=0.0), replace(STEEL, second_moment_m4=1e-7)
     quality = 2 * loss_rates(Losses(0.0, 1e-3, 0.5), flexible, 20) / undamped_frequencies(flexible, 20)
@@ -57,7 +56,7 @@ def test_losses_have_their_limits() -> None:
 
 
 @pytest.mark.parametrize(("grid_points", "modes"), [(101, 1), (101, 25), (101, 99), (801, 799), (1_201, 90)])
-def test_modes_come_back_from_the_grid_and_a_large_picture_is_that_of_its_table(grid_points: int, modes: int) -> None:
+def test_modes_come_back_from_the_grid_and_a_large_picture_is_that_of_its_table(grid_points, modes):
     amplitudes = np.random.default_rng(1).normal(size=(4, modes))
     displacement = to_grid(amplitudes, grid_points)
     assert (displacement[:, [0, -1]] == 0).all()
@@ -69,7 +68,7 @@ def test_modes_come_back_from_the_grid_and_a_large_picture_is_that_of_its_table(
         to_modes(np.zeros(101), 100)
 
 
-def test_listening_is_exact_on_the_grid_and_between_its_points() -> None:
+def test_listening_is_exact_on_the_grid_and_between_its_points():
     displacement = np.zeros(101)
     displacement[37] = 1
     heard = displacement @ listening_weights(np.array([0.37, 0.36]), 101)
@@ -87,6 +86,6 @@ def test_listening_is_exact_on_the_grid_and_between_its_points() -> None:
         ({"omega": np.arange(5.0, 0.0, -1.0)}, "omega must not fall"),
     ],
 )
-def test_a_resonator_of_what_does_not_go_together_is_refused(changed: dict[str, Any], words: str) -> None:
+def test_a_resonator_of_what_does_not_go_together_is_refused(changed, words):
     with pytest.raises(ValueError, match=words):
         replace(resonator_of(STRING, 5, grid_points=9), **changed)

@@ -35,21 +35,21 @@ def random_state(batch: int, modes: int) -> ModalState:
     )
 
 
-def test_order_of_convergence() -> None:
+def test_order_of_convergence():
     """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
     state, resonator = worst_of_protocol("noise", 25), resonator_of(STRING, 25)
     coarse, fine, truth = (SplittingSolver(resonator, 16_000, substeps=n).solve(state, 100) for n in (12, 24, 96))
     assert relative(coarse, truth) / relative(fine, truth) > 14
 
 
-def test_the_linear_string_is_exact() -> None:
+def test_the_linear_string_is_exact():
     state = random_state(3, 25)
     found = SplittingSolver(resonator_of(STRING, 25, tension_modulated=False), 16_000).solve(state, 2000)
     times_s = torch.arange(2001, dtype=torch.float64) / 16_000
     assert relative(found, solve_linear(resonator_of(STRING, state.modes), state, times_s)) < 1e-11
 
 
-def test_without_damping_the_energy_stays() -> None:
+def test_without_damping_the_energy_stays():
     string = StringParameters(damping_d1_kg_m_s=0, damping_d3_kg_m_s=0)
 
     def energy(state: ModalState) -> float:
@@ -65,9 +65,7 @@ def test_without_damping_the_energy_stays() -> None:
 
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
-def test_the_worst_of_the_protocol_is_the_oracles_and_modes_that_died_away_are_left_out(
-    initial: str, rate_hz: int, modes: int
-) -> None:
+def test_the_worst_of_the_protocol_is_the_oracles_and_modes_that_died_away_are_left_out(initial, rate_hz, modes):
     """1e-7 over 4000 samples was measured once, with the same strings; a shorter stretch keeps the suite quick."""
     state, resonator = worst_of_protocol(initial, modes), resonator_of(STRING, modes)
     truth = solve_dop853(resonator, state, rate_hz, 200)
@@ -94,7 +92,7 @@ def in_blocks(solver: SplittingSolver, state: ModalState, blocks: tuple[int, ...
     return torch.cat(parts, 1)
 
 
-def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_it_is() -> None:
+def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_it_is():
     solver, state = SplittingSolver(resonator_of(STRING, 10), 16_000, substeps=2), random_state(3, 10)
     kept = state.amplitude.clone(), state.velocity.clone()
     whole, last = solver.advance(state, 257)
@@ -112,14 +110,14 @@ def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_pluck_peaks_where_and_as_far_as_asked(shape: str) -> None:
+def test_a_pluck_peaks_where_and_as_far_as_asked(shape):
     displacement = Pluck(position=0.3, amplitude_mm=2.5, shape=shape, width=0.1).displacement(101)
     assert abs(int(displacement.argmax()) - 30) <= (2 if shape == "rounded" else 0)  # it is round where it is pulled
     assert float(displacement.max()) == pytest.approx(2.5e-3)
     assert (displacement[[0, -1]] == 0).all()
 
 
-def test_a_rounded_triangle_is_the_triangle_under_a_spread_force() -> None:
+def test_a_rounded_triangle_is_the_triangle_under_a_spread_force():
     """The string's second derivative is the force: a raised cosine of that width, and none outside it."""
     points, position, width = 401, 0.3, 0.2
     shape = displacement("rounded", position, width, 2e-3, points)
@@ -134,7 +132,7 @@ def test_a_rounded_triangle_is_the_triangle_under_a_spread_force() -> None:
 
 @pytest.mark.parametrize("time_s", [0.5e-3, 2e-3, 6e-3])
 @pytest.mark.parametrize("blow", [False, True])
-def test_a_release_or_a_blow_in_a_time_is_a_smaller_one_at_its_middle(blow: bool, time_s: float) -> None:
+def test_a_release_or_a_blow_in_a_time_is_a_smaller_one_at_its_middle(blow, time_s):
     """Against DOP853 of modes without losses under a force: amplitude and speed after it.
 
     The force that holds them falls as a raised cosine; that of a hammer is one, and brings speeds that are given.
@@ -158,7 +156,7 @@ def test_a_release_or_a_blow_in_a_time_is_a_smaller_one_at_its_middle(blow: bool
     np.testing.assert_allclose(found[4:], left * speed, atol=1e-4)
 
 
-def test_a_blow_sends_out_a_wave_as_high_as_the_pluck_is() -> None:
+def test_a_blow_sends_out_a_wave_as_high_as_the_pluck_is():
     """On a flexible string, before it has come to an end."""
     points = 801
     shape_m = displacement("raised_cosine", 0.4, 0.06, 1e-3, points)

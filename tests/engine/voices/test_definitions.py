@@ -1,7 +1,6 @@
 """Every voice is its definition, also of a string that changes as it rings: bent, damped, plucked again."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -62,9 +61,7 @@ STUDIO = sorted(path.stem for path in preset_files(SHIPPED) if path.stem.startsw
         *((name, "truth", STEREO, Pluck(0.3, 6.0), 0.25, 1e-4) for name in (KNOWING, sounds.STEEL)),
     ],
 )
-def test_at_its_own_rate_a_voice_is_its_definition(
-    name: str, kind: str, ear: Ear, pluck: Pluck, seconds: float, allowed: float
-) -> None:
+def test_at_its_own_rate_a_voice_is_its_definition(name, kind, ear, pluck, seconds, allowed):
     preset = shipped(name)
     info = preset.info
     if kind == "model":
@@ -80,7 +77,7 @@ def test_at_its_own_rate_a_voice_is_its_definition(
 
 
 @pytest.mark.parametrize("name", [KNOWING, HINTED, sounds.STEEL])
-def test_at_any_rate_it_is_the_model_at_those_times(name: str) -> None:
+def test_at_any_rate_it_is_the_model_at_those_times(name):
     preset, pluck, rate_hz = shipped(name), Pluck(0.71, 5.0), 44_100
     model, info = preset.model, preset.info
     found = rung(rate_hz, strike(name, pluck, rate_hz, STEREO), attack=False)
@@ -93,7 +90,7 @@ def test_at_any_rate_it_is_the_model_at_those_times(name: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "rate_hz"), [("dmd", 4_000), ("dmd", 48_000), ("truth", 4_000), ("truth", 44_100)])
-def test_the_linear_string_is_its_closed_form(kind: str, rate_hz: int) -> None:
+def test_the_linear_string_is_its_closed_form(kind, rate_hz):
     """The truth is as exact as single precision, in which a device is given its samples."""
     info = sounds.small(False)
     let_go_m = initial_m(info, Pluck(0.3, 8.0))
@@ -111,7 +108,7 @@ def test_the_linear_string_is_its_closed_form(kind: str, rate_hz: int) -> None:
 
 
 @pytest.mark.parametrize("modulated", [False, True])
-def test_at_a_low_rate_no_mode_is_heard_as_another(modulated: bool) -> None:
+def test_at_a_low_rate_no_mode_is_heard_as_another(modulated):
     """Softly plucked, it is the string of the modes that the rate can hold."""
     info = sounds.small(modulated)
     omegas = [info.string.undamped_frequency(number) for number in range(1, info.modes + 1)]
@@ -128,7 +125,7 @@ def test_at_a_low_rate_no_mode_is_heard_as_another(modulated: bool) -> None:
     assert relative(aliased, expected) > 1e-3
 
 
-def test_at_a_low_rate_no_latent_is_heard_as_another() -> None:
+def test_at_a_low_rate_no_latent_is_heard_as_another():
     """What a device of 48 kHz gives below 3.5 kHz is what one of 8 kHz gives."""
     preset, pluck, spectra = shipped(sounds.STEEL), Pluck(0.13, 2.0, width=0.03), []
     for rate_hz in (8_000, 48_000):
@@ -141,7 +138,7 @@ def test_at_a_low_rate_no_latent_is_heard_as_another() -> None:
 
 @pytest.mark.parametrize("ear", [Ear((0.0,)), Ear((0.37,), solo=9)])
 @pytest.mark.parametrize("name", [KNOWING, sounds.STEEL])
-def test_what_was_silent_at_one_place_is_whole_at_another(name: str, ear: Ear) -> None:
+def test_what_was_silent_at_one_place_is_whole_at_another(name, ear):
     """Where nothing can be heard, the modulation is left out; elsewhere it must be there again."""
     expected = rung(14_400, strike(name, Pluck(0.3, 8.0)))
     voice = strike(name, Pluck(0.3, 8.0), ear=ear)
@@ -151,7 +148,7 @@ def test_what_was_silent_at_one_place_is_whole_at_another(name: str, ear: Ear) -
     np.testing.assert_allclose(mixer.render(9600)[1200:], expected[6000:], atol=1e-5)
 
 
-def test_what_is_no_bank_has_no_program(small_preset: Path) -> None:
+def test_what_is_no_bank_has_no_program(small_preset):
     preset = shipped(KNOWING)
     seeing = load_preset(small_preset).model
     assert bank_program(seeing, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
@@ -160,7 +157,7 @@ def test_what_is_no_bank_has_no_program(small_preset: Path) -> None:
 
 
 @pytest.mark.parametrize("rank", [0, MOST_LATENTS + 2])
-def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(rank: int) -> None:
+def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(rank):
     """Its latents would be written beyond their memory; so would those of a fit to silence, which has none."""
     info = sounds.small(False)
     model = DMD(DMDConfiguration(info.grid_points, 16, max(rank, 2)))
@@ -186,7 +183,7 @@ def any_string() -> tuple[Preset, Program]:
 @pytest.mark.parametrize(
     ("rate_hz", "pluck", "nodes"), [(44_100, Pluck(0.3, 6.0), 2), (48_000, Pluck(0.3, 12.0, width=0.02), 3)]
 )
-def test_a_voice_is_the_model_and_the_string(rate_hz: int, pluck: Pluck, nodes: int) -> None:
+def test_a_voice_is_the_model_and_the_string(rate_hz, pluck, nodes):
     tuned = of_string(any_string()[0], rate_hz=rate_hz)
     info, let_go_m = tuned.info, initial_m(tuned.info, pluck)
     _, state = tuned.model.advance(tuned.model.encode(torch.from_numpy(let_go_m[None] / info.scale_m).float()), 1)
@@ -201,7 +198,7 @@ def test_a_voice_is_the_model_and_the_string(rate_hz: int, pluck: Pluck, nodes: 
 
 
 @pytest.mark.parametrize("source", ["model", "truth"])
-def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(source: str) -> None:
+def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(source):
     preset, program = any_string()
     info, resonator = preset.info, preset.info.resonator
     let_go_m = initial_m(info, Pluck(0.12, 4.0, "triangular"))
@@ -213,7 +210,7 @@ def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(source: str) -> No
     assert relative(found, np.repeat(expected[:, None], 2, 1)) < 1e-4
 
 
-def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string() -> None:
+def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string():
     preset, program = any_string()
     info, model = preset.info, preset.model
     # 301 frames after a pluck that raises its tension by a half, in m and m/s
@@ -232,7 +229,7 @@ def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string
         assert relative(found, expected) < 1e-5
 
 
-def test_solo_reads_one_mode_at_the_listening_point() -> None:
+def test_solo_reads_one_mode_at_the_listening_point():
     amplitudes = np.random.default_rng(0).normal(size=25)
     motion = to_grid(amplitudes, 101)
     for mode in (1, 7, 25):
@@ -252,7 +249,7 @@ def newtons(displacement_m: Signal, ear: Ear = BRIDGE, modes: int = 99) -> Signa
     return displacement_m @ weights_of(ear, 101, force) * (FULL_SCALE_N / FULL_SCALE_M)
 
 
-def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> None:
+def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end():
     """T ∂y/∂x - EI ∂³y/∂x³ at x = 0, by finite differences of one mode."""
     mode, step = 7, 1e-4 * STIFF.length_m
     x = step * np.arange(5)
@@ -271,7 +268,7 @@ def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> No
 
 
 @pytest.mark.parametrize("pluck", [Pluck(0.1, 3.0, "triangular"), Pluck(0.5, 3.0, width=0.03), Pluck(0.03, 3.0)])
-def test_no_motion_passes_the_bound_by_much(pluck: Pluck) -> None:
+def test_no_motion_passes_the_bound_by_much(pluck):
     resonator = resonator_of(STIFF, 60, grid_points=101, tension_modulated=False)
     shape = resonator.to_grid(resonator.to_modes(pluck.displacement(101)))
     times = torch.arange(2000, dtype=torch.float64) / 48_000
@@ -281,7 +278,7 @@ def test_no_motion_passes_the_bound_by_much(pluck: Pluck) -> None:
     assert 0.2 * bound < float(np.abs(heard).max()) < 0.2 * RUNAWAY_FACTOR * bound
 
 
-def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string() -> None:
+def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string():
     assert Ear((0.5,), solo=2).is_on_node(0.5) and Ear((0.0,)).is_on_node(0.0)
     assert not any(
         ear.is_on_node(place)
@@ -294,7 +291,7 @@ def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [4_000, 48_000])
-def test_velocity_is_the_derivative(rate_hz: int, derivative: Callable[..., np.ndarray]) -> None:
+def test_velocity_is_the_derivative(rate_hz, derivative):
     time_s = np.arange(4000) / rate_hz
     omega = 2 * np.pi * rate_hz * np.array([[0.01, 0.13, 0.31, 0.42]])
     signal = np.cos(omega * time_s[:, np.newaxis])
@@ -375,12 +372,12 @@ BEND: Changes = [(40 + 2 * step, bent(step / 20), 0.002) for step in range(1, 41
     ],
     ids=["a slow bend", "bent before it is struck", "damped and free again", "all"],
 )
-def test_the_model_follows_the_truth_through_every_change(changes: Changes, allowed: float) -> None:
+def test_the_model_follows_the_truth_through_every_change(changes, allowed):
     """Relative MSE of 0.4 s with a tension rise of 2 %."""
     assert relative(sound(program("model"), changes), sound(program("truth", coarser=1), changes)) ** 2 < allowed
 
 
-def test_the_truth_is_the_equation_whose_modes_change() -> None:
+def test_the_truth_is_the_equation_whose_modes_change():
     """Against DOP853, quantum by quantum, with the modes that the voice had then."""
     first, last, quanta = resonator_of(STRING, 4), resonator_of(replace(STRING, tension_n=95.0, length_m=0.6), 4), 12
     of = program("truth", first, coarser=1)
@@ -410,7 +407,7 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind: str, pickup: str) -> None:
+def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind, pickup):
     """Of next to nothing, sample by sample: the motion continues in its own time, however far ahead it was made."""
     of, ear = program(kind), Ear((0.37, 0.6), pickup)
     soft, faint = (Pluck(0.3, amplitude_mm, "raised_cosine", 0.2) for amplitude_mm in (0.02, 1e-4))
@@ -423,7 +420,7 @@ def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind: str, pic
     np.testing.assert_allclose(touched, alone, atol=2e-4 * np.abs(alone).max())
 
 
-def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
+def test_modes_above_half_the_rate_are_silent_from_the_start():
     own, low_hz = resonator_of(STRING, 80), 16_000
     below = int((own.omega < 3.0 * low_hz).sum())
     assert below < 80
@@ -435,7 +432,7 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
-def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) -> None:
+def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind):
     high = resonator_of(STRING, 80)
     assert float(high.omega[-1]) / (2 * math.pi) > 0.45 * RATE_HZ / 2
     up = resonator_of(replace(STRING, tension_n=STRING.tension_n * 16), 80)  # two octaves

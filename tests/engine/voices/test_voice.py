@@ -1,9 +1,7 @@
 """What all voices share: blocks, gains, listening points, beginning and end; samples of others; files."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,7 +42,7 @@ def constant(frames: int = 48_000, level: float = 0.5, rate_hz: int = RATE_HZ) -
 
 @KINDS
 @PICKUPS
-def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str) -> None:
+def test_any_splitting_into_blocks_is_the_same(kind, pickup):
     def rendered(sizes: list[int]) -> sounds.Signal:
         mixer = mixer_of(struck(kind, Ear((0.3, 0.6), pickup)), limited=True)
         return np.concatenate([mixer.render(size) for size in sizes])
@@ -57,9 +55,7 @@ def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str) -> None:
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 3])
-def test_velocity_is_the_derivative_of_displacement(
-    kind: str, solo: int, derivative: Callable[..., np.ndarray]
-) -> None:
+def test_velocity_is_the_derivative_of_displacement(kind, solo, derivative):
     points = (0.3, 0.6)
     displacement = rung(9600, struck(kind, Ear(points, solo=solo)), attack=False)
     found = rung(9600, struck(kind, Ear(points, "velocity", solo)), attack=False)
@@ -69,7 +65,7 @@ def test_velocity_is_the_derivative_of_displacement(
 
 
 @pytest.mark.parametrize("amplitude_mm", [0.1, 20.0])
-def test_no_pluck_as_velocity_is_taken_for_a_runaway(amplitude_mm: float) -> None:
+def test_no_pluck_as_velocity_is_taken_for_a_runaway(amplitude_mm):
     info, pluck = shipped(sounds.STEEL).info, Pluck(0.02, amplitude_mm, "triangular")
     voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), Ear((0.05,), "velocity"))
     assert rung(4800, voice).any()
@@ -79,7 +75,7 @@ def test_no_pluck_as_velocity_is_taken_for_a_runaway(amplitude_mm: float) -> Non
 @KINDS
 @PICKUPS
 @pytest.mark.parametrize("skipped", [False, True])
-def test_what_was_not_heard_is_where_it_would_have_been(kind: str, pickup: str, skipped: bool) -> None:
+def test_what_was_not_heard_is_where_it_would_have_been(kind, pickup, skipped):
     """It fades in, without anything of what sounded meanwhile; what is skipped is not even waited for."""
     ear, frames, arrived = Ear((0.37,), pickup), 150 * QUANTUM, FADE + 4 * QUANTUM
     expected = rung(frames + 12_000, struck(kind, ear))[frames:]
@@ -103,7 +99,7 @@ def test_what_was_not_heard_is_where_it_would_have_been(kind: str, pickup: str, 
 
 @pytest.mark.parametrize(("kind", "rate_hz"), [("bank", 48_000), ("truth", 44_100), ("truth", 192_000)])
 @pytest.mark.parametrize("solo", [0, 2])
-def test_another_listening_point_is_faded_to_and_then_exact(kind: str, rate_hz: int, solo: int) -> None:
+def test_another_listening_point_is_faded_to_and_then_exact(kind, rate_hz, solo):
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
     moved, frames = struck(kind, here, rate_hz=rate_hz), round(0.02 * rate_hz)
     mixer = mixer_of(moved, rate_hz=rate_hz)
@@ -121,7 +117,7 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, rate_hz: 
 
 @pytest.mark.parametrize("gain", [0.0, 1.0])
 @pytest.mark.parametrize("kind", ["bank", "truth", "tension"])
-def test_what_has_become_silent_ends_by_itself(kind: str, gain: float) -> None:
+def test_what_has_become_silent_ends_by_itself(kind, gain):
     voice = struck(kind, gain=gain)
     mixer, level, found = mixer_of(voice), np.inf, np.zeros((1, 2), np.float32)
     while not voice.over and voice.seconds < 40:
@@ -133,7 +129,7 @@ def test_what_has_become_silent_ends_by_itself(kind: str, gain: float) -> None:
 
 @pytest.mark.parametrize("rate_hz", [44_100, 192_000])
 @KINDS
-def test_at_its_end_it_fades_as_long_at_any_rate(kind: str, rate_hz: int) -> None:
+def test_at_its_end_it_fades_as_long_at_any_rate(kind, rate_hz):
     voice, frames = struck(kind, rate_hz=rate_hz), round(0.02 * rate_hz)
     voice.record["silent"] = 0.0  # louder than it is
     found, whole = (rung(8000, each) for each in (voice, struck(kind, rate_hz=rate_hz)))
@@ -145,7 +141,7 @@ def test_at_its_end_it_fades_as_long_at_any_rate(kind: str, rate_hz: int) -> Non
 @KINDS
 @PICKUPS
 @pytest.mark.parametrize("frame", [1, 700, 1023])
-def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(kind: str, pickup: str, frame: int) -> None:
+def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(kind, pickup, frame):
     """All of it, with a change of gain and the release, later by so many frames."""
 
     def rendered(begins: int) -> sounds.Signal:
@@ -167,7 +163,7 @@ def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(kind: str
     assert np.abs(later[frame + len(at_once) - 64 :]).max() == 0
 
 
-def test_the_attack_is_short_and_smooth() -> None:
+def test_the_attack_is_short_and_smooth():
     whole, found = (rung(960, struck("truth"), attack=attack)[:, 0] for attack in (False, True))
     np.testing.assert_array_equal(found[96:], whole[96:])
     window = 0.5 - 0.5 * np.cos(np.pi * (np.arange(96) + 0.5) / 96)
@@ -175,7 +171,7 @@ def test_the_attack_is_short_and_smooth() -> None:
 
 
 @pytest.mark.parametrize("value", [float("nan"), 1e30, 50.0])
-def test_a_runaway_never_reaches_the_mix(value: float) -> None:
+def test_a_runaway_never_reaches_the_mix(value):
     """A number of the model is spoilt: what nobody believes is found out before it is heard."""
     preset = shipped(KNOWING)
     program = model_program(preset, RATE_HZ)
@@ -198,7 +194,7 @@ def test_a_runaway_never_reaches_the_mix(value: float) -> None:
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)
 
 
-def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_without_steps() -> None:
+def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_without_steps():
     """Where a loud string is stopped within 6 ms, a corner would be a click."""
     voice = constant()
     mixer = mixer_of(voice)
@@ -219,7 +215,7 @@ def test_a_gain_is_reached_by_a_fade_without_corners_and_changes_on_its_way_with
 
 
 @pytest.mark.parametrize("rate_hz", [44_100, 48_000, 192_000])
-def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(rate_hz: int) -> None:
+def test_a_release_fades_for_its_time_and_one_before_the_beginning_is_silence(rate_hz):
     voice, waiting = (constant(rate_hz=rate_hz) for _ in range(2))
     waiting.begin_at(10_000)
     mixer, frames = mixer_of(voice, waiting, rate_hz=rate_hz), round(0.01 * rate_hz)
@@ -262,7 +258,7 @@ def empty(
 
 
 @pytest.mark.parametrize("points", [1, 2])
-def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points: int) -> None:
+def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points):
     samples = sounds.noise(5000, points)
     once, loop = (Voice.of_samples(plain_program(RATE_HZ), each) for each in (samples, samples[:1000]))
     found = rung(6000, once, attack=False)
@@ -274,7 +270,7 @@ def test_equal_rates_leave_each_sample_as_it_is_and_a_loop_has_no_seam(points: i
 
 
 @pytest.mark.parametrize(("source_hz", "rate_hz"), [(4_000, 48_000), (16_000, 44_100), (48_000, 44_100)])
-def test_other_rates_are_what_soxr_makes_of_them(source_hz: int, rate_hz: int) -> None:
+def test_other_rates_are_what_soxr_makes_of_them(source_hz, rate_hz):
     info, samples = replace(small(True), rate_hz=source_hz), band_limited(source_hz, 0.5)
     voice = empty(0.5, program=rendered_program(info, rate_hz), source_hz=source_hz)
     voice.append(samples)
@@ -286,7 +282,7 @@ def test_other_rates_are_what_soxr_makes_of_them(source_hz: int, rate_hz: int) -
 
 
 @PICKUPS
-def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -> None:
+def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup):
     samples = np.concatenate([band_limited(RATE_HZ, 0.1), np.zeros((100, 1), np.float32)])
     voice, whole = empty(0.1, pickup), empty(0.1, pickup)
     whole.append(samples)
@@ -309,7 +305,7 @@ def test_what_starves_fades_stands_still_and_goes_on_where_it_was(pickup: str) -
     assert mixer.new_gaps() == []  # its samples have come to their end
 
 
-def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
+def test_what_has_no_samples_yet_begins_when_it_has_them():
     voice, samples = empty(0.1), sounds.noise(4801, 1)
     mixer = mixer_of(voice)
     assert not mixer.render(640).any()
@@ -330,7 +326,7 @@ def program_of(kind: str) -> Program:
 
 @pytest.mark.parametrize("kind", ["bank", "truth"])
 @pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
-def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear) -> None:
+def test_it_is_a_mixer_with_that_one_voice(kind, ear):
     program, frames = program_of(kind), round(SECONDS * CD_HZ)
     found = render_voice(program, ModelSource(PRESET), PRESET.info, sounds.PLUCK, ear, SECONDS)
     mixer = mixer_of(Voice(program, initial_m(PRESET.info, sounds.PLUCK), ear), rate_hz=CD_HZ, limited=True)
@@ -339,7 +335,7 @@ def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear) -> None:
     assert mixer.take_reduction_db() == 0.0
 
 
-def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path) -> None:
+def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset):
     preset, ear = load_preset(small_preset), Ear((0.3, 0.6))
     info, source = preset.info, ModelSource(preset)
     assert model_program(preset, CD_HZ).rendered
@@ -353,7 +349,7 @@ def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path) -
     np.testing.assert_allclose(higher[::12][attack:-4], found[attack:-4], atol=1e-5)
 
 
-def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time() -> None:
+def test_progress_may_end_it_and_a_runaway_is_reported_with_its_time():
     shares: list[float] = []
     program, source = program_of("bank"), ModelSource(PRESET)
     render_voice(program, source, PRESET.info, sounds.PLUCK, EAR, SECONDS, shares.append)
@@ -379,7 +375,7 @@ def undying() -> Program:
 
 
 @pytest.mark.parametrize("ear", [EAR, Ear((0.3, 0.6), "velocity", 2)])
-def test_a_voice_ends_though_its_model_hums_on(ear: Ear) -> None:
+def test_a_voice_ends_though_its_model_hums_on(ear):
     program, given = undying(), (ModelSource(PRESET), PRESET.info, sounds.PLUCK, ear)
     found = render_voice(program, *given, 1.0)
     endless = render_voice(replace(program, ends_s=math.inf), *given, 1.0)
@@ -392,7 +388,7 @@ def test_a_voice_ends_though_its_model_hums_on(ear: Ear) -> None:
 
 
 @pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
-def test_what_is_played_ends_as_in_a_file(skipped_s: float) -> None:
+def test_what_is_played_ends_as_in_a_file(skipped_s):
     """Also where it begins later in its motion, or behind its end."""
     first, faded_in = round(skipped_s * CD_HZ / QUANTUM) * QUANTUM, 2 * round(0.02 * CD_HZ) * bool(skipped_s)
     file = render_voice(undying(), ModelSource(PRESET), PRESET.info, sounds.PLUCK, EAR, 1.0)[first:, 0]
@@ -405,7 +401,7 @@ def test_what_is_played_ends_as_in_a_file(skipped_s: float) -> None:
     np.testing.assert_array_equal(played[faded_in:], file[faded_in:] * (skipped_s < 0.3))
 
 
-def test_it_ends_where_its_string_is_silent_and_not_within_its_training() -> None:
+def test_it_ends_where_its_string_is_silent_and_not_within_its_training():
     info = PRESET.info
     slowest = float(info.resonator.sigma.min())
     assert voice_ends_s(info) == pytest.approx(2 * math.log(1e3) / slowest)  # twice 60 dB

@@ -1,7 +1,5 @@
 """Sounds for the gate of recordings: notes as users record them, chords, drums and noise, all drawn by a seed."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Callable

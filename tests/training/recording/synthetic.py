@@ -1,7 +1,5 @@
 """Synthetic recordings of which all is known: the project's own solver, a body, noise, a second polarisation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

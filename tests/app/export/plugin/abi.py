@@ -1,7 +1,5 @@
 """What the hosts of these tests share: C structures as the formats' documents have them, and pieces in blocks."""
 
-from __future__ import annotations
-
 import ctypes as c
 import re
 from collections.abc import Callable, Sequence

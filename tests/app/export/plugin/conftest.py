@@ -1,7 +1,5 @@
 """Plug-ins that the tests share: built once."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An LV2 host: loads a bundle, connects its ports, sends MIDI, takes sound, keeps state; from LV2's documents."""
 
-from __future__ import annotations
-
 import ctypes as c
 import struct
 from collections.abc import Sequence

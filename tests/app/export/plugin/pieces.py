@@ -1,7 +1,5 @@
 """Instruments of a bank of plug-ins, and music for them: as the app renders it, and as hosts play it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Building plug-ins: identifiers, files that are kept, faults of the disk, and what a killed build leaves."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -15,7 +13,7 @@ from app.export.plugin import build, texts
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
 from app.export.plugin.identity import MOST_BYTES, check_kept, held_in, identifier, lost_with
-from app.export.plugin.image import Image, image_of
+from app.export.plugin.image import image_of
 from app.export.plugin.objects import ObjectError, digest, objects_of
 from app.instruments.library import SHIPPED, list_instruments
 from engine.kernels import cache as kernel_cache
@@ -28,9 +26,7 @@ LARGEST_BYTES = 2_000_000  # the code has 0.8 MB more
 HERE = this_target()
 
 
-def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid(
-    objects: Path, tmp_path: Path
-) -> None:
+def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid(objects, tmp_path):
     names = ("é" * 60, "古琴" * 18, "古琴" * 18 + "!", "🎸" * 60, "My bass!", "my bass-", "My bass", "عود", "!!!")
     harp, preset = instrument_of("concert_harp"), preset_of("concert_harp")
     made = [image_of(harp.model_copy(update={"name": name}), preset) for name in names]
@@ -57,7 +53,7 @@ def test_names_in_any_script_are_plug_ins_of_their_own_and_their_bundle_is_valid
         assert not any(name in done.stderr for name in files)
 
 
-def test_instruments_are_small_and_one_that_cannot_sound_is_refused() -> None:
+def test_instruments_are_small_and_one_that_cannot_sound_is_refused():
     for name in ("concert_toms", "frame_drum", "slow_water"):  # the most drums or modes, the longest room
         assert image_of(instrument_of(name), preset_of(name)).bytes < LARGEST_BYTES
     assert instrument_of("sitar").pickup.kind == "bridge"  # whose force a recording does not give
@@ -65,9 +61,7 @@ def test_instruments_are_small_and_one_that_cannot_sound_is_refused() -> None:
         image_of(instrument_of("sitar"), preset_of(LEARNED))
 
 
-def test_any_other_kernel_makes_other_object_files_and_an_unknown_target_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_any_other_kernel_makes_other_object_files_and_an_unknown_target_is_refused(tmp_path, monkeypatch):
     """Where the user chooses the folder of compiled code, it is the same for every version."""
     with pytest.raises(ValueError, match="linux-x64, linux-arm64, windows-x64"):
         objects_of("amiga", tmp_path)
@@ -83,9 +77,7 @@ def contents(path: Path) -> dict[Path, bytes]:
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
-    images: dict[str, Image], objects: Path, tmp_path: Path, form: str
-) -> None:
+def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(images, objects, tmp_path, form):
     place, (one, two, three, *_) = tmp_path / "bank", images.values()
     path = build_plugin([one, two], form, HERE, place, objects)
     assert held_in(path) == {one.id, two.id}
@@ -107,9 +99,7 @@ def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
         library.destroy_instances()
 
 
-def test_faults_of_disk_and_compiler_are_named_and_leave_nothing(
-    images: dict[str, Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_faults_of_disk_and_compiler_are_named_and_leave_nothing(images, objects, tmp_path, monkeypatch):
     def refused(error: type[Exception], words: str, folder: Path = tmp_path) -> None:
         with pytest.raises(error, match=words):
             build_plugin([*images.values()][:1], "clap", HERE, folder / "bank", objects)
@@ -131,9 +121,7 @@ def test_faults_of_disk_and_compiler_are_named_and_leave_nothing(
     assert [path for path in tmp_path.iterdir() if path.suffix != ".lock"] == []
 
 
-def test_what_a_killed_build_left_goes_with_the_next(
-    images: dict[str, Image], objects: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_killed_build_left_goes_with_the_next(images, objects, tmp_path, monkeypatch):
     def die(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -173,7 +161,7 @@ def respellings(name: str) -> list[str]:
     return [*forms, *others, *marks, words[:1].upper() + words[1:], f"{name} ", f" {name}"]
 
 
-def test_names_that_fold_alike_differ_and_plain_ones_keep_theirs() -> None:
+def test_names_that_fold_alike_differ_and_plain_ones_keep_theirs():
     names = {each for name in (*NAMES, *FACTORY) for each in (name, *respellings(name))}
     ids = {identifier(name) for name in names}
     assert len(ids) == len(names)
@@ -186,7 +174,7 @@ def test_names_that_fold_alike_differ_and_plain_ones_keep_theirs() -> None:
     assert identifier("My bass!") == f"{PREFIX}my-bass--b3dcc31a205f"  # songs find it by this
 
 
-def test_what_a_plug_in_holds_is_read_from_it_and_what_is_none_is_never_replaced(tmp_path: Path) -> None:
+def test_what_a_plug_in_holds_is_read_from_it_and_what_is_none_is_never_replaced(tmp_path):
     ids = {identifier(name) for name in NAMES}
     file, manifest = tmp_path / "bank.clap", tmp_path / "bank.lv2" / "manifest.ttl"
     noise = bytes(range(256)) * 50

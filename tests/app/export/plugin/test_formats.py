@@ -1,7 +1,5 @@
 """VST3 and LV2 in hosts of their own: they play what the CLAP plug-in plays, and keep to their interfaces."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct
@@ -55,7 +53,7 @@ def lv2(built: Built, images: dict[str, Image]) -> Iterator[Lv2]:
 
 
 @pytest.mark.parametrize("name", ("classical_guitar", "fretless_bass", "timpani"))
-def test_all_formats_play_the_same(bank: host.Library, vst3: vst3_host.Library, lv2: Lv2, name: str) -> None:
+def test_all_formats_play_the_same(bank, vst3, lv2, name):
     music, instance = piece(instrument_of(name)), active(vst3, name)
     wanted = played(active(bank, name), music)
     assert np.array_equal(played(instance, music, block=480), wanted)
@@ -64,9 +62,7 @@ def test_all_formats_play_the_same(bank: host.Library, vst3: vst3_host.Library, 
         assert np.array_equal(played(lv2(name), music, block=block), wanted)
 
 
-def test_impossible_rates_and_blocks_are_refused_and_unusual_ones_sound(
-    bank: host.Library, vst3: vst3_host.Library, lv2: Lv2
-) -> None:
+def test_impossible_rates_and_blocks_are_refused_and_unusual_ones_sound(bank, vst3, lv2):
     other, instance = bank.create_named(instrument_of(BASS).name), vst3.create_named(instrument_of(BASS).name)
     for rate_hz in IMPOSSIBLE_HZ:
         assert not other.accepts(rate_hz) and not instance.accepts(rate_hz)
@@ -82,7 +78,7 @@ def test_impossible_rates_and_blocks_are_refused_and_unusual_ones_sound(
     instance.destroy()
 
 
-def test_values_without_a_finite_number_are_ignored(bank: host.Library, vst3: vst3_host.Library, lv2: Lv2) -> None:
+def test_values_without_a_finite_number_are_ignored(bank, vst3, lv2):
     plain, other, instance = active(bank, BASS), active(bank, BASS), active(vst3, BASS)
     wanted, bad = (
         plain.render(4_096, [STRUCK]),
@@ -116,7 +112,7 @@ def test_values_without_a_finite_number_are_ignored(bank: host.Library, vst3: vs
 MACRO, SAVED = "macros.0", "classical_guitar"
 
 
-def test_ports_that_return_to_their_defaults_while_it_is_inactive_count(lv2: Lv2) -> None:
+def test_ports_that_return_to_their_defaults_while_it_is_inactive_count(lv2):
     music, instance = piece(instrument_of(BASS)), lv2(BASS)
     wanted, standard = played(lv2(BASS), music), instance.values.copy()
     instance.move("volume_db", -24.0)
@@ -144,7 +140,7 @@ ORDERS = (
 )
 
 
-def test_a_song_comes_back_as_it_was_saved_in_any_order(lv2: Lv2, moved: lv2_host.Instance) -> None:
+def test_a_song_comes_back_as_it_was_saved_in_any_order(lv2, moved):
     state, values, music = moved.save(), moved.values.copy(), piece(instrument_of(SAVED))
     moved.activate_again()  # as for another size of blocks
     wanted = played(moved, music, block=256)
@@ -186,9 +182,7 @@ def damaged(whole: bytes, draw: np.random.Generator) -> bytes:
     return changed[draw.integers(len(changed))]
 
 
-def test_damaged_states_are_refused_and_change_nothing(
-    bank: host.Library, vst3: vst3_host.Library, moved: lv2_host.Instance
-) -> None:
+def test_damaged_states_are_refused_and_change_nothing(bank, vst3, moved):
     draw, state = np.random.default_rng(4), moved.save()
     for _ in range(100):
         key = str(draw.choice(sorted(state)))
@@ -220,7 +214,7 @@ def share_of(name: str, shown: host.clap.ParamInfo, value: float) -> float:
     return known[name].share(value) if name in known else (value - shown.low) / (shown.high - shown.low)
 
 
-def test_parameters_are_the_clap_plug_in_s_and_macros_move_them(vst3: vst3_host.Library, bank: host.Library) -> None:
+def test_parameters_are_the_clap_plug_in_s_and_macros_move_them(vst3, bank):
     instrument, other, instance = instrument_of(SAVED), active(bank, SAVED), active(vst3, SAVED)
     shown, wanted = instance.parameters, other.parameters
 
@@ -249,7 +243,7 @@ def test_parameters_are_the_clap_plug_in_s_and_macros_move_them(vst3: vst3_host.
         each.destroy()
 
 
-def test_a_note_expression_tunes_one_note(vst3: vst3_host.Library) -> None:
+def test_a_note_expression_tunes_one_note(vst3):
     def sound(*notes: vst3_host.vst3.Event) -> Sound:
         return active(vst3, "jazz_guitar").block(4_000, [(0, note) for note in notes])
 
@@ -270,7 +264,7 @@ np.save(out, np.asarray(plugin(messages, duration=1.6, sample_rate=48_000, num_c
 """
 
 
-def test_pedalboard_plays_it(built: Built, bank: host.Library, tmp_path: Path) -> None:
+def test_pedalboard_plays_it(built, bank, tmp_path):
     python = os.environ.get("PEDALBOARD_PYTHON") or (sys.executable if find_spec("pedalboard") else "")
     if not python:
         pytest.skip("needs pedalboard; PEDALBOARD_PYTHON may be a Python that has it")

@@ -1,7 +1,5 @@
 """Plug-ins in a host: they sound as the app renders, in blocks of any size, and survive what hosts do."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -102,9 +100,7 @@ SOUNDS: list[tuple[str, int, Values | Turned]] = [
 
 @pytest.mark.parametrize("seed", range(12 if pieces.LONG else 1))
 @pytest.mark.parametrize(("name", "rate_hz", "turned"), SOUNDS)
-def test_it_sounds_as_the_app_renders(
-    bank: Library, name: str, rate_hz: int, turned: Values | Turned, seed: int, request: pytest.FixtureRequest
-) -> None:
+def test_it_sounds_as_the_app_renders(bank, name, rate_hz, turned, seed, request):
     """At any rate, with parameters and macros anywhere, of the model and of the truth."""
     instrument, instance = instrument_of(name), active(bank, name, rate_hz)
     draw = np.random.default_rng(zlib.crc32(request.node.name.encode()))
@@ -142,9 +138,7 @@ OF_BENDS = {101: 0, 100: 0, 6: 12}  # the range
         ("electric_bass", tuple((0.0, ControlChange(*each)) for each in OF_BENDS.items()), 0.0),
     ],
 )
-def test_it_follows_parameters_and_controllers_while_it_plays(
-    bank: Library, name: str, steps: tuple, settled_s: float
-) -> None:
+def test_it_follows_parameters_and_controllers_while_it_plays(bank, name, steps, settled_s):
     """Blows and plucks follow at once; drums that ring are heard at other places."""
     instrument = turned = instrument_of(name)
     instance, events, controls, changes = active(bank, name), list[Event](), [], []
@@ -169,7 +163,7 @@ def test_it_follows_parameters_and_controllers_while_it_plays(
     assert difference_db(sound, rendered(instrument)) > -60
 
 
-def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library) -> None:
+def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank):
     def bounced() -> Sound:
         instance = active(bank, MOVED)
         instance.go_offline()
@@ -179,7 +173,7 @@ def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank: Library) -> None:
     assert np.array_equal(bounced(), bounced())
 
 
-def test_values_are_words_which_lead_back(bank: Library) -> None:
+def test_values_are_words_which_lead_back(bank):
     instance = active(bank, MOVED)
     strokes, harmonic, volume = (instance.parameters[name] for name in ("strokes of strums", "harmonic", "volume"))
     assert [instance.text(strokes.id, value) for value in range(3)] == ["down", "up", "both"]
@@ -189,7 +183,7 @@ def test_values_are_words_which_lead_back(bank: Library) -> None:
     assert [instance.number(volume.id, text) for text in (b"-1e400 dB", b"inf")] == [volume.low, volume.high]
 
 
-def test_expressions_of_notes_are_what_bend_and_slide_of_a_member_are(bank: Library) -> None:
+def test_expressions_of_notes_are_what_bend_and_slide_of_a_member_are(bank):
     def in_host(timed: pieces.Timed, *more: Event) -> Sound:
         return played(active(bank, pieces.MEMBERS), timed, more=more, seconds=0.8)
 
@@ -206,7 +200,7 @@ def test_expressions_of_notes_are_what_bend_and_slide_of_a_member_are(bank: Libr
     assert np.array_equal(in_host(piece(instrument), *pressed), in_host(piece(instrument)))
 
 
-def test_blocks_of_any_size_and_neighbours_change_nothing(bank: Library) -> None:
+def test_blocks_of_any_size_and_neighbours_change_nothing(bank):
     music, neighbour = piece(instrument_of("cimbalom")), active(bank, "concert_harp")
     whole = played(active(bank, "cimbalom"), music)
     sound = played(active(bank, "cimbalom"), music, block=1, seconds=0.1)  # a block is a call from Python
@@ -219,7 +213,7 @@ def test_blocks_of_any_size_and_neighbours_change_nothing(bank: Library) -> None
 # State and presets
 
 
-def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> None:
+def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank):
     instrument, instance = instrument_of(MOVED), active(bank, MOVED)
     macro = instrument.macros[0]
     control = instance.parameters[macro.name]
@@ -239,7 +233,7 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
         assert difference_db(played(other, piece(instrument)), sound) < -80  # here a knob glided to where it was set
 
 
-def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank: Library) -> None:
+def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank):
     id, places, done, reported = host.presets(bank)
     assert (id, done) == (b"org.learned-strings.bank.presets", True)
     assert places == [(1, b"Instruments", host.IN_PLUGIN, None)]  # of the factory
@@ -257,7 +251,7 @@ def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank: Lib
 
 
 @pytest.mark.parametrize("name", (MOVED, "timpani"))
-def test_a_preset_brings_back_the_instrument_as_it_was(bank: Library, name: str) -> None:
+def test_a_preset_brings_back_the_instrument_as_it_was(bank, name):
     music, fresh = piece(instrument_of(name)), active(bank, name)
     state, sound = fresh.save(), played(fresh, music)
     key = bank.id_of(instrument_of(name).name)
@@ -280,7 +274,7 @@ def test_a_preset_brings_back_the_instrument_as_it_was(bank: Library, name: str)
             assert np.array_equal(played(instance, music), sound)
 
 
-def test_the_preset_of_another_instrument_is_refused(bank: Library) -> None:
+def test_the_preset_of_another_instrument_is_refused(bank):
     instance, other = active(bank, MOVED), active(bank, "timpani")
     own, foreign = (bank.id_of(instrument_of(name).name) for name in (MOVED, "timpani"))
     instance.block(512, [param(0, instance.parameters[instrument_of(MOVED).macros[0].name].id, 1.0)])
@@ -297,7 +291,7 @@ def test_the_preset_of_another_instrument_is_refused(bank: Library) -> None:
 # Notes, resets and other calls of a host
 
 
-def test_latency_tail_and_ends_of_notes_are_reported(bank: Library) -> None:
+def test_latency_tail_and_ends_of_notes_are_reported(bank):
     harp = active(bank, "concert_harp", 96_000)
     assert harp.latency == 96
     tail = harp.extension("clap.tail", host.clap.Frames).get(harp.at)
@@ -319,7 +313,7 @@ def ringing(bank: Library) -> Callable[..., float]:
     return level
 
 
-def test_a_choked_note_is_silent_at_once_and_others_ring_on(ringing: Callable[..., float]) -> None:
+def test_a_choked_note_is_silent_at_once_and_others_ring_on(ringing):
     both = note_on(0, 40, 120, note_id=1), note_on(0, 47, 120, note_id=2)
     rest, one = ringing(*both), ringing(*both, choke(4_800, note_id=1))
     assert ringing(*both, choke(4_800, note_id=1), choke(4_800, key=47)) < 0.01 * rest
@@ -337,16 +331,14 @@ def test_a_choked_note_is_silent_at_once_and_others_ring_on(ringing: Callable[..
         (lambda frame: midi(frame, 0x90, 40, 120), lambda frame: midi(frame, 0x80, 40, 64)),
     ],
 )
-def test_a_release_belongs_to_the_stroke_before_it(
-    ringing: Callable[..., float], on: Callable[[int], Event], off: Callable[[int], Event]
-) -> None:
+def test_a_release_belongs_to_the_stroke_before_it(ringing, on, off):
     struck = on(0), on(4_800)
     held = ringing(*struck)
     assert ringing(*struck, off(4_900)) == held  # of the first stroke
     assert ringing(*struck, off(4_900), off(6_000)) < 0.01 * held
 
 
-def test_tuning_one_note_leaves_the_others(bank: Library) -> None:
+def test_tuning_one_note_leaves_the_others(bank):
     def sound(*events: Event) -> Sound:
         return active(bank, "fretless_bass").render(9_600, events)  # without an amplifier sounds add
 
@@ -362,7 +354,7 @@ def test_tuning_one_note_leaves_the_others(bank: Library) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
+def test_after_a_reset_it_is_as_a_new_one(bank, name):
     instrument = instrument_of(name)
     instance, fresh = active(bank, name), active(bank, name)
     pedals = [midi(0, 0xE0, 0, 100), midi(0, 0xB0, 1, 90), midi(0, 0xB0, 64, 127), midi(0, 0xB1, 101, 0)]
@@ -388,7 +380,7 @@ def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
     assert np.array_equal(played(instance, piece(instrument)), wanted)
 
 
-def test_the_last_of_many_values_counts(bank: Library) -> None:
+def test_the_last_of_many_values_counts(bank):
     instance, other = (active(bank, "electric_bass") for _ in range(2))
     moved = [each for name, each in instance.parameters.items() if name not in ("Source", "volume")][:6]
     ends = [param(511, each.id, each.low + 0.4 * (each.high - each.low)) for each in moved]
@@ -413,7 +405,7 @@ def attack(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", (MOVED, "fretless_bass", *(("concert_harp", "timpani") if pieces.LONG else ())))
-def test_nothing_random_does_harm_or_allocates(built: Callable, attack: Path, bank: Library, name: str) -> None:
+def test_nothing_random_does_harm_or_allocates(built, attack, bank, name):
     seconds = 600 if pieces.LONG else 8  # of sound
     command = [attack, built("clap"), bank.id_of(instrument_of(name).name), str(seconds), "3"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -1,7 +1,5 @@
 """Instruments that are rendered without a model, as decaying sines at their own levels, and players of samples."""
 
-from __future__ import annotations
-
 import math
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """An export for samplers is whole or not at all, replaces only its own, and is as loud and large as reported."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable
 from functools import partial
@@ -35,9 +33,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_an_instrument_is_replaced_whole_with_its_samples_and_those_of_others_stay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_instrument_is_replaced_whole_with_its_samples_and_those_of_others_stay(tmp_path, monkeypatch):
     out, folder = tmp_path / "a b.sfz", tmp_path / "a_b_samples"
     assert export_sampled(small(), out, render).samples == 10
     before = contents(tmp_path)
@@ -59,9 +55,7 @@ def test_an_instrument_is_replaced_whole_with_its_samples_and_those_of_others_st
 
 
 @KINDS
-def test_what_a_killed_export_left_goes_with_the_next(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_killed_export_left_goes_with_the_next(kind, tmp_path, monkeypatch):
     with monkeypatch.context() as killed:
         killed.setattr("engine.whole_file.os.getpid", lambda: 999_999_999)
         killed.setattr("engine.whole_file.shutil.rmtree", lambda *_, **__: None)
@@ -72,9 +66,7 @@ def test_what_a_killed_export_left_goes_with_the_next(
     assert not left.exists()
 
 
-def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leaves_nothing(tmp_path, monkeypatch):
     reached_s, written, cancel = list[float](), list[int](), failing(Cancelled())
 
     def slow(*note: object, advanced: Callable[[float], None]) -> np.ndarray:
@@ -94,7 +86,7 @@ def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leave
 
 @KINDS
 @pytest.mark.parametrize("instrument_db", [-30.0, 20.0])
-def test_peak_and_gain_are_those_of_the_notes(kind: str, instrument_db: float, tmp_path: Path) -> None:
+def test_peak_and_gain_are_those_of_the_notes(kind, instrument_db, tmp_path):
     # of one width, so that levels follow amplitudes up to the hardest velocity, which is not rendered
     instrument = instrument_of(level_db=instrument_db, pluck={"width": 0.1, "width_hard": 0.1})
     report = export_sampled(small(instrument), tmp_path / f"a.{kind}", render)
@@ -114,14 +106,14 @@ def test_peak_and_gain_are_those_of_the_notes(kind: str, instrument_db: float, t
         (failing(ValueError("key 50 has no string")), "key 50 has no string"),
     ],
 )
-def test_a_note_that_cannot_be_rendered_is_reported(rendered: Callable, words: str, tmp_path: Path) -> None:
+def test_a_note_that_cannot_be_rendered_is_reported(rendered, words, tmp_path):
     with pytest.raises(WriteError, match=words):
         export_sampled(small(), tmp_path / "a.sfz", rendered)
     assert not list(tmp_path.iterdir())
 
 
 @KINDS
-def test_a_place_that_cannot_be_written_is_reported_before_the_work(kind: str, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_reported_before_the_work(kind, tmp_path):
     (tmp_path / f"a.{kind}").mkdir()
     (tmp_path / "file").write_bytes(b"")
     (tmp_path / "b_samples").mkdir()
@@ -138,7 +130,7 @@ def test_a_place_that_cannot_be_written_is_reported_before_the_work(kind: str, t
     ("kind", "form", "bits"),
     [("sfz", "wav", "16"), ("sfz", "wav", "24"), ("sfz", "flac", "16"), ("sfz", "flac", "24"), ("sf2", "flac", "24")],
 )
-def test_no_instrument_is_larger_than_reported(kind: str, form: str, bits: str, fields: dict, tmp_path: Path) -> None:
+def test_no_instrument_is_larger_than_reported(kind, form, bits, fields, tmp_path):
     plan, soundfont = small(instrument_of(**fields), format=form, bits=bits), kind == "sf2"
 
     def noise(instrument, key, velocity, held_s, seconds, rate_hz, *, advanced):

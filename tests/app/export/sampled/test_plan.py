@@ -1,7 +1,5 @@
 """What is planned for samplers: keys and velocities by sample, notes as they are stored, and levels between them."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace
@@ -28,7 +26,7 @@ WHOLE = instrument_of(range=(0, 127))
     st.integers(1, MOST_LAYERS),
 )
 @settings(max_examples=60, deadline=None)
-def test_each_key_and_velocity_has_one_zone(keys: tuple[int, int], every: int, layers: int) -> None:
+def test_each_key_and_velocity_has_one_zone(keys, every, layers):
     sounded = [
         (key, velocity)
         for zone in SampledPlan(WHOLE, keys, every, layers).zones
@@ -38,7 +36,7 @@ def test_each_key_and_velocity_has_one_zone(keys: tuple[int, int], every: int, l
     assert sorted(sounded) == [(k, v) for k in range(keys[0], keys[1] + 1) for v in range(1, 128)]
 
 
-def test_no_key_is_transposed_unless_asked() -> None:
+def test_no_key_is_transposed_unless_asked():
     assert {(zone.keys, zone.key) for zone in SampledPlan(instrument_of()).zones} == {
         ((key, key), key) for key in range(45, 65)
     }
@@ -48,7 +46,7 @@ def test_no_key_is_transposed_unless_asked() -> None:
 
 
 @pytest.mark.parametrize("every", [1, 3])
-def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every: int) -> None:
+def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every):
     plan = SampledPlan(instrument_of(pluck={"hardest_mm": 20.0}), layers=3, every=every)
     zones, glides = [zone for zone in plan.zones if 50 in zone.keys], glides_cents(plan.instrument)
     assert [zone.velocities for zone in zones] == [(1, 42), (43, 84), (85, 127)]
@@ -62,7 +60,7 @@ def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every: in
     assert SampledPlan(plan.instrument, layers=32, every=every).pitch_error_cents < 0.5 * plan.pitch_error_cents
 
 
-def test_a_string_that_does_not_glide_is_rendered_at_its_hardest() -> None:
+def test_a_string_that_does_not_glide_is_rendered_at_its_hardest():
     string = replace(WHOLE.strings.string, youngs_modulus_pa=0.0, second_moment_m4=0.0)
     plan = SampledPlan(instrument_of(strings=Fretted(string=string)), layers=3)
     assert [zone.velocity for zone in plan.zones if zone.key == 50] == [42, 84, 127]
@@ -88,12 +86,12 @@ WHITE = {"keymap": "12\n0\n127\n60\n69\n440.0\n12\n0\nx\n2\nx\n4\n5\nx\n7\nx\n9\
         (WHITE, {"keys": (49, 49)}, "keys: the instrument's tuning leaves all of them out"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(tuning: dict, choices: dict, reported: str) -> None:
+def test_what_cannot_be_is_refused_by_name(tuning, choices, reported):
     with pytest.raises(ValueError, match=re.escape(reported)):
         SampledPlan(instrument_of(tuning=tuning), **choices)
 
 
-def test_a_tuning_is_never_transposed_and_keys_that_it_leaves_out_have_no_sample() -> None:
+def test_a_tuning_is_never_transposed_and_keys_that_it_leaves_out_have_no_sample():
     assert SampledPlan(instrument_of(tuning=FIVE)).every == 1
     zones = SampledPlan(instrument_of(tuning=WHITE), (48, 59)).zones
     assert {zone.key for zone in zones} == {48, 50, 52, 53, 55, 57, 59}
@@ -107,7 +105,7 @@ def decaying(t60_s: float, seconds: float, level: float = 0.1) -> np.ndarray:
     return (level * 10 ** (-3 * time_s / t60_s) * np.sin(2 * np.pi * 220 * time_s))[:, None].astype(np.float32)
 
 
-def test_a_note_ends_where_it_is_silent_and_is_faded_out_where_it_still_rings() -> None:
+def test_a_note_ends_where_it_is_silent_and_is_faded_out_where_it_still_rings():
     sound, sample = sample_of(decaying(1.0, 3.0), RATE_HZ)
     assert not sample.cut
     assert len(sound) / RATE_HZ == pytest.approx(1.5 + 0.02, abs=0.01)  # 90 dB at 60 dB/s
@@ -124,7 +122,7 @@ def test_a_note_ends_where_it_is_silent_and_is_faded_out_where_it_still_rings() 
 
 
 @pytest.mark.parametrize("level", [1e-4, 0.1, 1.0, 3.0])
-def test_the_peak_is_full_and_the_gain_says_by_how_much(level: float) -> None:
+def test_the_peak_is_full_and_the_gain_says_by_how_much(level):
     rendered = decaying(1.0, 2.0, level)
     sound, sample = sample_of(rendered, RATE_HZ)
     peak_db = 20 * np.log10(np.abs(sound).max())
@@ -134,7 +132,7 @@ def test_the_peak_is_full_and_the_gain_says_by_how_much(level: float) -> None:
     assert round(sample.gain_db, 2) == sample.gain_db  # as an SFZ file says it
 
 
-def test_silence_is_a_sample_too_and_what_is_no_note_is_refused() -> None:
+def test_silence_is_a_sample_too_and_what_is_no_note_is_refused():
     sound, sample = sample_of(np.zeros((1000, 2), np.float32), RATE_HZ)
     assert sound.shape == (64, 2)
     assert not sound.any()
@@ -149,7 +147,7 @@ def test_silence_is_a_sample_too_and_what_is_no_note_is_refused() -> None:
 
 @pytest.mark.parametrize("form", ["flac", "wav"])
 @pytest.mark.parametrize(("bits", "error"), [("16", 2**-14), ("24", 2**-23)])
-def test_a_file_holds_the_sample_and_is_the_same_each_time(form: str, bits: str, error: float) -> None:
+def test_a_file_holds_the_sample_and_is_the_same_each_time(form, bits, error):
     sound, _ = sample_of(np.hstack([decaying(1.0, 0.2), decaying(0.5, 0.2)]), RATE_HZ)
     data = encoded(sound, RATE_HZ, form, bits)
     assert encoded(sound, RATE_HZ, form, bits) == data
@@ -175,7 +173,7 @@ def levels(instrument: Instrument, *measured_db: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("curve", [-0.5, 0.0, 0.5])
-def test_a_string_follows_its_plucks_at_every_velocity_also_where_a_layer_is_silent(curve: float) -> None:
+def test_a_string_follows_its_plucks_at_every_velocity_also_where_a_layer_is_silent(curve):
     instrument = instrument_of(pluck={"curve": curve})
     wanted = 20 * np.log10([instrument.pluck.pluck(velocity).amplitude_mm for velocity in range(128)])
     for layers in (1, 2, 3):
@@ -184,7 +182,7 @@ def test_a_string_follows_its_plucks_at_every_velocity_also_where_a_layer_is_sil
     np.testing.assert_allclose(levels(instrument, -120.0, -20.0), wanted - wanted[hardest] - 20)
 
 
-def test_what_was_measured_holds_where_it_was_and_beyond_it_is_as_steep_as_between_the_nearest_two() -> None:
+def test_what_was_measured_holds_where_it_was_and_beyond_it_is_as_steep_as_between_the_nearest_two():
     found = levels(instrument_of(), -40.0, -25.0, -22.0)
     first, second, third = rendered(instrument_of(), 3)
     assert list(found[[first, second, third]]) == pytest.approx([-40, -25, -22])
@@ -193,7 +191,7 @@ def test_what_was_measured_holds_where_it_was_and_beyond_it_is_as_steep_as_betwe
     assert found[127] - found[third] == pytest.approx(3 * (127 - third) / (third - second))
 
 
-def test_plucks_of_one_strength_differ_in_width_alone() -> None:
+def test_plucks_of_one_strength_differ_in_width_alone():
     instrument = instrument_of(pluck={"softest_mm": 2.0, "hardest_mm": 2.0})
     first, second = rendered(instrument, 2)
     between = levels(instrument, -30.0, -26.0)[first : second + 1]

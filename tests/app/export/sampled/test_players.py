@@ -1,7 +1,5 @@
 """Files for samplers as others play and read them: two samplers, sfzlint, and a SoundFont by its specification."""
 
-from __future__ import annotations
-
 import io
 import re
 import struct
@@ -43,9 +41,7 @@ NOTES = [(58, 127), (58, 1), (59, 20), (60, 42), (60, 43), (61, 84), (61, 100)]
         ("sf2", {"pluck": {"curve": 0.2}}, {}, 3.0),  # in a layer, dB over velocity are a straight line
     ],
 )
-def test_it_sounds_as_the_instrument_in_pitch_and_level(
-    kind: str, fields: dict, choices: dict, spread_db: float, tmp_path: Path
-) -> None:
+def test_it_sounds_as_the_instrument_in_pitch_and_level(kind, fields, choices, spread_db, tmp_path):
     instrument, out, offsets = instrument_of(**fields), tmp_path / f"a.{kind}", []
     seconds, part = SECONDS[kind], PARTS[kind]
     gain_db = export_sampled(small(instrument, seconds=seconds, **choices), out, render).gain_db
@@ -62,7 +58,7 @@ def test_it_sounds_as_the_instrument_in_pitch_and_level(
 
 
 @pytest.mark.parametrize("kind", PLAYERS)
-def test_a_released_key_falls_by_60_db_in_the_damping_time(kind: str, tmp_path: Path) -> None:
+def test_a_released_key_falls_by_60_db_in_the_damping_time(kind, tmp_path):
     t60_s, released_s = {"sfz": (0.1, 0.04), "sf2": (0.4, 0.2)}[kind]
     out, step_s = tmp_path / f"a.{kind}", 0.5 * t60_s
     export_sampled(small(instrument_of(damping={"release_t60_s": t60_s}), seconds=SECONDS[kind]), out, render)
@@ -75,7 +71,7 @@ def test_a_released_key_falls_by_60_db_in_the_damping_time(kind: str, tmp_path: 
     assert release_s(instrument_of(damping={"release_t60_s": longest})) < 100  # within the format's range
 
 
-def test_strings_that_ring_on_end_where_they_are_plucked_again(tmp_path: Path) -> None:
+def test_strings_that_ring_on_end_where_they_are_plucked_again(tmp_path):
     export_sampled(
         small(instrument_of(damping={"let_ring": True, "release_t60_s": 0.01})), tmp_path / "a.sfz", render
     )
@@ -97,7 +93,7 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("kind", PLAYERS)
-def test_a_shipped_instrument_sounds_as_the_note_itself(kind: str, tmp_path: Path) -> None:
+def test_a_shipped_instrument_sounds_as_the_note_itself(kind, tmp_path):
     harp = find_instrument("Concert harp").instrument.with_value("room.mix", 0.0)  # a string alone
     note = note_renderer(load_preset(find_preset(harp.preset)), "model")
     out, seconds = tmp_path / f"harp.{kind}", SECONDS[kind]
@@ -115,7 +111,7 @@ def test_a_shipped_instrument_sounds_as_the_note_itself(kind: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize(("key", "layers"), [(28, 2), (33, 4)])
-def test_a_note_starts_within_the_reported_error(key: int, layers: int, tmp_path: Path) -> None:
+def test_a_note_starts_within_the_reported_error(key, layers, tmp_path):
     """Rendered at the hardest velocity of its layer, a note would start about twice as far off."""
     bass = find_instrument("Electric bass").instrument.model_copy(
         update={"amp": Amp(), "body": BodyChoice(), "room": Room()}
@@ -163,7 +159,7 @@ def opcodes(text: str, name: str) -> list[str]:
         ({"level_db": 20.0, "damping": {"release_t60_s": 60.0}, "description": "Loud."}, {"layers": 32}),
     ],
 )
-def test_sfzlint_accepts_it_and_every_sample_is_there(fields: dict, choices: dict, tmp_path: Path) -> None:
+def test_sfzlint_accepts_it_and_every_sample_is_there(fields, choices, tmp_path):
     out, plan = tmp_path / "An instrument (2).sfz", small(instrument_of(**fields), **choices)
     export_sampled(plan, out, render)
     assert lint(out) == ""
@@ -229,7 +225,7 @@ HOSTILE = (
 )
 
 
-def test_no_name_becomes_a_path_or_an_opcode(tmp_path: Path) -> None:
+def test_no_name_becomes_a_path_or_an_opcode(tmp_path):
     for place, name in enumerate(HOSTILE):
         folder = tmp_path / str(place)
         folder.mkdir()
@@ -254,9 +250,7 @@ def test_no_name_becomes_a_path_or_an_opcode(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("points", "level_db"), [((0.2,), 20.0), ((0.2, 0.4), -30.0)])
-def test_the_tables_are_as_the_specification_has_them_and_the_whole_is_at_full_level(
-    points: tuple[float, ...], level_db: float, tmp_path: Path
-) -> None:
+def test_the_tables_are_as_the_specification_has_them_and_the_whole_is_at_full_level(points, level_db, tmp_path):
     written = {"name": "Häärp ñ 琴", "description": "Two lines."}
     plan = small(instrument_of(pickup={"points": points}, level_db=level_db, **written))
     export_sampled(plan, tmp_path / "a.sf2", render)
@@ -295,7 +289,7 @@ def test_the_tables_are_as_the_specification_has_them_and_the_whole_is_at_full_l
         ("a.wav", {}, r"a\.wav: must end with \.sfz or \.sf2"),
     ],
 )
-def test_plans_that_no_file_can_hold_are_reported_before(name: str, choices: dict, reported: str) -> None:
+def test_plans_that_no_file_can_hold_are_reported_before(name, choices, reported):
     whole = instrument_of(range=(0, 127))
     plan = small(whole, **choices)
     with pytest.raises(ValueError, match=reported):

@@ -1,9 +1,6 @@
 """Controls: what they say, report, paint and take from mouse and keys."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
@@ -45,7 +42,7 @@ from tests.app.gestures import (
 )
 
 
-def test_the_longest_wording_that_fits_is_shown_and_no_sign_is_taken_for_a_mnemonic(show: Callable[..., Any]) -> None:
+def test_the_longest_wording_that_fits_is_shown_and_no_sign_is_taken_for_a_mnemonic(show):
     label = show(ElidedLabel())
     wordings = ("1.305 s   106 Hz   -63.2 dB", "106 Hz   -63.2 dB", "-63.2 dB")
     label.say(*wordings)
@@ -60,7 +57,7 @@ def test_the_longest_wording_that_fits_is_shown_and_no_sign_is_taken_for_a_mnemo
     assert [menu.action[name].text() for name in ("undo", "redo")] == ["Undo: tension && length", "Redo"]
 
 
-def test_the_meter_is_painted_when_it_looks_another_way_and_not_all_the_time(show: Callable[..., Any]) -> None:
+def test_the_meter_is_painted_when_it_looks_another_way_and_not_all_the_time(show):
     meter = show(Meter())
     meter.resize(meter.sizeHint())
     QApplication.processEvents()
@@ -83,7 +80,7 @@ def test_the_meter_is_painted_when_it_looks_another_way_and_not_all_the_time(sho
     assert not meter.limit_light and picture(meter) == dark
 
 
-def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(qtbot: QtBot) -> None:
+def test_a_notice_is_reported_once_counted_when_it_repeats_and_kept(qtbot):
     bar = NoticeBar()
     for widget in (bar, bar.bell):
         qtbot.addWidget(widget)
@@ -133,7 +130,7 @@ def type_in(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key) -> None:
     qtbot.waitUntil(lambda: knob.findChild(QLineEdit) is None)
 
 
-def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot: QtBot, knob: Knob) -> None:
+def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot, knob):
     drags = reported(knob.drag_started, knob.drag_ended)
     qtbot.mousePress(knob, LEFT, pos=PRESSED)
     up = 0
@@ -154,7 +151,7 @@ def test_a_drag_goes_with_the_pointer_finer_with_shift_and_without_a_leap(qtbot:
     assert drags == [(), ()]
 
 
-def test_the_wheel_and_keys(knob: Knob) -> None:
+def test_the_wheel_and_keys(knob):
     for turned, held, value in (
         ((0, 120), NONE, 4.25),
         ((0, -240), NONE, 3.5),
@@ -193,7 +190,7 @@ def test_the_wheel_and_keys(knob: Knob) -> None:
         ("7 m", Key.Key_A, 4.0, "4.00 mm is kept"),  # no number has it: it plays
     ],
 )
-def test_a_number_is_typed(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key, value: float, words: str) -> None:
+def test_a_number_is_typed(qtbot, knob, text, end, value, words):
     QToolTip.hideText()
     qtbot.waitUntil(lambda: not QToolTip.isVisible())
     letters: list[str] = []
@@ -206,16 +203,14 @@ def test_a_number_is_typed(qtbot: QtBot, knob: Knob, text: str, end: Qt.Key, val
 
 @pytest.mark.parametrize("end", [Key.Key_Return, Key.Key_Escape])
 @pytest.mark.parametrize("reason", [Qt.FocusReason.MouseFocusReason, Qt.FocusReason.TabFocusReason])
-def test_the_focus_returns_where_it_was_brought(
-    qtbot: QtBot, knob: Knob, reason: Qt.FocusReason, end: Qt.Key
-) -> None:
+def test_the_focus_returns_where_it_was_brought(qtbot, knob, reason, end):
     knob.window().setFocus()
     knob.setFocus(reason)
     type_in(qtbot, knob, "7", end)
     assert QApplication.focusWidget() is (knob if reason == Qt.FocusReason.TabFocusReason else knob.window())
 
 
-def test_value_figure_and_bar_are_seen_and_said(qtbot: QtBot, knob: Knob) -> None:
+def test_value_figure_and_bar_are_seen_and_said(qtbot, knob):
     figures, pictures = reported(knob.figure_asked), [picture(knob)]
 
     def changed() -> str:
@@ -247,7 +242,7 @@ def type_over(qtbot: QtBot, box: QAbstractSpinBox, text: str) -> None:
     qtbot.keyClick(box, Qt.Key.Key_Return)
 
 
-def test_a_refused_text_leaves_the_value_and_presses_no_button(qtbot: QtBot, show: Callable[..., QDialog]) -> None:
+def test_a_refused_text_leaves_the_value_and_presses_no_button(qtbot, show):
     dialog, button = QDialog(), QPushButton("Do it", default=True)
     box = NumberBox("length", (0, 5), 0.65, "", " m", 3)
     column = QVBoxLayout(dialog)
@@ -267,7 +262,7 @@ def test_a_refused_text_leaves_the_value_and_presses_no_button(qtbot: QtBot, sho
     assert len(pressed) == 1 and box.value() == 1.2
 
 
-def test_counts_are_whole(qtbot: QtBot, show: Callable[..., CountBox]) -> None:
+def test_counts_are_whole(qtbot, show):
     box = show(CountBox("trials", 5000, 16, ""))
     for text, value in (("12", 12), ("2.5", 12), ("1 234", 1234), ("5001", 1234), ("0", 1234), ("8.0", 8), ("a", 8)):
         type_over(qtbot, box, text)
@@ -276,7 +271,7 @@ def test_counts_are_whole(qtbot: QtBot, show: Callable[..., CountBox]) -> None:
     assert box.value() == 9
 
 
-def test_a_note_is_typed_by_its_name_within_its_range(qtbot: QtBot, show: Callable[..., NoteBox]) -> None:
+def test_a_note_is_typed_by_its_name_within_its_range(qtbot, show):
     box = show(NoteBox("Lowest key", ""))
     box.setRange(40, 76)
     box.setValue(52)
@@ -326,7 +321,7 @@ def focus(widget: QWidget | None) -> None:
     QApplication.instance().focusChanged.emit(None, widget)  # type: ignore[union-attr]
 
 
-def test_a_list_takes_no_notes_and_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+def test_a_list_takes_no_notes_and_who_writes_is_left_alone(qtbot, window, hear):
     letters, box, line = hear("windows"), window.findChild(QComboBox), window.findChild(QLineEdit)
     for focused, heard, text, chosen in (
         (box, ["A", "a"], "", "first"),
@@ -339,7 +334,7 @@ def test_a_list_takes_no_notes_and_who_writes_is_left_alone(qtbot: QtBot, window
         assert (letters, line.text(), box.currentText()) == (heard, text, chosen)
 
 
-def test_a_held_key_is_reported_once_and_shortcuts_are_no_notes(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+def test_a_held_key_is_reported_once_and_shortcuts_are_no_notes(qtbot, window, hear):
     letters = hear("windows")
     qtbot.keyPress(window, Qt.Key.Key_S)
     for _ in range(5):
@@ -348,7 +343,7 @@ def test_a_held_key_is_reported_once_and_shortcuts_are_no_notes(qtbot: QtBot, wi
     assert letters == ["S"]
 
 
-def test_releases_and_repetitions(qtbot: QtBot, window: QWidget, hear: Hear) -> None:
+def test_releases_and_repetitions(qtbot, window, hear):
     """Of two keys together, as the platform gives them: with the key's code and the server's time."""
     for platforms, events, letters in (
         # on X11 a repetition looks like a release and a press

@@ -1,7 +1,5 @@
 """The listening test by keyboard: it runs, hides what must be hidden, and keeps a record."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from pathlib import Path
@@ -107,7 +105,7 @@ def saved(tmp_path: Path) -> AbxRecord:
     return AbxRecord.model_validate_json(path.read_bytes())
 
 
-def test_a_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_test_by_keyboard(qtbot, open_dialog, tmp_path, monkeypatch):
     heard: list[str] = []
 
     class Heard(Pair):
@@ -137,7 +135,7 @@ def test_a_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path, mon
     assert (record.a.gain_db, record.b.gain_db) == pytest.approx((0, -3.52), abs=0.02)
 
 
-def test_nothing_that_is_shown_depends_on_x(qtbot: QtBot, open_dialog: Open) -> None:
+def test_nothing_that_is_shown_depends_on_x(qtbot, open_dialog):
     """Two tests with another X: after the same keys the dialogs are the same, pixel by pixel, word by word."""
     seeds = [next(seed for seed in range(99) if "".join(draw_order(seed, 2)) == order) for order in ("AB", "BA")]
     seen: list[list[object]] = []
@@ -157,7 +155,7 @@ def test_nothing_that_is_shown_depends_on_x(qtbot: QtBot, open_dialog: Open) -> 
     assert seen[0][0] != seen[0][1]
 
 
-def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
+def test_a_test_that_is_stopped_is_incomplete(qtbot, open_dialog, tmp_path):
     dialog = open_dialog()
     start(dialog)
     press(qtbot, dialog, "x", "1")
@@ -177,9 +175,7 @@ def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, t
     assert not dialog.isVisible()
 
 
-def test_a_vanished_device_ends_it(
-    qtbot: QtBot, open_dialog: Open, sound: Sound, devices: list[AudioDevice], tmp_path: Path
-) -> None:
+def test_a_vanished_device_ends_it(qtbot, open_dialog, sound, devices, tmp_path):
     dialog = open_dialog()
     start(dialog)
     press(qtbot, dialog, "x", "1", "x")
@@ -190,7 +186,7 @@ def test_a_vanished_device_ends_it(
     assert saved(tmp_path).through["device"] == "Headphones"
 
 
-def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> None:
+def test_without_a_device_it_cannot_start(qtbot, open_dialog):
     with Sound() as silent:
         dialog = open_dialog(through=silent)
         qtbot.waitUntil(lambda: NO_DEVICE in texts(dialog))
@@ -207,9 +203,7 @@ def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> No
     ],
     ids=["same", "trivial", "apart", "runs away"],
 )
-def test_sounds_are_waited_for_and_a_test_without_a_point_is_reported(
-    qtbot: QtBot, open_dialog: Open, sounds: Sounds | Exception, message: str, can_start: bool
-) -> None:
+def test_sounds_are_waited_for_and_a_test_without_a_point_is_reported(qtbot, open_dialog, sounds, message, can_start):
     rendered: Future[Sounds] = Future()
     dialog = open_dialog(render=lambda rate_hz: rendered)
     qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
@@ -219,9 +213,7 @@ def test_sounds_are_waited_for_and_a_test_without_a_point_is_reported(
     assert start_button(dialog).isEnabled() == can_start
 
 
-def test_another_rate_is_rendered_again(
-    qtbot: QtBot, sound: Sound, devices: list[AudioDevice], open_dialog: Open
-) -> None:
+def test_another_rate_is_rendered_again(qtbot, sound, devices, open_dialog):
     asked: list[int] = []
     dialog = open_dialog(render=lambda rate_hz: asked.append(rate_hz) or done(sounds_of()))
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):
@@ -232,9 +224,7 @@ def test_another_rate_is_rendered_again(
     assert asked == [RATE_HZ, 44_100]
 
 
-def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
-    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(qtbot, open_dialog, tmp_path, monkeypatch):
     (tmp_path / "records").write_text("in the way")
     dialog = open_dialog(trials=1)
     start(dialog)

@@ -1,13 +1,9 @@
 """Audio settings are shown and asked for; help and about name everything that there is."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
-from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice
@@ -17,7 +13,6 @@ from app.shared.log import log_file
 from app.views.controls.app_menu import ENTRIES
 from app.views.dialogs.audio_dialog import AudioDialog
 from app.views.dialogs.help_dialog import HelpDialog, help_parts
-from app.window.controller import Controller
 from engine.models import MODELS as KNOWN_MODELS
 from engine.voices import Gap
 from tests.app.gestures import named, reported
@@ -28,9 +23,7 @@ PLAYING = SoundStatus(AudioDevice("Loud", "ALSA", 48_000), 48_000, 0.012, tuple(
 SILENT = SoundStatus(problem="It is in use by another program.")
 
 
-def test_choices_are_shown_and_asked_for_and_the_state_is_shown(
-    qtbot: QtBot, show: Callable[..., AudioDialog]
-) -> None:
+def test_choices_are_shown_and_asked_for_and_the_state_is_shown(qtbot, show):
     dialog, chosen = show(AudioDialog()), SoundChoice(rate_hz=48_000, buffer=512)
     dialog.show_devices([LOUD, SOFT], LOUD)
     dialog.show_sound(chosen)
@@ -64,7 +57,7 @@ def test_choices_are_shown_and_asked_for_and_the_state_is_shown(
     assert not named(dialog, "Left", QPushButton).isEnabled()
 
 
-def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller) -> None:
+def test_help_has_every_key_view_and_model(qtbot, controller):
     controller.window.action["help"].trigger()
     dialog = controller.window.findChild(HelpDialog)
     assert dialog.isVisible()

@@ -1,7 +1,5 @@
 """The export dialog: what its pages write, remember, and say when they cannot."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys
@@ -116,7 +114,7 @@ def made(open_at: Make, note: Callable[..., HeardNote | None]) -> Make:
     return opened
 
 
-def test_it_writes_the_named_file(qtbot: QtBot, made: Make, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_writes_the_named_file(qtbot, made, folder, monkeypatch):
     dialog = made()
     assert not dialog.show_folder.isVisible()
     run(qtbot, dialog, "Saved")
@@ -132,7 +130,7 @@ def test_it_writes_the_named_file(qtbot: QtBot, made: Make, folder: Path, monkey
     assert opened == [str(folder)]
 
 
-def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot: QtBot, made: Make, folder: Path) -> None:
+def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot, made, folder):
     dialog = made({"format": "wav 32f"})
     edit, form = dialog.note.file.edit, dialog.wav["format"]
     choose(form, "flac 16")
@@ -149,7 +147,7 @@ def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot: QtBot
     assert edit.text() == str(folder / "mine.wav"), "a name that was given keeps its stem"
 
 
-def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made: Make, folder: Path) -> None:
+def test_both_become_two_files_which_are_named_before(qtbot, made, folder):
     dialog = made({"source": "files"}, stereo=True, listen_right=0.7, pickup="velocity")
     names = ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
     assert dialog.note.names.text() == "\n".join(names)
@@ -166,9 +164,7 @@ def test_both_become_two_files_which_are_named_before(qtbot: QtBot, made: Make, 
     assert dialog.note.names.isHidden()
 
 
-def test_it_follows_another_pluck_until_it_begins_and_cancel_leaves_nothing(
-    qtbot: QtBot, made: Make, note: Callable[..., HeardNote | None], folder: Path
-) -> None:
+def test_it_follows_another_pluck_until_it_begins_and_cancel_leaves_nothing(qtbot, made, note, folder):
     dialog = made()
     dialog.show_subjects({"note": note(amplitude_mm=0.01, heard="b")})
     assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
@@ -200,8 +196,8 @@ def test_it_follows_another_pluck_until_it_begins_and_cancel_leaves_nothing(
     ],
 )
 def test_the_sound_that_is_heard_is_offered_first_and_the_choices_are_remembered(
-    made: Make, remembered: dict[str, object], heard: dict[str, object], source: str, preset: str
-) -> None:
+    made, remembered, heard, source, preset
+):
     dialog = made(remembered, **heard)
     page = dialog.note
     assert page["source"].currentData() == source
@@ -214,7 +210,7 @@ def test_the_sound_that_is_heard_is_offered_first_and_the_choices_are_remembered
     assert made(choices.model_dump(), **heard).choices()[0] == choices
 
 
-def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot: QtBot, made: Make, folder: Path) -> None:
+def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot, made, folder):
     dialog = made({}, instrument=GUITAR)
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
@@ -266,7 +262,7 @@ def sampler(open_at: Make, preset: PresetEntry, notes: Notes) -> Make:
     return opened
 
 
-def test_an_sfz_is_written_as_it_was_reported(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes) -> None:
+def test_an_sfz_is_written_as_it_was_reported(qtbot, sampler, folder, notes):
     dialog = sampler(rate_hz=44_100, source="truth", form="wav", bits="16")
     assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.sampler.size_text.text()
     run(qtbot, dialog, "Saved")
@@ -280,7 +276,7 @@ def test_an_sfz_is_written_as_it_was_reported(qtbot: QtBot, sampler: Make, folde
     assert dialog.save.text() == "Replace"
 
 
-def test_size_and_error_of_pitch_follow_the_choices(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes) -> None:
+def test_size_and_error_of_pitch_follow_the_choices(qtbot, sampler, folder, notes):
     dialog = sampler()
     form, text = dialog.sampler, dialog.sampler.size_text.text
     for box, value, words in (
@@ -316,7 +312,7 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("words", IMPOSSIBLE)
-def test_impossible_choices_are_reported(qtbot: QtBot, sampler: Make, folder: Path, notes: Notes, words: str) -> None:
+def test_impossible_choices_are_reported(qtbot, sampler, folder, notes, words):
     dialog = sampler()
     form = dialog.sampler
     IMPOSSIBLE[words](form, folder)
@@ -333,9 +329,7 @@ def test_impossible_choices_are_reported(qtbot: QtBot, sampler: Make, folder: Pa
     assert len(notes) == 3
 
 
-def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(
-    sampler: Make, folder: Path, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_named_after_the_instrument_and_ends_as_its_format(sampler, folder, preset, monkeypatch):
     dialog = sampler()
     dialog.show_subjects({"sampler": HeardInstrument(HARP, preset)})
     file = dialog.sampler.file
@@ -368,9 +362,7 @@ def plugin(open_at: Make, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch, 
     return open_at("plugin", HeardInstrument(GUITAR, preset), ExportChoices(), SampledChoices())
 
 
-def test_a_plug_in_is_built_where_hosts_look_and_losses_said(
-    qtbot: QtBot, plugin: ExportDialog, folder: Path
-) -> None:
+def test_a_plug_in_is_built_where_hosts_look_and_losses_said(qtbot, plugin, folder):
     page = plugin.plugin
     assert set(PLUGIN_NAMES) == set(FORMATS)
     choose(page["form"], "vst3")

@@ -1,7 +1,5 @@
 """The strip: its bar, the string's knobs on demand, and the browser of instruments."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -54,7 +52,7 @@ def click(qtbot: QtBot, panel: InstrumentPanel, name: str) -> None:
     qtbot.mouseClick(named(panel, name, QAbstractButton), LEFT)
 
 
-def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_either_surface_is_played_and_sees_what_sounds(qtbot, panel):
     for name, words, surface in (("neck", "Surface: Strings", panel.neck), ("keys", "Surface: Keys", panel.keys)):
         click(qtbot, panel, words)
         assert panel.surface == name and surface.isVisible()
@@ -67,7 +65,7 @@ def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: Inst
         panel.show_surface("neck")
 
 
-def test_in_a_low_window_the_strings_knobs_take_the_place_of_the_keys(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_in_a_low_window_the_strings_knobs_take_the_place_of_the_keys(qtbot, panel):
     hint, facts = panel.findChild(QLabel, "hint"), panel.knobs.facts
     panel.set_low(True)
     height = panel.sizeHint().height()
@@ -86,7 +84,7 @@ def test_in_a_low_window_the_strings_knobs_take_the_place_of_the_keys(qtbot: QtB
         assert panel.findChild(QStackedWidget).isVisible()
 
 
-def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button(qtbot, panel):
     chosen, switched = reported(panel.touch_chosen), reported(panel.technique_switched)
     for part, names in ((panel.touch, "legato slide pluck"), (panel.techniques, "strum tremolo strum harmonics")):
         for name in names.split():
@@ -108,7 +106,7 @@ def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button(qtbot: QtBot, pa
     assert not panel.touch.isEnabled() and not panel.techniques.isEnabled()
 
 
-def test_macros_are_those_of_the_instrument_and_say_what_they_change(bar: InstrumentBar, guitar: Instrument) -> None:
+def test_macros_are_those_of_the_instrument_and_say_what_they_change(bar, guitar):
     def shown(*macros: Macro) -> int:
         bar.show_instrument(guitar.model_copy(update={"macros": macros}), own=True)
         return sum(knob.isVisible() for knob in bar.macros)
@@ -127,9 +125,7 @@ def test_macros_are_those_of_the_instrument_and_say_what_they_change(bar: Instru
     assert (shown(*[macro] * 8), shown()) == (8, 0)
 
 
-def test_the_record_button_and_the_menu_beside_it(
-    qtbot: QtBot, bar: InstrumentBar, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_record_button_and_the_menu_beside_it(qtbot, bar, monkeypatch):
     for seconds, text in ((73.4, "■  1:13"), (3.0, "■  0:03"), (-0.2, "■  −1"), (-1.5, "■  −2"), (None, "●  Record")):
         bar.show_recording(seconds)
         assert (bar.record.text(), bar.record.isChecked()) == (text, seconds is not None)
@@ -152,7 +148,7 @@ def test_the_record_button_and_the_menu_beside_it(
         qtbot.mouseClick(bar.record, LEFT)
 
 
-def test_a_scale_is_chosen_shown_by_name_and_left_again(bar: InstrumentBar, guitar: Instrument) -> None:
+def test_a_scale_is_chosen_shown_by_name_and_left_again(bar, guitar):
     keymap = "2\n0\n127\n60\n69\n440\n2\n0\n1\n"
     actions = {each.text(): each for each in bar.scale.menu().actions()}
     asked = reported(bar.scale_asked)
@@ -179,9 +175,7 @@ def knobs(show: Callable[..., StringKnobs], guitar: Instrument) -> StringKnobs:
     return made
 
 
-def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(
-    knobs: StringKnobs, guitar: Instrument
-) -> None:
+def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(knobs, guitar):
     stereo = guitar.model_copy(update={"pickup": Pickup(points=(0.1, 0.6))})
     knobs.show_instrument(stereo)
     metrics = QFontMetrics(theme.small_font(9, grows=False))
@@ -196,7 +190,7 @@ def test_every_field_is_shown_can_be_turned_to_both_ends_and_its_name_fits(
     assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
 
 
-def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs, guitar: Instrument) -> None:
+def test_gestures_are_reported_with_their_field(qtbot, knobs, guitar):
     asked = reported(knobs.changed)
     press_keys(knobs.knobs["knobs.gauge"], Key.Key_Up)
     knobs.knobs["tuning.transpose"].value_asked.emit(2.6)  # by whole keys
@@ -217,9 +211,7 @@ def test_gestures_are_reported_with_their_field(qtbot: QtBot, knobs: StringKnobs
     assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Rounded"]
 
 
-def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
-    knobs: StringKnobs, guitar: Instrument
-) -> None:
+def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs, guitar):
     keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
     changes = {"pluck.shape": "triangular", "damping.let_ring": True, "tuning.keymap": keymap}
     dead = guitar.model_dump()
@@ -236,7 +228,7 @@ def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(
     assert not knobs.shape.isEnabled(), "drums have no pluck to shape"
 
 
-def test_knobs_hidden_while_text_grew_have_their_room(show: Callable[..., Sideways], own_look: QApplication) -> None:
+def test_knobs_hidden_while_text_grew_have_their_room(show, own_look):
     knobs = StringKnobs()
     row = show(Sideways(knobs), 700, 200)
     row.hide()
@@ -291,7 +283,7 @@ def chosen(browser: Browser) -> list[str]:
     return reported(browser.chosen)
 
 
-def test_words_in_any_order_category_owner_and_favourites_filter(browser: Browser) -> None:
+def test_words_in_any_order_category_owner_and_favourites_filter(browser):
     for words, name, key, listed in (
         ("BRASS harp", "", "", ["harp of brass"]),
         ("long", "", "", ["steel"]),
@@ -313,7 +305,7 @@ def test_words_in_any_order_category_owner_and_favourites_filter(browser: Browse
     assert browser.listed, "closed without any, next and previous would lead nowhere"
 
 
-def test_arrows_load_and_play_and_a_hit_is_only_shown(qtbot: QtBot, browser: Browser, chosen: list[str]) -> None:
+def test_arrows_load_and_play_and_a_hit_is_only_shown(qtbot, browser, chosen):
     with qtbot.waitSignal(browser.played) as heard:
         for _ in range(3):
             press_keys(browser.search if not chosen else browser.list, Key.Key_Down)
@@ -329,7 +321,7 @@ def test_arrows_load_and_play_and_a_hit_is_only_shown(qtbot: QtBot, browser: Bro
     assert asked[1:] == chosen[3:] == ["harp of brass"]
 
 
-def test_a_hit_by_name_is_better_than_one_by_description(qtbot: QtBot, browser: Browser, guitar: Instrument) -> None:
+def test_a_hit_by_name_is_better_than_one_by_description(qtbot, browser, guitar):
     entries = [entry(guitar, "bass", description="Starts sharp"), entry(guitar, "nylon"), entry(guitar, "brass harp")]
     fill(browser, entries, "nylon")
     for words, selected in (("harp", "brass harp"), ("starts", "bass")):
@@ -342,7 +334,7 @@ def test_a_hit_by_name_is_better_than_one_by_description(qtbot: QtBot, browser: 
     assert browser.selected == "bass" and "<b>bass</b>" in browser.card.text()
 
 
-def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: QtBot, browser: Browser) -> None:
+def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot, browser):
     renamed, deleted = reported(browser.rename_asked), reported(browser.delete_asked)
     assert not browser.rename.isVisible() and not browser.delete.isVisible()
     browser.set_chosen("mine")

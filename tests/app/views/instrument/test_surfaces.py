@@ -1,14 +1,11 @@
 """Neck and keys: where and how they are touched is what is played, and what sounds is seen on them."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtWidgets import QWidget
-from pytestqt.qtbot import QtBot
 
 from app.playing.keys import SoundingNote
 from app.shared.key_names import note_name
@@ -62,14 +59,14 @@ def on(neck: Neck, string: int, fret: int, share: float = 0.5) -> QPoint:
     return QPointF(cell.center().x(), cell.top() + share * cell.height()).toPoint()
 
 
-def test_frets_lie_where_those_of_a_string_do() -> None:
+def test_frets_lie_where_those_of_a_string_do():
     assert (fret_share(0, 24), fret_share(24, 24)) == (0, 1)
     assert fret_share(12, 24) == pytest.approx(0.5 / 0.75)  # half of the string, of three quarters
     gaps = [fret_share(n + 1, 24) - fret_share(n, 24) for n in range(24)]
     assert all(b / a == pytest.approx(2 ** (-1 / 12)) for a, b in itertools.pairwise(gaps))
 
 
-def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+def test_a_click_is_the_note_of_its_string_and_fret(qtbot, neck, notes):
     pressed, keys = reported(neck.pressed), []
     for string, fret in ((0, 0), (0, 5), (3, 2), (5, 12), (5, 22)):
         qtbot.mouseClick(neck, LEFT, pos=on(neck, string, fret))
@@ -97,7 +94,7 @@ def lit_x(neck: Neck, string: int) -> float:
     return lit[0] / image.width() if lit else float("nan")
 
 
-def test_a_note_is_seen_on_the_highest_string_at_or_below_it_and_slides_on_its_own(neck: Neck) -> None:
+def test_a_note_is_seen_on_the_highest_string_at_or_below_it_and_slides_on_its_own(neck):
     for key, string in ((40, 0), (44, 0), (45, 1), (58, 3), (59, 4), (86, 5), (30, 0)):
         assert neck.string_of(key) == string
     neck.show_notes([SoundingNote(52, 1.0)])  # the second fret of D
@@ -112,7 +109,7 @@ def test_a_note_is_seen_on_the_highest_string_at_or_below_it_and_slides_on_its_o
     assert on_the_way == sorted(on_the_way) and on_the_way[-1] < last
 
 
-def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot, neck, notes):
     pressed, chord = reported(neck.pressed), [42, 47, 52, 57, 61, 66]
     qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
     qtbot.mouseMove(neck, on(neck, 3, 2))  # a fast mouse is seen at few places
@@ -130,7 +127,7 @@ def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, 
 
 
 @pytest.mark.parametrize("legato", [False, True])
-def test_a_drag_along_a_string_takes_its_note_over_in_legato(neck: Neck, notes: Notes, legato: bool) -> None:
+def test_a_drag_along_a_string_takes_its_note_over_in_legato(neck, notes, legato):
     neck.legato = legato
     drag(neck, on(neck, 0, 1), on(neck, 0, 3))
     moved = [("on", 43), ("off", 41)]
@@ -138,9 +135,7 @@ def test_a_drag_along_a_string_takes_its_note_over_in_legato(neck: Neck, notes: 
 
 
 @pytest.mark.parametrize(("button", "modifier"), [(RIGHT, NONE), (LEFT, SHIFT)])
-def test_a_chord_is_fingered_silently_then_strummed(
-    qtbot: QtBot, neck: Neck, notes: Notes, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
-) -> None:
+def test_a_chord_is_fingered_silently_then_strummed(qtbot, neck, notes, button, modifier):
     bare = picture(neck)
     for string, fret in ((1, 3), (2, 2), (3, 5), (4, 1)):  # C, and a wrong finger on G
         qtbot.mouseClick(neck, button, modifier, on(neck, string, fret))
@@ -156,7 +151,7 @@ def test_a_chord_is_fingered_silently_then_strummed(
     assert neck.fingers == {}, "fingers leave with their strings"
 
 
-def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Neck, notes: Notes) -> None:
+def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot, neck, notes):
     up, down, left, right = Key.Key_Up, Key.Key_Down, Key.Key_Left, Key.Key_Right
     press_keys(neck, *[down] * 9, *[left] * 30, right)
     assert neck.chosen == (41, 5)  # F on the lowest string
@@ -194,7 +189,7 @@ def spot(keys: PianoKeys, key: int, share: float = 0.9) -> QPoint:
     return QPointF(rect.center().x(), rect.top() + share * rect.height()).toPoint()
 
 
-def test_every_key_is_found_where_it_is_drawn(keys: PianoKeys) -> None:
+def test_every_key_is_found_where_it_is_drawn(keys):
     for key in range(36, 96):
         assert keys.key_at(QPointF(spot(keys, key))) == key, note_name(key)
     assert keys.key_at(QPointF(-1, 5)) is None
@@ -207,7 +202,7 @@ def test_every_key_is_found_where_it_is_drawn(keys: PianoKeys) -> None:
         assert (first % 12, last % 12) == (0, 11)
 
 
-def test_lower_on_a_key_is_harder(qtbot: QtBot, keys: PianoKeys, played: Notes) -> None:
+def test_lower_on_a_key_is_harder(qtbot, keys, played):
     pressed = reported(keys.pressed)
     assert is_black(66)
     for key, share in ((64, 0.0), (64, 0.5), (64, 0.99), (66, 0.97)):
@@ -218,7 +213,7 @@ def test_lower_on_a_key_is_harder(qtbot: QtBot, keys: PianoKeys, played: Notes) 
     assert played == [(what, key) for key in (64, 64, 64, 66) for what in ("on", "off")]
 
 
-def test_a_drag_is_a_glissando(qtbot: QtBot, keys: PianoKeys, played: Notes) -> None:
+def test_a_drag_is_a_glissando(qtbot, keys, played):
     qtbot.mousePress(keys, LEFT, pos=spot(keys, 60))
     for key in (60, 62, 64):
         qtbot.mouseMove(keys, spot(keys, key))
@@ -228,9 +223,7 @@ def test_a_drag_is_a_glissando(qtbot: QtBot, keys: PianoKeys, played: Notes) -> 
 
 
 @pytest.mark.parametrize(("button", "modifier"), [(RIGHT, NONE), (LEFT, SHIFT)])
-def test_a_key_that_is_held_stays_until_it_is_clicked_so_again(
-    qtbot: QtBot, keys: PianoKeys, played: Notes, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
-) -> None:
+def test_a_key_that_is_held_stays_until_it_is_clicked_so_again(qtbot, keys, played, button, modifier):
     qtbot.mouseClick(keys, button, modifier, spot(keys, 60))
     assert (played, keys.held) == ([("on", 60)], {60})
     qtbot.mouseClick(keys, LEFT, pos=spot(keys, 60))  # plucks it again, and it stays
@@ -240,9 +233,7 @@ def test_a_key_that_is_held_stays_until_it_is_clicked_so_again(
 
 
 @pytest.mark.parametrize("end", ["release_all", "another range", "hide"])
-def test_each_stroke_is_released_however_it_was_struck(
-    qtbot: QtBot, keys: PianoKeys, played: Notes, end: str
-) -> None:
+def test_each_stroke_is_released_however_it_was_struck(qtbot, keys, played, end):
     qtbot.mouseClick(keys, RIGHT, pos=spot(keys, 60))
     qtbot.mousePress(keys, LEFT, pos=spot(keys, 59))
     for key in (60, 62, 60):  # a glissando over the key that is held
@@ -253,9 +244,7 @@ def test_each_stroke_is_released_however_it_was_struck(
         assert played.count(("on", key)) == played.count(("off", key)) > 0
 
 
-def test_keys_without_a_string_are_grey_and_sounding_ones_bright(
-    qtbot: QtBot, keys: PianoKeys, played: Notes
-) -> None:
+def test_keys_without_a_string_are_grey_and_sounding_ones_bright(qtbot, keys, played):
     for key in (39, 87):
         qtbot.mouseClick(keys, LEFT, pos=spot(keys, key))
     assert played == []
@@ -269,7 +258,7 @@ def test_keys_without_a_string_are_grey_and_sounding_ones_bright(
     assert colours[2:] == [theme.MODEL, theme.TRUTH] and len(set(colours)) == 4
 
 
-def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, played: Notes) -> None:
+def test_arrows_choose_a_key_and_enter_plays_it(qtbot, keys, played):
     keys.activateWindow()
     keys.setFocus()
     qtbot.waitUntil(keys.hasFocus)

@@ -1,7 +1,5 @@
 """Plots: their line, axes, legend and table, and what spectrum and waveform draw of a signal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -13,7 +11,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 
 from app.analysis.moment import StringFrame
 from app.presets.library import Library
@@ -60,7 +57,7 @@ def line_columns(plot: TimePlot) -> list[int]:
     return list(np.flatnonzero((pixels(plot) == QColor(theme.TEXT).rgb()).sum(axis=0) > 100))
 
 
-def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot: QtBot, plot: TimePlot) -> None:
+def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot, plot):
     plot.move_line(9.0)
     without, paints, places = pixels(plot), Paints(plot.viewport()), []
     for at in (0.8, 2.0, 3.2):
@@ -88,7 +85,7 @@ def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot
         assert (pixels(plot) == whole).all()
 
 
-def test_the_keyboard_seeks_and_zooms_and_a_click_reports_its_place(qtbot: QtBot, plot: TimePlot) -> None:
+def test_the_keyboard_seeks_and_zooms_and_a_click_reports_its_place(qtbot, plot):
     asked = reported(plot.seek_asked)
     plot.show_playhead(1.0)
     press_keys(plot, Key.Key_Right, Key.Key_Left, Key.Key_Home)
@@ -112,7 +109,7 @@ def test_the_keyboard_seeks_and_zooms_and_a_click_reports_its_place(qtbot: QtBot
     assert points[0] == pytest.approx((2.0, 0.25), abs=0.02)
 
 
-def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(qtbot: QtBot, plot: TimePlot) -> None:
+def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(qtbot, plot):
     place, view = place_of(plot, 3.0, 0.5), plot.viewport()
     for steps, length_s in ((4, 4 / 1.25**4), (60, 0.002), (-100, 4)):
         turn_wheel(view, place, QPoint(0, 120 * steps))
@@ -129,7 +126,7 @@ def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(q
     qtbot.mouseRelease(view, RIGHT, pos=end)
 
 
-def test_the_view_stays_for_a_take_of_the_same_length_and_training_is_seen(qtbot: QtBot, plot: TimePlot) -> None:
+def test_the_view_stays_for_a_take_of_the_same_length_and_training_is_seen(qtbot, plot):
     assert (plot.horizon.isVisible(), plot.horizon.value()) == (True, 0.25)
     shaded, unshaded = (
         pixels(plot)[place_of(plot, time_s, 0.9).y(), place_of(plot, time_s, 0.9).x()] for time_s in (0.12, 2.0)
@@ -153,7 +150,7 @@ def numbers(axis: pg.AxisItem) -> dict[str, float]:
     return {text: y for y, text in written}
 
 
-def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot: QtBot, show: Show) -> None:
+def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot, show):
     for room, kept in ((1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))):
         assert [text for _, text in sparse(TICKS, room)] == [str(number) for number in kept], "the ends go last"
     assert sparse([], 1) == []
@@ -183,7 +180,7 @@ def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbo
         assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
 
 
-def test_the_legend_stands_in_the_corner_and_gives_way(qtbot: QtBot, show: Show) -> None:
+def test_the_legend_stands_in_the_corner_and_gives_way(qtbot, show):
     plot = show(pg.PlotWidget(), 900, 200)
     legend, seen = Legend(plot), {}
     long = "Classical guitar, nylon B3, plucked anywhere"
@@ -209,7 +206,7 @@ def table(show: Show) -> FiguresTable:
     return made
 
 
-def test_figures_are_sorted_as_numbers_none_last_and_copied_so(table: FiguresTable) -> None:
+def test_figures_are_sorted_as_numbers_none_last_and_copied_so(table):
     for column, order, keys in ((0, "Ascending", "abc"), (1, "Ascending", "cba"), (1, "Descending", "bca")):
         table.sortByColumn(column, getattr(Qt.SortOrder, f"{order}Order"))
         assert "".join(row.key for row in table.rows) == keys
@@ -217,7 +214,7 @@ def test_figures_are_sorted_as_numbers_none_last_and_copied_so(table: FiguresTab
     assert QGuiApplication.clipboard().text() == "name\tlevel\nb\t2.12345\nc\t-10.0\na\t\n"
 
 
-def test_rows_are_chosen_by_keys_and_clicks_and_stay_chosen(qtbot: QtBot, table: FiguresTable) -> None:
+def test_rows_are_chosen_by_keys_and_clicks_and_stay_chosen(qtbot, table):
     asked = reported(table.row_entered, table.row_deleted, table.escaped, table.row_clicked, table.row_double_clicked)
     table.choose("a")
     press_keys(table, Key.Key_Down, Key.Key_Return, Key.Key_Delete, Key.Key_Escape)
@@ -233,7 +230,7 @@ def test_rows_are_chosen_by_keys_and_clicks_and_stay_chosen(qtbot: QtBot, table:
 
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])
 @pytest.mark.parametrize("level_db", [0.0, -40.0])
-def test_a_sine_shows_its_level_at_its_frequency(rate_hz: int, level_db: float) -> None:
+def test_a_sine_shows_its_level_at_its_frequency(rate_hz, level_db):
     analyser = Analyser(rate_hz)
     time_s = np.arange(analyser.window_frames) / rate_hz
     signal = 10 ** (level_db / 20) * np.sin(2 * np.pi * 997 * time_s)
@@ -243,7 +240,7 @@ def test_a_sine_shows_its_level_at_its_frequency(rate_hz: int, level_db: float) 
     assert (analyser.level_db(np.zeros(10, np.float32)) == -130).all()
 
 
-def test_extremes_keep_every_peak_without_gaps_or_beats() -> None:
+def test_extremes_keep_every_peak_without_gaps_or_beats():
     signal = np.zeros(100_000, np.float32)
     signal[12_345], signal[67_890] = 1, -1
     values = extremes(signal, np.linspace(0, 100_000, 1001).astype(int))
@@ -271,7 +268,7 @@ def drawn(panel: WaveformPanel | SpectrumPanel) -> pg.PlotDataItem:
     return panel.plot.getPlotItem().listDataItems()[0]
 
 
-def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(waveform: WaveformPanel) -> None:
+def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(waveform):
     signal, columns = np.sin(np.arange(48_000, dtype=np.float32)), waveform.plot.columns
 
     def shown(frames: int) -> tuple[NDArray[np.float64], object]:
@@ -290,7 +287,7 @@ def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(wa
     assert len(shown(10)[0]) == 0, "nothing of what is in view"
 
 
-def test_animated_plots_survive(qtbot: QtBot, waveform: WaveformPanel, show: Callable[..., Any]) -> None:
+def test_animated_plots_survive(qtbot, waveform, show):
     """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
     spectrum, string = (show(view, 600, 240) for view in (SpectrumPanel(Session(), Library([])), StringView()))
     spectrum.set_rate(16_000)

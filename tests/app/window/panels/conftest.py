@@ -1,7 +1,5 @@
 """A panel with a take of known motion, and what its plots show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

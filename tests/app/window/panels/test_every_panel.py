@@ -1,18 +1,13 @@
 """Laws of every panel of the registry, and of the jobs that panels compute."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable
 from threading import Event
 
 import pytest
 from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QAbstractButton, QTabBar, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
-from app.rendering import Take
 from app.session.choices import Choices
 from app.shared.worker import Job
 from app.stage.session import Session
@@ -20,8 +15,7 @@ from app.window.panels import Moment, Panel, StringPanel, base
 from app.window.panels.drum import DrumPanel
 from app.window.panels.rack import LEFT, RIGHT
 from tests.app.gestures import reported
-from tests.app.window.driver import KEY, Window, by_arrows, fits, tab_stops
-from tests.app.window.panels.conftest import Make
+from tests.app.window.driver import KEY, by_arrows, fits, tab_stops
 
 DECKS = (*LEFT, *RIGHT)
 EVERY = (StringPanel, DrumPanel, *DECKS)
@@ -36,9 +30,7 @@ def lightness(panel: QWidget) -> float:
 
 
 @pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.key)
-def test_a_panel_is_named_and_themed_empty_and_with_a_take_and_leaves_no_thread(
-    kind: type[Panel], make: Make, take: Take, themed: Callable[..., None], qtbot: QtBot
-) -> None:
+def test_a_panel_is_named_and_themed_empty_and_with_a_take_and_leaves_no_thread(kind, make, take, themed, qtbot):
     """`make` sees to the threads."""
     assert kind.title and kind.help.endswith(".")
     empty = kind(Session(Choices(face="lab")), Library([]))
@@ -64,7 +56,7 @@ def test_a_panel_is_named_and_themed_empty_and_with_a_take_and_leaves_no_thread(
             assert control.toolTip() or isinstance(control, QTabBar), control.accessibleName()
 
 
-def test_every_panel_fits_and_is_operated_by_the_keyboard_alone(lab: Window, themed: Callable[..., None]) -> None:
+def test_every_panel_fits_and_is_operated_by_the_keyboard_alone(lab, themed):
     """From the deck's names by arrows to the panel, and by Tab to each of its controls and out again."""
     themed("dark", 150)
     lab.window.show_keys(False)
@@ -120,7 +112,7 @@ class Growing:
 
 
 @pytest.mark.parametrize(("looks", "complete"), [(5, True), (0, False)], ids=["rendered", "abandoned"])
-def test_a_job_rests(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, looks: int, complete: bool) -> None:
+def test_a_job_rests(qtbot, monkeypatch, looks, complete):
     monkeypatch.setattr(base, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
     panel, take, resting = AnyPanel(Session(), Library([])), Growing(looks), Event()
     panel.take_started(take)  # type: ignore[arg-type]

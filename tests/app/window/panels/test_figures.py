@@ -1,7 +1,5 @@
 """Eigenvalues, partials, the map of errors and the table of presets, in the Lab: read, pointed at and chosen from."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,7 @@ from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
 from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
 from engine.pluck import Pluck
-from tests.app.window.driver import KEY, LEFT, Window, choose, find, press
+from tests.app.window.driver import KEY, LEFT, choose, find, press
 from tests.app.window.panels.conftest import at, items
 
 LEARNED, STRING, PLUCK = 13, 6, 13  # pixels of the points
@@ -34,7 +32,7 @@ def words_of(panel: Any) -> str:
     return panel.findChild(ElidedLabel).text()
 
 
-def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: Window) -> None:
+def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab):
     panel = lab.panel("eigenvalues")
     plane = panel.plane
     lab.wait(lambda: len(points(plane, LEARNED)) > 0)
@@ -69,7 +67,7 @@ def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: W
     assert ((left, bottom) <= shown).all() and (shown <= (right, top)).all()
 
 
-def test_partials_of_a_pluck_are_measured_greyed_and_heard_alone(lab: Window) -> None:
+def test_partials_of_a_pluck_are_measured_greyed_and_heard_alone(lab):
     panel = lab.panel("partials")
     table = panel.table
     lab.wait(lambda: len(table.rows) == 10)
@@ -113,7 +111,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Pluck]:
     return plucks
 
 
-def test_the_map_of_errors_is_computed_once_and_plucked_in(asked: list[Pluck], lab: Window) -> None:
+def test_the_map_of_errors_is_computed_once_and_plucked_in(asked, lab):
     panel = lab.panel("error_plane")
     plane, count = panel.map, len(POSITIONS) * len(AMPLITUDES_MM)
 
@@ -178,7 +176,7 @@ def menu_of(panel: Any) -> list[QAction]:
     return find(panel, QToolButton, "Presets to compare").menu().actions()
 
 
-def test_presets_are_compared_and_exported(lab: Window, tmp_path: Path) -> None:
+def test_presets_are_compared_and_exported(lab, tmp_path):
     lab.window.action["models"].trigger()
     panel, both = lab.panel("compare"), {"first", "second"}
     assert lab.choices.right_view == "compare" and panel.table.hasFocus()

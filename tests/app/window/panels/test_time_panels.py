@@ -1,7 +1,5 @@
 """The views over time and frequency show a take of known motion in its units, and gestures ask for what they name."""
 
-from __future__ import annotations
-
 import gc
 import math
 import weakref
@@ -12,7 +10,6 @@ import numpy as np
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QPoint
-from pytestqt.qtbot import QtBot
 
 from app.analysis import heard as heard_module
 from app.rendering import Take
@@ -28,7 +25,7 @@ from tests.app.gestures import drag, turn_wheel
 from tests.app.takes import append_to
 from tests.app.window.driver import KEY, LEFT, SHIFT, press
 from tests.app.window.driver import choose as choose_in
-from tests.app.window.panels.conftest import Hear, Make, at, bar_of, choose, curves, items, label_of
+from tests.app.window.panels.conftest import at, bar_of, choose, curves, items, label_of
 
 Watch = Callable[..., None]
 MOMENTS = 12  # enough that every panel has looked at one
@@ -57,7 +54,7 @@ def look(panel: Panel, take: Take, position_s: float, moving: bool = False) -> N
         panel.show_moment(Moment(take, position_s, moving, 0.016))
 
 
-def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, watch: Watch) -> None:
+def test_the_map_shows_motion_and_error_in_mm(qtbot, make, watch):
     panel = make(SpaceTimePanel)
     plot, bar = panel.plot, bar_of(panel.plot)
     watch(panel, lambda: "without sign" in panel.readout.text() and image_of(panel).max() > 3)
@@ -86,7 +83,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, watch: W
     assert panel.readout.text() == "0.0000 s   position 0.50   +40 µm"
 
 
-def test_the_spectrogram_has_one_scale(make: Make, take: Take, hear: Hear, watch: Watch) -> None:
+def test_the_spectrogram_has_one_scale(make, take, hear, watch):
     panel = make(SpectrogramPanel)
 
     def column() -> np.ndarray:
@@ -122,7 +119,7 @@ def test_the_spectrogram_has_one_scale(make: Make, take: Take, hear: Hear, watch
         assert bar_of(panel.plot).getAxis("left").labelText == label
 
 
-def test_the_error_over_time_is_one_per_cent_and_its_level_a_tenth_of_a_db(make: Make, watch: Watch) -> None:
+def test_the_error_over_time_is_one_per_cent_and_its_level_a_tenth_of_a_db(make, watch):
     panel = make(ErrorTimePanel)
     watch(panel, lambda: len(drawn(panel, "model")) > 0 and not panel.background.busy)
     for kind in ("model", "difference"):  # the colours of RMSE and MAE
@@ -151,7 +148,7 @@ def test_the_error_over_time_is_one_per_cent_and_its_level_a_tenth_of_a_db(make:
         assert low < np.log10(error) < high
 
 
-def test_the_spectrum_is_read_by_pointer_and_keys(qtbot: QtBot, make: Make, take: Take, watch: Watch) -> None:
+def test_the_spectrum_is_read_by_pointer_and_keys(qtbot, make, take, watch):
     panel = make(SpectrumPanel)
     plot, first_hz, second_hz = panel.plot, take.fundamental_hz, float(take.partials_hz[1])
     watch(panel, lambda: len(drawn(panel, "truth")) > 0)
@@ -188,7 +185,7 @@ def test_the_spectrum_is_read_by_pointer_and_keys(qtbot: QtBot, make: Make, take
     assert plot.getPlotItem().vb.viewRange()[1] == pytest.approx([-60, 0])
 
 
-def test_waveform_and_spectrum_have_the_unit(make: Make, take: Take, hear: Hear, watch: Watch) -> None:
+def test_waveform_and_spectrum_have_the_unit(make, take, hear, watch):
     spectrum, waveform = (make(kind) for kind in PLOTTED)
     hear(take, Ear((0.37,)))
     signal_mm = 1000 * take.motion_m("model")[:, 37]
@@ -227,9 +224,7 @@ def test_waveform_and_spectrum_have_the_unit(make: Make, take: Take, hear: Hear,
 
 
 @pytest.mark.parametrize("kind", [StringPanel, *PLOTTED])
-def test_a_still_take_is_not_looked_at(
-    kind: type[Panel], make: Make, take: Take, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_still_take_is_not_looked_at(kind, make, take, monkeypatch):
     """The window waits for its user most of the time, and should take no power for it."""
     panel, looks = make(kind), list[object]()
     name = "HeardMotion" if kind is StringPanel else "HeardSignal"
@@ -249,7 +244,7 @@ def test_a_still_take_is_not_looked_at(
 
 
 @pytest.mark.parametrize("kind", [SpaceTimePanel, SpectrogramPanel, ErrorTimePanel, *PLOTTED])
-def test_a_view_lets_the_last_take_go(kind: type[Panel], make: Make, take: Take, qtbot: QtBot, hear: Hear) -> None:
+def test_a_view_lets_the_last_take_go(kind, make, take, qtbot, hear):
     """Takes have tens of megabytes."""
     panel = make(kind)
     last = Take("last", take.info, take.pluck, 1.0, Ear((0.5,)))
@@ -263,7 +258,7 @@ def test_a_view_lets_the_last_take_go(kind: type[Panel], make: Make, take: Take,
     qtbot.waitUntil(lambda: gc.collect(1) < 0 or gone() is None)
 
 
-def test_the_string_shows_one_moment(make: Make, take: Take, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_string_shows_one_moment(make, take, monkeypatch):
     frames: list[Any] = []
     monkeypatch.setattr(StringView, "show_frame", lambda view, frame: frames.append(frame))
     panel = make(StringPanel)
