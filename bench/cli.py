@@ -41,7 +41,6 @@ PLAIN = {  # benchmarks without options, on one thread, as in the app, where win
     "plugin": "Voices of a plug-in compared with the app: how many times faster than real time each plays 30 notes.",
     "drums": "Frequencies and pitch drops of drums compared with published ones; cost of drums, a kit, and choosing.",
     "effects": "Cost of body and room: shares of a core, and the slowest quantum.",
-    "take": "Time and memory of a pluck's pictures and signals, and after its listening point has moved.",
 }
 
 
@@ -105,28 +104,6 @@ def train(
         run("train", partial(authors.measure, against.absolute(), source.absolute()), json)
     else:
         run("train", of_train.measure_on_gpu if gpu else of_train.measure, json)
-
-
-@bench.command()
-def tune(
-    instrument: Annotated[
-        list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
-    ] = None,
-    every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
-    json: Json = False,
-) -> None:
-    """Pitch and loudness of instruments over their range, and the level of a chord."""
-    from app.instruments.library import list_instruments
-    from bench.tune import measure
-    from training.cli.arguments import open_preset
-
-    chosen = (
-        [_instrument(name) for name in instrument]
-        if instrument
-        else [entry.instrument for entry in list_instruments()[0]]
-    )
-    presets = {name: open_preset(name) for name in {each.preset for each in chosen}}
-    run("tune", partial(measure, [(each, presets[each.preset]) for each in chosen], every), json)
 
 
 @bench.command()
