@@ -137,6 +137,10 @@ def find_instrument(name_or_path: str) -> InstrumentEntry:
     path = Path(name_or_path)
     if path.suffix == SUFFIX:
         return InstrumentEntry(path, read_instrument(path))
+    for folder in instrument_folders():
+        for file in folder.glob(f"*{SUFFIX}"):
+            if file.stem.casefold() == folded_name:  # one that cannot be used: the error says why
+                return InstrumentEntry(file, read_instrument(file))
     names = [entry.name for entry in entries]
     if close := get_close_matches(file_stem(folded_name), names, cutoff=0.55):
         raise InstrumentError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
