@@ -50,7 +50,7 @@ CHANGED: dict[
     "many samples clipped": (lambda x: np.clip(4 * x, -0.5, 0.5), {"clipped"}, {"clipped"}),
     "clipped above alone, as with an offset": (lambda x: np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
     "clipped below alone": (lambda x: -np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
-    "few samples clipped": (lambda x: np.clip(x, *np.sort(np.abs(x))[-8] * [-1, 1]), {"clipped"}, set()),
+    "few samples clipped": (lambda x: np.clip(x, np.sort(-np.abs(x))[7], np.sort(np.abs(x))[-8]), {"clipped"}, set()),
     "reversed": (lambda x: x[::-1].copy(), {"edited"}, {"edited"}),
     "so much of a room that the level rises for long": (reverberated, {"edited"}, {"chord"}),
     "two attacks": (lambda x: np.concatenate([x[:40_000], x]), {"onsets"}, {"onsets"}),

@@ -147,7 +147,8 @@ def test_what_diverged_is_a_result_and_a_row_that_makes_no_sense_is_a_failure(pl
     for wrong in ({"rel_mae": "much"}, {"status": "perhaps"}, {"horizon": "400"}):
         rows = sweep(plan(), Script(done, wrong=wrong), options, Mock())
         assert {row.status for row in rows} == {"failed"} and "makes no sense" in rows[0].message
-    diverged = Script(lambda run, tries: row_of(run, status="diverged", rel_mae=None, message="the loss is nan"))
+    later = {"status": "diverged", "rel_mae": None, "finished": "2100-01-01T00:00:00Z"}
+    diverged = Script(lambda run, tries: row_of(run, **later))
     assert {row.status for row in sweep(plan(), diverged, options, Mock())} == {"diverged"}
     sweep(plan(), NOBODY, options, Mock())
     assert is_finished(row_of(plan().runs[0])) and not is_finished(None)

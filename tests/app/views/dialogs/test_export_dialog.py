@@ -211,7 +211,7 @@ def test_the_sound_that_is_heard_is_offered_first_and_the_choices_are_remembered
 
 
 def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot, made, folder):
-    dialog = made({}, instrument=GUITAR)
+    dialog = made({}, played=GUITAR)
     page = dialog.note
     assert page.through.isVisible() and page.through.isChecked()
     words = "Classical guitar with body, room, sympathetic strings and level, as it is heard"
@@ -227,7 +227,7 @@ def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot, made, f
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
     assert read_recipe(path).struck is None
-    again = made(dialog.choices()[0].model_dump(), instrument=GUITAR)
+    again = made(dialog.choices()[0].model_dump(), played=GUITAR)
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
 
