@@ -46,16 +46,13 @@ class Outer:
         ({"name": "x", "share": 2.0}, "here: share must be at most 1"),
         ({"name": "x", "on": 1}, "here.on: must be true or false, found 1"),
         ({"name": "x", "sizes": [1, "2"]}, r"here.sizes\[1\]: must be a valid integer, found '2'"),
-        ({"name": "x", "sizes": 4}, "here.sizes: must be a list, found 4"),
         ({"name": "x", "pair": [1.0]}, "here.pair: field 1 is missing"),
         ({"name": "x", "inner": {"sizes": 1}}, "here.inner: unknown field 'sizes'; known are size"),
         ({"name": "x", "pair": [1.0, 2.0, 3.0]}, "here.pair: must have at most 2 items"),
         ({"name": "x", "share": 10**400}, "here.share: must be a number of at most 64 bits"),
         ({"name": "x", "sizes": [1] * 1001}, "here.sizes: has 1001 entries"),
-        ({"name": "x", "sizes": [1, float("inf")]}, r"here.sizes\[1\]: must be a finite number"),
         ({"name": "x" * 10_001}, "here.name: has 10001 characters"),
         ({"name": date(2020, 1, 1)}, "here.name: must be a number or a text"),
-        ({"name": "x", "inner": {"size": 1.5}}, "here.inner.size: must be a valid integer"),
     ],
 )
 def test_what_does_not_fit_is_named(data, message):

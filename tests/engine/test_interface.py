@@ -12,11 +12,10 @@ import torch
 
 import engine
 from engine.pluck import Pluck
-from engine.presets import load_preset, of_string
+from engine.presets import load_preset
 from engine.resonators.sine_transform import listening_weights
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
-from engine.values.string import StringParameters
-from tests.engine.sounds import initial_m, shipped
+from tests.engine.sounds import initial_m
 
 ROOT = Path(__file__).parents[2]
 
@@ -71,20 +70,3 @@ def test_runaway_output_is_detected_with_its_time(small_preset, factor, monkeypa
     with pytest.raises(Runaway, match=r"diverges 0\.008 s after the pluck") as caught:
         source.advance(state, 64)
     assert caught.value.time_s == pytest.approx(31 / 4_000)
-
-
-def test_a_model_of_many_strings_moves_in_numpy_as_in_torch():
-    steel = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
-    preset = of_string(shipped("studio_any_string"), steel, 16_000)
-    plucks = [Pluck(0.17, 1.0), Pluck(0.3, 12.0, "triangular"), Pluck(0.03, 12.0, width=0.03)]
-    initial = np.stack([initial_m(preset.info, pluck) for pluck in plucks])
-    source, frames = ModelSource(preset), np.arange(3, 2_401, 3)
-    found, state = source.sample(source.start(initial), frames, 2_400)
-    assert len(np.unique(state.inner.nodes)) > 1  # soft and hard plucks step differently
-    following, _ = source.advance(state, 100)
-    with torch.inference_mode():
-        released = torch.from_numpy(initial / preset.info.scale_m).float()
-        expected = preset.model(released, 2_500).numpy() * preset.info.scale_m
-    atol = 1e-9 * np.abs(expected).max()
-    np.testing.assert_allclose(found, expected[:, frames - 1], rtol=0, atol=atol)
-    np.testing.assert_allclose(following, expected[:, 2_400:], rtol=0, atol=atol)

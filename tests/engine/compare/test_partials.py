@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.compare import partials
-from engine.compare.partials import Array, PartialErrors, PartialTrack, partial_errors, segment_frames, track_partials
+from engine.compare.partials import Array, PartialErrors, partial_errors, segment_frames, track_partials
 from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
@@ -84,52 +84,26 @@ def test_a_glide_is_reported_of_truth_and_prediction():
     assert found.glide_error_cents[0, 0, RESOLVED] == pytest.approx(predicted - true, rel=0.02)
     assert np.isnan(found.glide_cents[0, 1]).all()  # ten segments have no thirds of four
     assert np.isnan(found.glide_error_cents[0, 1]).all()
-    row = found.by_mode(0)[0]
-    assert (row.glide_cents, row.glide_error_cents) == (found.glide_cents[0, 0, 0], found.glide_error_cents[0, 0, 0])
     assert found.weighted(0).glide_error_cents == pytest.approx(predicted - true, rel=0.02)
 
 
-def test_a_t60_needs_a_decay():
+def test_predictions_that_are_silent_weak_not_numbers_or_grow():
     time_s, hz, sigma = ten_modes(1)
-    sigma[0], sigma[1] = 0.1, 0.3  # 0.9 and 2.6 dB a second
-    truth = partial(time_s, hz, sigma)
-    growing = partial(time_s, hz, -sigma).real
-    found = errors(growing, truth, (0, 1))
-    assert np.isnan(found.t60_s[0, 0, 0])
-    assert found.t60_s[0, 0, 1] == pytest.approx(3 * math.log(10) / 0.3)
-    assert np.isnan(found.t60_error_percent[0, 0, 0])
-    assert found.t60_error_percent[0, 0, 1] == math.inf
-    assert found.by_mode(0)[1].t60_error_percent == math.inf
-
-
-def test_predictions_that_are_silent_weak_or_not_numbers():
-    time_s, hz, sigma = ten_modes(1)
-    truth = partial(time_s, hz, sigma)
+    sigma[4] = 0.1  # 0.9 dB a second: too little for a T60
+    truth, growing = partial(time_s, hz, sigma), partial(time_s, hz, -sigma).real
     broken = truth.real.copy()
     broken[:, :, 0], broken[:, :, 1], broken[:, 2000:, 2] = 0, 0.01 * truth.real[:, :, 1], math.nan
-    broken[:, :, 3] = math.inf
-    found = errors(broken, truth, (0, 0.4), (0.6, 1))
-    assert found.level_db[0, :, 0].tolist() == [-math.inf, -math.inf]
-    assert found.level_db[0, :, 1] == pytest.approx(-40)
+    broken[:, :, 3:] = growing[:, :, 3:]
+    found = errors(broken, truth, (0, 0.4), (0.6, 1), (0, 1))
+    assert found.level_db[0, :2, 0].tolist() == [-math.inf, -math.inf]
+    assert found.level_db[0, :2, 1] == pytest.approx(-40)
     assert found.level_db[0, 0, 2] == pytest.approx(0, abs=1e-9)
     assert found.level_db[0, 1, 2] == math.inf
-    assert found.level_db[0, :, 3].tolist() == [math.inf, math.inf]
-    assert np.isnan(found.phase_cycles[0, 1, :4]).all()
-    assert np.isnan(found.cents[0, 0, [0, 1, 3]]).all()
+    assert np.isnan(found.phase_cycles[0, 1, :3]).all()
+    assert np.isnan(found.cents[0, 0, :2]).all()
     assert found.weighted(1).level_db == math.inf
-
-
-def test_blocks_join_to_the_whole():
-    time_s, hz, sigma = ten_modes(1)
-    truth, predicted = partial(time_s, hz, sigma), partial(time_s, 1.001 * hz, sigma).real
-    length = segment_frames(RATE_HZ, LINEAR_HZ[0])
-    parts = [slice(first, first + 7 * length) for first in range(0, 4000, 7 * length)]
-    joined = PartialTrack.join([track_partials(predicted[:, part], truth[:, part], length) for part in parts])
-    whole = track_partials(predicted, truth, length)
-    assert np.array_equal(whole.match, joined.match)
-    assert np.array_equal(whole.turn, joined.turn)
-    trajectories = PartialErrors.join([errors(predicted, truth, (0, 1))] * 2)
-    assert trajectories.cents.shape == (2, 1, 10)
+    assert np.isnan(found.t60_s[0, 2, 4]) and np.isnan(found.t60_error_percent[0, 2, 4])
+    assert found.by_mode(2)[3].t60_error_percent == math.inf
 
 
 def test_the_phasors_of_a_linear_string_are_exact_and_those_of_a_tense_one_circles():
@@ -155,12 +129,11 @@ def test_a_partial_is_reported_of_while_it_is_there():
     time_s, hz, sigma = ten_modes(2)
     levels = np.ones(10)
     sigma[:] = 1.0
-    levels[2], levels[3], levels[4] = 0, 0.9e-3, 1.1e-3
+    levels[2:5] = 0, 0.9e-3, 1.1e-3
     sigma[5] = 30.0  # 60 dB below the others, which lose 3 dB or so, after a quarter of a second
     truth = partial(time_s, hz, sigma) * levels
     found = errors(truth.real, truth, (0, 1), (1, 2))
     assert np.isnan(found.level_db[0, 0]).tolist() == [n in (2, 3, 7) for n in range(10)]
-    assert found.energy[0, 0, 2:4].tolist() == [0, 0]
     assert (found.by_mode(0)[2].level_db, found.by_mode(0)[2].trajectories) == (None, 0)
     assert found.t60_s[0, 0, 5] == pytest.approx(3 * math.log(10) / 30, rel=1e-6)
     assert found.level_db[0, 0, 5] == pytest.approx(0, abs=1e-4)

@@ -59,7 +59,6 @@ def test_windows_frames_trajectories_and_batches_have_their_own_errors():
     assert found.rel_mae == pytest.approx(np.mean([error.rel_mae for error in own]))
     assert found.rel_mse != pytest.approx(sums.total().rel_mse, rel=0.01)
     frames, trajectories = sums.per_frame(), sums.per_trajectory()
-    assert frames[0].dtype == np.float64
     assert (frames[0].shape, trajectories[0].shape, frames[0][2]) == ((50,), (5,), 0)
     for index, each in enumerate(zip(*frames, strict=True)):
         assert same(RelativeError(*each), predicted[:, [index]], truth[:, [index]])
@@ -67,24 +66,8 @@ def test_windows_frames_trajectories_and_batches_have_their_own_errors():
         assert same(RelativeError(*each), predicted[[row]], truth[[row]])
     assert sums.spread().rel_mse == pytest.approx(np.std(trajectories[0]))
     assert sums.spread().rel_mae == pytest.approx(np.std(trajectories[1]))
-    for steps in (0, 51):
-        with pytest.raises(ValueError, match=f"steps must lie in 1 … 50, not {steps}"):
-            sums.total(steps)
-
-
-@pytest.mark.parametrize("rows_first", [True, False])
-def test_trajectories_are_known_again_in_blocks(rows_first):
-    predicted, truth, whole = motions(5, 30, 3)
-    sums = ErrorSums(30)
-    parts, blocks = ((0, 2), (2, 5)), ((0, 7), (7, 20), (20, 30))
-    for outer in parts if rows_first else blocks:
-        for inner in blocks if rows_first else parts:
-            rows, frames = (slice(*each) for each in ((outer, inner) if rows_first else (inner, outer)))
-            row = None if rows_first else rows.start
-            sums.add(predicted[rows, frames], truth[rows, frames], frames.start, row)
-    assert sums.per_trajectory()[0] == pytest.approx(whole.per_trajectory()[0])
-    assert sums.spread().rel_mae == pytest.approx(whole.spread().rel_mae)
-    assert sums.total().rel_mse == pytest.approx(whole.total().rel_mse)
+    with pytest.raises(ValueError, match="steps must lie in 1 … 50, not 51"):
+        sums.total(51)
 
 
 def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSums:
@@ -105,20 +88,11 @@ def test_a_standard_error_is_that_of_a_ratio_of_sums():
     assert found.rel_mse == pytest.approx(expected, rel=0.05)
     assert found.rel_mse < sums.spread().rel_mse / 20 / 5  # what the plain deviation of a mean would tell
     # of equal trajectories it is that of a mean: a draw with replacement is binomial
-    found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
-    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)
-    assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
+    assert spoilt([0.1, 0.3] * 50).standard_error(20_000).rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)
     assert spoilt([0.5]).standard_error() == RelativeError(0, 0)
-    assert spoilt([0.5] * 7).standard_error().rel_mae == pytest.approx(0, abs=1e-12)
     assert spoilt([0.1, math.inf]).standard_error() == RelativeError(math.inf, math.inf)
-    assert spoilt([0.1, 0.2, 0.4]).standard_error() == spoilt([0.1, 0.2, 0.4]).standard_error()
     assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
-    for rel_mse, depth_db in (
-        (1e-3, -30),
-        (0, relative.NULL_FLOOR_DB),
-        (1e-30, relative.NULL_FLOOR_DB),
-        (math.inf, math.inf),
-    ):
+    for rel_mse, depth_db in ((1e-3, -30), (0, relative.NULL_FLOOR_DB), (math.inf, math.inf)):
         assert RelativeError(rel_mse, 0).null_depth_db == pytest.approx(depth_db)
 
 
@@ -222,12 +196,10 @@ def errors(model: np.ndarray, truth: np.ndarray | None = None):
 
 
 def test_the_truth_itself_has_no_errors_whatever_its_phase_and_level():
-    same = errors(string())
-    assert (same.distance_db, same.level_db, same.rise_db, same.split_cents) == (0, 0, 0, None)
-    assert same.pitch_cents == 0
-    turned = errors(-string())
-    assert turned.distance_db == pytest.approx(0, abs=1e-9)
-    assert turned.pitch_cents == pytest.approx(0, abs=1e-9)
+    for factor in (1, -1):
+        found = errors(factor * string())
+        assert (found.distance_db, found.level_db, found.pitch_cents) == pytest.approx((0, 0, 0), abs=1e-9)
+        assert (found.rise_db, found.split_cents) == (0, None)
     assert errors(2 * string()).level_db == pytest.approx(0, abs=1e-9)
 
 
@@ -273,15 +245,6 @@ def test_what_is_not_heard_does_not_count_and_silence_is_finite():
     assert errors(silent).pitch_cents is None
     assert errors(silent, silent).distance_db == 0
     assert np.isfinite(errors(string(), silent).distance_db)
-
-
-def test_sounds_of_two_lengths_and_too_short_ones_are_refused():
-    with pytest.raises(ValueError, match="differ in shape"):
-        errors(string()[:-1])
-    with pytest.raises(ValueError, match="less than a frame"):
-        audible_errors(string()[:100], string()[:100], RATE_HZ, PARTIALS_HZ, 0.25)
-    found = audible_errors(string(), string(), RATE_HZ, [hz for hz in PARTIALS_HZ if hz > RATE_HZ], 0.25)
-    assert (found.pitch_cents, found.split_cents) == (None, None)  # whose partials cannot be made
 
 
 def test_a_level_is_a_sines_amplitude_whatever_it_rests_on():

@@ -93,44 +93,13 @@ def test_sounds_are_as_they_were(name):
     np.testing.assert_allclose([(found * waves).sum(), np.abs(found).max()], FROZEN[name], rtol=1e-10)
 
 
-def spectrum(body: Body, rate_hz: int) -> tuple[Array, Array]:
-    """Frequencies in Hz, and how strongly the body alone answers."""
-    size = 2 * rate_hz
-    found = np.abs(np.fft.rfft(body.response(rate_hz)[:, 0], size))
-    return np.fft.rfftfreq(size, 1 / rate_hz), found
-
-
-@pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000])
-@pytest.mark.parametrize("size", [0.5, 1.0, 1.6])
-def test_the_lowest_modes_are_at_their_frequencies(size, rate_hz):
-    frequency_hz, found = spectrum(Body(size=size), rate_hz)
-    for mode in BODIES["guitar"].lowest[:2]:  # the strong ones, alone in their range
-        expected_hz = mode.frequency_hz / size
-        near = (frequency_hz > 0.85 * expected_hz) & (frequency_hz < 1.15 * expected_hz)
-        assert frequency_hz[near][found[near].argmax()] == pytest.approx(expected_hz, rel=0.01)
-
-
 @pytest.mark.parametrize("name", BODIES)
-def test_each_body_has_its_modes_rings_out_and_names_its_sources(name):
-    wood = BODIES[name]
-    lowest_hz = [mode.frequency_hz for mode in wood.lowest]
-    assert lowest_hz == sorted(lowest_hz) and len(lowest_hz) >= 4
-    assert len(wood.sources) > 40 and wood.title
-    modes = modes_of(wood)
-    frequency_hz, decay = modes[:2, modes[0] < 20_000.0]
-    assert (np.diff(frequency_hz) >= 0).all() and 0.5 < frequency_hz[-1] / 20_000 <= 1
-    assert len(frequency_hz) < 1_500
+def test_each_body_has_modes_up_to_20_khz_and_rings_out(name):
+    frequency_hz = modes_of(BODIES[name])[0]
+    frequency_hz = frequency_hz[frequency_hz < 20_000.0]
+    assert (np.diff(frequency_hz) >= 0).all() and frequency_hz[-1] > 10_000 and len(frequency_hz) < 1_500
     found = Body(name=name).response(48_000)
-    assert found.shape[1] == 2 and np.isfinite(found).all()
     assert np.abs(found[-480:]).max() < 3e-3 * np.abs(found).max()
-    assert np.exp(-decay[: len(lowest_hz)] * wood.seconds).max() < 0.05  # what is cut is faint
-
-
-def test_an_impulse_of_ones_own_that_is_stretched_too_long_is_faded_out():
-    long = Impulse(noise(2 * 48_000, 1), 48_000)
-    found = Body(size=2.0, impulse=long).response(48_000)
-    assert len(found) == 3 * 48_000 and abs(found[-1, 0]) < 1e-12
-    assert len(Body(size=1.5, impulse=long).response(44_100)) == round(1.5 * 2 * 44_100)
 
 
 def t60_s(response: Array, band_hz: tuple[float, float], rate_hz: int) -> float:
@@ -284,11 +253,3 @@ def test_silence_has_a_gain_of_one_and_gains_and_peaks_have_bounds():
     assert loudness.limit(0.9 * highest) == 1.0
     assert 3 * highest * loudness.limit(3 * highest) == pytest.approx(highest)
     assert [loudness.looked_at(28, 88, number) for number in range(loudness.LOOKED_AT)] == [28, 43, 58, 73, 88]
-
-
-def test_a_body_on_one_side_is_levelled_as_its_mirror_image():
-    samples = np.random.default_rng(0).uniform(-1, 1, (2_000, 1)) * np.geomspace(1, 1e-3, 2_000)[:, None]
-    sides = (np.hstack([samples, 0 * samples]), np.hstack([0 * samples, samples]))
-    left, right = (curves_of(Body(impulse=Impulse(side, 48_000))) for side in sides)
-    np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12)
-    assert left[of.BODY_STEP] > 0.1

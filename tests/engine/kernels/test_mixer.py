@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.kernels.constants import AHEAD
-from engine.kernels.limiter import CEILING, LARGEST_LEVEL, STEEPEST
+from engine.kernels.limiter import CEILING, STEEPEST
 from engine.kernels.mixer import TONE_HZ, TONE_LEVEL, UNDERFLOW, call
 from engine.kernels.mixer_records import GAPS, MOST_VOICES, RING
 from engine.voices import Mixer
@@ -82,9 +82,6 @@ def test_what_is_no_number_is_silence(value):
     assert np.isfinite(found).all()
     assert mixer.non_finite > 0
     np.testing.assert_array_equal(found[64 + 960 + AHEAD :], other[64 + 960 : -AHEAD])
-    wild = mixer_of(voice_of(noise(640), 2e5), limited=True)  # a gain that nothing in the app asks for
-    wild.render(128)
-    assert float(wild.record["limiter"]) <= LARGEST_LEVEL  # is soon forgotten
 
 
 def test_voices_of_one_hand_over_begin_with_one_frame_and_say_when_the_device_had_it():
@@ -116,10 +113,7 @@ def test_an_underflow_counts_as_a_gap_where_something_sounds_and_the_latest_are_
     assert gap.milliseconds == pytest.approx(15.0, abs=1e-6)
     for number in range(GAPS + 20):
         ask(mixer, 64, UNDERFLOW, now_s=1 + number / 100)
-    gaps = mixer.new_gaps()
-    assert len(gaps) == GAPS
-    assert gaps[-1].time_s == (4 * 480 + (GAPS + 19) * 64) / RATE_HZ
-    assert mixer.new_gaps() == []
+    assert (len(mixer.new_gaps()), mixer.new_gaps()) == (GAPS, [])
 
 
 def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over():
@@ -135,17 +129,8 @@ def test_beyond_the_last_place_and_in_a_full_ring_voices_are_refused_and_over():
     assert mixer.render(64).any()
     mixer.add(again := voice_of(noise(64)))
     assert not again.over
-
-
-def test_ended_voices_are_forgotten_the_others_go_on_and_another_rate_is_refused():
-    lasting = noise(20_000)
-    mixer = mixer_of(voice_of(noise(640)), voice_of(lasting), voice_of(noise(64)))
-    mixer.render(6400)
-    mixer.forget_ended()
-    assert len(mixer.voices) == 1
-    np.testing.assert_array_equal(mixer.render(6400), lasting[6400:12_800])
     with pytest.raises(ValueError, match="48000 Hz, the mixer 44100 Hz"):
-        Mixer(44_100).add(voice_of(noise(64)))
+        Mixer(44_100).add(again)
 
 
 ROUNDING = 1e-6  # of a gain that is read off single-precision samples

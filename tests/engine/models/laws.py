@@ -141,16 +141,6 @@ class ModelLaws:
             assert relative(motion.model(released[None], 50), motion.whole[row : row + 1, :50]) < self.near
 
     @torch.no_grad()
-    def test_no_string_moves_nowhere(self, motion):
-        """A batch of none: empty arrays, by every way."""
-        model, none = motion.model, motion.released[:0]
-        _, state = model.advance(model.encode(none), 40)
-        assert model.advance(state, 70, listening_weights([0.37, 0.123], POINTS))[0].shape == (0, 70, 2)
-        assert model.sample(state, torch.tensor([2, 9]), 30)[0].shape == (0, 2, POINTS)
-        with torch.enable_grad():
-            assert model(none, 40).shape == (0, 40, POINTS)
-
-    @torch.no_grad()
     def test_listening_is_the_grid_at_that_point(self, motion):
         weights, total = listening_weights([0.37, 0.123], POINTS), sum(self.blocks)
         state, parts = motion.model.encode(motion.released), []

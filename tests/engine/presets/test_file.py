@@ -22,7 +22,6 @@ from engine.presets import (
     find_preset,
     load_preset,
     outside_training,
-    preset_files,
     read_info,
     save_preset,
 )
@@ -109,10 +108,7 @@ FAULTS = {
     "re-typed": Fault("of type F64, expected F32", tensors=lambda t: t.update(nu_log=t["nu_log"].double())),
     "NaN": Fault("'encoder.weight' .* not finite", tensors=lambda t: t["encoder.weight"][0, 5].fill_(float("nan"))),
     "infinite": Fault("'theta_log' .* not finite", tensors=lambda t: t["theta_log"][0].fill_(float("inf"))),
-    **{
-        f"cut to {size} bytes": Fault("not a whole safetensors .* get the preset again", raw=itemgetter(slice(size)))
-        for size in (0, 7, 200, 2000)
-    },
+    "cut": Fault("not a whole safetensors .* get the preset again", raw=itemgetter(slice(2000))),
     # a voice takes its string from the metadata, a picture from the tensors
     "another string": Fault(OTHER_STRING % "nu_log|theta_log", sets(tension_n=61.0), many=True),
     "another rate": Fault(OTHER_STRING % "nu_log", sets(rate_hz=44_100), many=True),
@@ -180,15 +176,6 @@ def test_other_files_are_refused_and_names_are_found(tmp_path, preset_file):
         find_preset("nonsense")
 
 
-def test_shipped_presets_are_better_than_the_paper():
-    """Table 2a of the paper, Koopman_var, Gaussian, 4000 steps: relative MAE 0.0977 at 4 kHz, 0.0888 at 16 kHz."""
-    wanted = ("koopman_var", "gaussian", 4000, True)
-    infos = [read_info(path) for path in preset_files()]
-    kinds = [(info.model, info.initial, info.horizon_steps, info.tension_modulated) for info in infos]
-    found = {info.rate_hz: info.rel_mae for info, kind in zip(infos, kinds, strict=True) if kind == wanted}
-    assert found[4_000] <= 0.0977 and found[16_000] <= 0.0888
-
-
 def test_loading_presets_does_not_load_torchs_compiler():
     """It takes a second and more, and a start of the app would wait for it; an operation on a meta tensor may."""
     script = (
@@ -198,17 +185,6 @@ def test_loading_presets_does_not_load_torchs_compiler():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True", "False"]
-
-
-@pytest.mark.parametrize("name", ["studio_any_string", "studio_any_harp_c6", "studio_any_nylon_e4"])
-def test_a_model_of_many_strings_was_trained_in_rises_of_tension(name):
-    """No peak: a loose string was pulled further than a tense one. Widths are those of each shape."""
-    info, pluck = read_info(find_preset(name)), Pluck(0.3, 4.0, "raised_cosine", 0.2)
-    assert (info.trained_range.peak_m, info.trained_range.tension_rise) == (None, 0.5)
-    assert info.trained_range.width == {"gaussian": (0.04, 0.15), "raised_cosine": (0.08, 0.3)}
-    hardest_mm = pytest.approx(4.0 * (0.5 / info.tension_rise(pluck)) ** 0.5)
-    assert info.trained_amplitudes_mm(pluck) == (0, hardest_mm)
-    assert info.hardest_mm(pluck) == hardest_mm
 
 
 ANY_SHAPE = {"width": {"gaussian": (0.02, 0.1), "raised_cosine": (0.1, 0.3)}}
@@ -223,16 +199,17 @@ TENSE = {"tension_rise": 0.01}
         ("small", {}, Pluck(0.5, 5.0, "triangular"), ("not the trained gaussian",)),
         ("small", ANY_SHAPE, Pluck(0.5, 5.0, "raised_cosine", 0.09), ("width 0.09",)),
         ("small", ANY_SHAPE, Pluck(0.5, 5.0, "gaussian", 0.09), ()),
-        ("small", ANY_SHAPE, Pluck(0.5, 5.0, "triangular", 0.5), ()),
         ("small", {"position": None, "width": None}, Pluck(0.1, 5.0, "gaussian", 0.05), ()),
-        ("small", TENSE, Pluck(0.5, 1.0, "gaussian", 0.05), ()),
         ("small", TENSE, Pluck(0.5, 5.0, "gaussian", 0.05), ("beyond the trained 1%",)),
         # where the error grows: not of a pitch below or above the trained ones
         ("string", {}, Pluck(0.12, 20.0, "triangular"), ()),  # 20 mm raise the tension of a nylon B3 by a fifth
         ("string", {}, Pluck(0.3, 4.0, "gaussian", 0.19), ()),
-        ("string", {}, Pluck(0.3, 4.0, "gaussian", 0.25), ("width 0.25 is outside the trained 0.04 … 0.15",)),
-        ("string", {}, Pluck(0.3, 4.0, "raised_cosine", 0.06), ("width 0.06 is outside the trained 0.08 … 0.3",)),
-        ("string", {}, Pluck(0.03, 4.0, "gaussian", 0.06), ("position 0.03 is outside",)),
+        (
+            "string",
+            {},
+            Pluck(0.03, 4.0, "raised_cosine", 0.06),
+            ("position 0.03 is", "trained 0.08 … 0.3"),
+        ),
         ("string", {}, Pluck(0.3, 20.0, "gaussian", 0.04), ("beyond the trained 50%",)),
         ("bass_e1", {}, Pluck(0.3, 1.0, "triangular"), ()),
         ("piano_c2", {}, Pluck(0.3, 1.0, "triangular"), ("decay time near 3 kHz",)),

@@ -14,13 +14,12 @@ import pytest
 import torch
 
 from engine.pluck import Pluck
-from engine.presets import PresetError, load_preset, preset_digest, preset_files
+from engine.presets import PresetError, preset_digest, preset_files
 from engine.presets.migrations import FORMAT_VERSION, UnknownVersion, migrated
 from engine.presets.of_string import STRINGS, find_string, of_string, read_described_string, read_string
 from engine.schema import SchemaError
 from engine.sources import ModelSource, Runaway, TruthSource
 from engine.values.string import StringParameters
-from tests.engine.presets.test_file import Fault
 from tests.engine.sounds import KNOWING, initial_m, relative, shipped
 
 SHIPPED = json.loads(Path(__file__).with_name("shipped.json").read_text(encoding="utf-8"))
@@ -116,20 +115,6 @@ def test_other_versions_are_refused(version):
         migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
 
 
-def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset, preset_file):
-    def age(facts: dict[str, Any]) -> None:
-        del facts["knows"]
-        facts["model_configuration"]["input"] = "displacement"
-        facts["trained_range"]["width"] = facts["trained_range"]["width"]["gaussian"]
-        facts["format_version"] = 1
-
-    Fault("", age).write(preset_file)
-    old, new = load_preset(preset_file), load_preset(small_preset)
-    assert old.info == replace(new.info, knows=old.info.knows) and old.info.format_version == FORMAT_VERSION
-    for name, weight in new.model.state_dict().items():
-        assert torch.equal(weight, old.model.state_dict()[name])
-
-
 STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
 TOML = "".join(f"{name} = {value}\n" for name, value in asdict(STEEL).items())
 
@@ -174,11 +159,7 @@ def test_a_string_file_is_read_and_may_describe_its_string(tmp_path):
     [
         ("length_m = ", "not valid TOML"),
         ("length = 1.0", "unknown field 'length'"),
-        ("length_m = -1.0", "length_m must lie in"),
-        ("length_m = nan", "finite"),
         ("description = 5", "description must be a text"),
-        ("a = " + "[" * 5_000, "not valid TOML"),
-        ("# " + "x" * 2**20, "larger than"),
         # none of the parameters is taken from the string of the paper
         (TOML.replace("tension_n", "# "), r"wrong\.toml: tension_n is missing"),
         ("", r"length_m, area_m2, .*, tension_n are missing; .*gives all of length_m, area_m2,"),

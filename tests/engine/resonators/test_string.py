@@ -76,16 +76,3 @@ def test_listening_is_exact_on_the_grid_and_between_its_points():
     amplitudes, place = np.array([1.0, 0.5, -0.25]), np.array([0.4321])
     heard = to_grid(amplitudes, 101) @ listening_weights(place, 101)
     np.testing.assert_allclose(heard, amplitudes @ mode_shapes(place, 3), rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({"coupling": np.zeros(4)}, "coupling has the shape"),
-        ({"sigma": np.full(5, math.nan)}, "sigma holds a number that is not finite"),
-        ({"omega": np.arange(5.0, 0.0, -1.0)}, "omega must not fall"),
-    ],
-)
-def test_a_resonator_of_what_does_not_go_together_is_refused(changed, words):
-    with pytest.raises(ValueError, match=words):
-        replace(resonator_of(STRING, 5, grid_points=9), **changed)

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from engine.kernels.fields import record_of, slot, slots
 from engine.kernels.memory import publish
 from engine.kernels.mixer_records import MOST_LATENTS
 from engine.kernels.voice_records import VOICE, WISH
-from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR
+from engine.levels import FULL_SCALE_M, FULL_SCALE_N, RUNAWAY_FACTOR
 from engine.models._tension_law import CURVES
 from engine.models.base import Physics
 from engine.models.configurations import DMDConfiguration, KoopmanTensionConfiguration
@@ -23,11 +22,10 @@ from engine.models.dmd import DMD
 from engine.models.integrated_phase import IntegratedPhase
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, Preset, load_preset, of_string, preset_files
+from engine.presets import SHIPPED, Preset, of_string, preset_files
 from engine.resonators.base import Resonator
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.resonators.string import resonator_of
-from engine.schema import write
 from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver
 from engine.values.ear import Ear
@@ -136,37 +134,19 @@ def test_at_a_low_rate_no_latent_is_heard_as_another():
     assert relative(spectra[0][band], spectra[1][band]) < 0.01
 
 
-@pytest.mark.parametrize("ear", [Ear((0.0,)), Ear((0.37,), solo=9)])
-@pytest.mark.parametrize("name", [KNOWING, sounds.STEEL])
-def test_what_was_silent_at_one_place_is_whole_at_another(name, ear):
-    """Where nothing can be heard, the modulation is left out; elsewhere it must be there again."""
-    expected = rung(14_400, strike(name, Pluck(0.3, 8.0)))
-    voice = strike(name, Pluck(0.3, 8.0), ear=ear)
-    mixer = mixer_of(voice)
-    mixer.render(4800)
-    assert voice.listen(EAR)
-    np.testing.assert_allclose(mixer.render(9600)[1200:], expected[6000:], atol=1e-5)
-
-
-def test_what_is_no_bank_has_no_program(small_preset):
-    preset = shipped(KNOWING)
-    seeing = load_preset(small_preset).model
-    assert bank_program(seeing, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
-    c = replace(preset.model.configuration, eigenvalue_widths=(MOST_LATENTS + 1,))
-    assert bank_program(IntegratedPhase(c), preset.info, 48_000) is None
+def test_a_network_that_the_kernel_cannot_hold_is_no_bank():
+    c = replace(shipped(KNOWING).model.configuration, eigenvalue_widths=(MOST_LATENTS + 1,))
+    assert bank_program(IntegratedPhase(c), shipped(KNOWING).info, 48_000) is None
 
 
 @pytest.mark.parametrize("rank", [0, MOST_LATENTS + 2])
-def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(rank):
-    """Its latents would be written beyond their memory; so would those of a fit to silence, which has none."""
+def test_a_dmd_that_the_kernel_cannot_hold_is_no_bank(rank):
+    """Its latents would be written beyond their memory; a fit to silence has none."""
     info = sounds.small(False)
     model = DMD(DMDConfiguration(info.grid_points, 16, max(rank, 2)))
     with torch.no_grad():
         model.magnitude_log.fill_(-0.01 if rank else -1e9)
     assert bank_program(model, info, 48_000) is None
-    sizes = write(model.configuration)
-    weights = {name: tensor.numpy() for name, tensor in model.state_dict().items()}
-    assert model_program(Preset("", Path(), replace(info, model_configuration=sizes), weights), 48_000).rendered
     with torch.no_grad():
         model.magnitude_log[:MOST_LATENTS].fill_(-0.01)
         model.magnitude_log[MOST_LATENTS:].fill_(-1e9)
@@ -197,16 +177,17 @@ def test_a_voice_is_the_model_and_the_string(rate_hz, pluck, nodes):
         assert relative(found, expected) < (1e-3 if hard else 1e-5)
 
 
-@pytest.mark.parametrize("source", ["model", "truth"])
-def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(source):
+@pytest.mark.parametrize(("source", "solo"), [("model", 0), ("truth", 0), ("truth", 3)])
+def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(source, solo):
     preset, program = any_string()
     info, resonator = preset.info, preset.info.resonator
     let_go_m = initial_m(info, Pluck(0.12, 4.0, "triangular"))
     own = program if source == "model" else truth_program(info, 48_000)
-    found = rung(12_000, Voice(own, let_go_m, Ear((0.5,), "bridge")), attack=False)
+    found = rung(12_000, Voice(own, let_go_m, Ear((0.5,), "bridge", solo)), attack=False)
     q = resonator.to_modes(let_go_m)[None]
     amplitudes, _ = SplittingSolver(resonator, 48_000).advance(ModalState.at_rest(q), len(found) - 1)
-    expected = np.concatenate([q, amplitudes[0]]) @ resonator.end_force / FULL_SCALE_N
+    heard = resonator.end_force * ((np.arange(1, q.size + 1) == solo) | (solo == 0))
+    expected = np.concatenate([q, amplitudes[0]]) @ heard / FULL_SCALE_N
     assert relative(found, np.repeat(expected[:, None], 2, 1)) < 1e-4
 
 
@@ -244,29 +225,6 @@ STIFF = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
 BRIDGE = Ear((0.37, 0.61), "bridge")
 
 
-def newtons(displacement_m: Signal, ear: Ear = BRIDGE, modes: int = 99) -> Signal:
-    force = resonator_of(STIFF, modes, grid_points=101).force_weights
-    return displacement_m @ weights_of(ear, 101, force) * (FULL_SCALE_N / FULL_SCALE_M)
-
-
-def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end():
-    """T ∂y/∂x - EI ∂³y/∂x³ at x = 0, by finite differences of one mode."""
-    mode, step = 7, 1e-4 * STIFF.length_m
-    x = step * np.arange(5)
-    y = 1e-3 * np.sin(mode * np.pi * x / STIFF.length_m)
-    slope = float(-25 * y[0] + 48 * y[1] - 36 * y[2] + 16 * y[3] - 3 * y[4]) / (12 * step)
-    third = float(-5 * y[0] + 18 * y[1] - 24 * y[2] + 14 * y[3] - 3 * y[4]) / (2 * step**3)
-    bending = STIFF.youngs_modulus_pa * STIFF.second_moment_m4
-    amplitudes = np.zeros(20)
-    amplitudes[mode - 1] = 1e-3
-    heard = newtons(to_grid(amplitudes, 101))
-    expected = STIFF.tension_n * slope - bending * third
-    assert heard.tolist() == pytest.approx([expected, expected], rel=1e-4)
-    for solo, alone in ((mode, expected), (mode + 1, 0.0), (101, 0.0)):
-        found = newtons(to_grid(amplitudes, 101), Ear((0.5,), "bridge", solo))
-        assert float(found[0]) == pytest.approx(alone, rel=1e-4, abs=1e-9)
-
-
 @pytest.mark.parametrize("pluck", [Pluck(0.1, 3.0, "triangular"), Pluck(0.5, 3.0, width=0.03), Pluck(0.03, 3.0)])
 def test_no_motion_passes_the_bound_by_much(pluck):
     resonator = resonator_of(STIFF, 60, grid_points=101, tension_modulated=False)
@@ -280,12 +238,7 @@ def test_no_motion_passes_the_bound_by_much(pluck):
 
 def test_nodes_are_known_and_a_bridge_is_no_place_on_the_string():
     assert Ear((0.5,), solo=2).is_on_node(0.5) and Ear((0.0,)).is_on_node(0.0)
-    assert not any(
-        ear.is_on_node(place)
-        for ear, place in ((Ear((0.5,), solo=3), 0.5), (Ear((0.5,)), 0.5), (Ear((0.0,), "bridge"), 0.0))
-    )
-    pickups = ("displacement", "velocity", "bridge")
-    assert [Ear((0.5,), each).full_scale for each in pickups] == [FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N]
+    assert not Ear((0.5,), solo=3).is_on_node(0.5) and not Ear((0.0,), "bridge").is_on_node(0.0)
     with pytest.raises(ValueError, match="another pick-up"):
         weights_of(BRIDGE, 101)
 
@@ -407,15 +360,10 @@ def test_the_truth_is_the_equation_whose_modes_change():
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
-def test_a_soft_second_pluck_leaves_the_loud_tail_without_a_click(kind, pickup):
-    """Of next to nothing, sample by sample: the motion continues in its own time, however far ahead it was made."""
+def test_a_second_pluck_of_next_to_nothing_changes_nothing(kind, pickup):
+    """Sample by sample: the motion continues in its own time, however far ahead it was made."""
     of, ear = program(kind), Ear((0.37, 0.6), pickup)
-    soft, faint = (Pluck(0.3, amplitude_mm, "raised_cosine", 0.2) for amplitude_mm in (0.02, 1e-4))
-    alone, touched = sound(of, [], ear=ear), sound(of, [(100, soft, 0.0)], ear=ear)
-    after, joint = slice(101 * QUANTUM, 200 * QUANTUM), slice(99 * QUANTUM, 104 * QUANTUM)
-    assert np.std(touched[after]) == pytest.approx(np.std(alone[after]), rel=0.05)
-    bend, usual = np.abs(np.diff(touched, 2))[joint].max(), np.abs(np.diff(alone, 2))[joint].max()
-    assert bend < 1.2 * usual
+    alone, faint = sound(of, [], ear=ear), Pluck(0.3, 1e-4, "raised_cosine", 0.2)
     touched = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear)
     np.testing.assert_allclose(touched, alone, atol=2e-4 * np.abs(alone).max())
 
@@ -429,13 +377,3 @@ def test_modes_above_half_the_rate_are_silent_from_the_start():
         for each in (own, resonator_of(STRING, below))
     )
     np.testing.assert_allclose(found, expected, atol=1e-4)
-
-
-@pytest.mark.parametrize("kind", ["model", "truth"])
-def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind):
-    high = resonator_of(STRING, 80)
-    assert float(high.omega[-1]) / (2 * math.pi) > 0.45 * RATE_HZ / 2
-    up = resonator_of(replace(STRING, tension_n=STRING.tension_n * 16), 80)  # two octaves
-    heard = sound(program(kind, high), [(20, up, 0.01)])
-    assert np.isfinite(heard).all()
-    assert 0.001 < np.abs(heard[-6400:]).max() < 4 * PLUCK.amplitude_mm / 1000 / FULL_SCALE_M
