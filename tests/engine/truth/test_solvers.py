@@ -9,12 +9,12 @@ from engine.excitation import blow_factor, displacement
 from engine.kernels.pulses import spectrum
 from engine.pluck import SHAPES, Pluck
 from engine.resonators.sine_transform import to_grid, to_modes
-from engine.resonators.string import resonator_of
+from engine.resonators.string import resonator_of, undamped_frequencies, wavenumbers
 from engine.truth import ModalState, SplittingSolver, solve_dop853
 from engine.values.string import StringParameters
 from tests.engine.sounds import relative
 from tests.engine.tensors import solve_linear
-from training.data.draws import DRAWS
+from training.data.draws import DRAWS, draw_noise
 
 STRING = StringParameters()
 PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 25), ("noise", 16_000, 25)]
@@ -35,11 +35,33 @@ def random_state(batch: int, modes: int) -> ModalState:
     )
 
 
+def test_order_of_convergence():
+    """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
+    state, resonator = worst_of_protocol("noise", 25), resonator_of(STRING, 25)
+    coarse, fine, truth = (SplittingSolver(resonator, 16_000, substeps=n).solve(state, 100) for n in (12, 24, 96))
+    assert relative(coarse, truth) / relative(fine, truth) > 14
+
+
 def test_the_linear_string_is_exact():
     state = random_state(3, 25)
     found = SplittingSolver(resonator_of(STRING, 25, tension_modulated=False), 16_000).solve(state, 2000)
     times_s = torch.arange(2001, dtype=torch.float64) / 16_000
     assert relative(found, solve_linear(resonator_of(STRING, state.modes), state, times_s)) < 1e-11
+
+
+def test_without_damping_the_energy_stays():
+    string = StringParameters(damping_d1_kg_m_s=0, damping_d3_kg_m_s=0)
+
+    def energy(state: ModalState) -> float:
+        q, v = state.amplitude.numpy(), state.velocity.numpy()
+        stretch = float(np.square(wavenumbers(string, 10) * q).sum())
+        tension = string.youngs_modulus_pa * string.area_m2 / (16 * string.mass_per_length_kg_m) * stretch**2
+        return float((v**2 + (undamped_frequencies(string, 10) * q) ** 2).sum() / 2 + tension)
+
+    amplitudes = to_modes(draw_noise(1, 101, torch.Generator().manual_seed(1)), 10)
+    state = ModalState.at_rest(torch.from_numpy(amplitudes))
+    _, later = SplittingSolver(resonator_of(string, 10), 16_000).advance(state, 4000)
+    assert energy(later) == pytest.approx(energy(state), rel=1e-7)
 
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
