@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.export.choices import ExportChoices
 from app.player.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, list_presets
 from app.presets.words import judged, percent
 from app.rendering.note_sound import NoteSound
-from app.shared.parameters import OF_CHOICES
 from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
-from app.window.dropped_files import Dropped, receive, receive_body
+from app.window.dropped_files import Dropped, receive
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, preset_digest
 from engine.values.ear import Ear
@@ -81,19 +79,8 @@ def test_a_preset_of_a_taken_name_gets_a_number(library, small_preset, own, tmp_
     assert install_preset(given, own, [*present, path]) == (path, True)
     assert install_preset(small_preset, own, present)[1]
     assert files(own) == ["first_2.safetensors"]
-
-
-def test_a_dropped_preset_that_is_there_is_chosen(library, small_preset, own, tmp_path):
     dropped = receive(small_preset, library)
-    assert dropped.choices == {"preset": "first"}
-    assert "is the factory preset “A small string" in dropped.notice
-    assert not own.exists()
-    new = other_preset(small_preset, tmp_path / "New.safetensors")
-    for notice in ("", "New.safetensors is your own preset “Another string"):
-        dropped = receive(new, library)
-        assert (dropped.choices, library.names) == ({"preset": "New"}, ["New", "first", "second"])
-        assert dropped.notice.startswith(notice) and bool(dropped.notice) == bool(notice)
-    assert files(own) == ["New.safetensors"]
+    assert dropped.choices == {"preset": "first"} and "is the factory preset “A small string" in dropped.notice
 
 
 @pytest.mark.parametrize("ending", ["WAV", "FLAC"])
@@ -116,27 +103,6 @@ def test_an_export_restores_its_choices(library, preset_folder, tmp_path, ending
     dropped = receive(tmp_path / "c.wav", library)
     assert "its duration of 0.1 s" in dropped.notice and "shown are 0.5 s" in dropped.notice
     assert [dropped.choices[name] for name in ("seconds", "a", "heard")] == [0.5, "difference", "a"]
-    if ending == "FLAC":
-        return
-    export = ExportChoices()  # as the dialog writes it: its longest duration, 30 s, is no choice for the window
-    assert export.until_decayed and export.longest_s > OF_CHOICES["seconds"].limits[1]
-    export_sound(replace(sound, seconds=export.longest_s), tmp_path / "d.wav", settings=export.wav)
-    assert "seconds" not in receive(tmp_path / "d.wav", library).choices
-
-
-def test_foreign_and_broken_files_are_one_notice(library, tmp_path):
-    for name, words in (
-        ("a.txt", "not a file that is used here"),
-        ("a.wav", "no sound file that can be read"),
-        ("a.safetensors", "no such preset file"),
-    ):
-        dropped = receive(tmp_path / name, library)
-        assert dropped.choices == {} and words in dropped.notice
-    soundfile.write(tmp_path / "a.wav", np.zeros(5), 8000)
-    assert "no impulse response" in receive(tmp_path / "a.wav", library).notice
-    soundfile.write(tmp_path / "a.wav", np.zeros(8000), 8000)
-    assert receive(tmp_path / "a.wav", library) == Dropped(sound=True)
-    assert "no impulse response" in receive_body(tmp_path / "a.wav").notice
 
 
 @pytest.mark.parametrize(
@@ -176,22 +142,6 @@ def test_a_measured_distance_comes_and_goes_with_it(library, preset_folder, smal
         (preset_folder / NAME).write_bytes(content)
         entries, problems = list_presets()
         assert [entry.name for entry in entries] == ["first", "second"] and 1 <= len(problems) <= 4
-
-
-def test_the_most_accurate_come_first(qtbot, library, preset_folder, small_preset):
-    for name, title, distance_db in (("third", b"Another string", 3.0), ("fourth", b"Fourth  string", 0.1)):
-        path = other_preset(small_preset, preset_folder / f"{name}.safetensors", title)
-        add_heard(preset_folder, [heard(path, distance_db)])
-    library.refresh()
-    rows = [preset_row(entry) for entry in library.entries]
-    for favourites, words, order, names in (
-        ((), "", 0, "fourth third first second"),
-        (("second", "third"), "", 0, "third second fourth first"),
-        ((), "", 1, "first fourth second third"),
-        ((), "", 2, "first fourth second third"),
-        ((), "not measured", 0, "first second"),
-    ):
-        assert [row.name for row in listed_rows(rows, favourites, (words,), order=order)] == names.split()
 
 
 def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot, preset_folder):

@@ -188,17 +188,6 @@ def test_a_signal_is_that_of_the_motion_also_where_a_point_moves_to(preset, ear,
         assert finished(moved) is take
 
 
-def test_while_a_point_is_dragged_all_of_the_signal_follows(job):
-    made = job(NETWORK)
-    take, seen = finished(made), set()
-    for number in range(40):
-        made.ask_again(replace(made.request, ear=Ear((0.1 + 0.02 * number,))))
-        made.advance()
-        assert take.listened.complete
-        seen.add(take.listened.ear)
-    assert len(seen) > 5 and finished(made).listened.ear == made.request.ear
-
-
 @PRESETS
 @pytest.mark.parametrize("blocks", [2, 1_000])
 def test_another_speed_shows_what_it_would_have_shown(preset, blocks, job):

@@ -9,7 +9,6 @@ from pytestqt.qtbot import QtBot
 from app.shared import worker
 from app.shared.worker import Cancelled, Job
 from app.views.background import Background
-from app.window.panels.time_panel import keep_up
 from engine.presets import PresetError
 from tests.app.gestures import reported
 
@@ -114,29 +113,3 @@ def test_errors_are_reported_and_the_thread_lives_on(qtbot, background):
         assert (failed.args[0], bool(failed.args[1])) == (message, has_details)
     with qtbot.waitSignal(background.finished):
         background.start(lambda job: None)
-
-
-class Counting:
-    """Ten results, of which `allowed` can be computed."""
-
-    def __init__(self, allowed: int) -> None:
-        self.done, self.allowed = 0, allowed
-
-    @property
-    def complete(self) -> bool:
-        return self.done == 10
-
-    def advance(self) -> bool:
-        more = self.done < self.allowed
-        self.done += more
-        return more
-
-
-def test_the_latest_that_grows_alone_is_kept_up_with(qtbot, background):
-    old, new = Counting(allowed=3), Counting(allowed=4)
-    for growing in (old, new):
-        background.start(lambda job, growing=growing: keep_up(growing, job))
-        qtbot.waitUntil(lambda growing=growing: growing.done == growing.allowed)
-    with qtbot.waitSignal(background.finished):  # of `new`: `old` was given up before it began
-        old.allowed = new.allowed = 10
-    assert (old.done, new.done) == (3, 10)

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QAction, QColor
 from PySide6.QtGui import Qt as GuiQt
-from PySide6.QtWidgets import QCheckBox, QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
+from PySide6.QtWidgets import QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
 
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
@@ -26,10 +26,8 @@ from app.views.dialogs.export_pages import HeardInstrument
 from app.views.dialogs.preset_card import preset_browser, preset_row
 from app.views.instrument.instrument_card import instrument_browser, instrument_row
 from app.views.instrument.panel import InstrumentPanel
-from app.views.plots.colour_maps import displacement_map, error_map, level_map, share_map
 from app.window.exports import heard_note
 from engine.presets import read_info
-from tests.app.gestures import picture
 from tests.app.places import places_in
 
 
@@ -42,28 +40,6 @@ def test_text_can_be_read_on_every_ground_and_no_two_roles_share_a_colour(chosen
         assert theme.contrast(chosen.background, filled) >= 4.5
     colours = chosen.colours.values()
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
-
-
-def test_a_theme_is_put_on_with_ticks_that_are_seen_and_maps_on_its_ground(qtbot, own_look):
-    for choice, chosen in (("dark", theme.DARK), ("light", theme.LIGHT)):
-        theme.apply_theme(own_look, choice, 150)  # type: ignore[arg-type]
-        assert theme.present == replace(chosen, scale=1.5)
-        assert chosen.panel in own_look.styleSheet()
-        assert own_look.palette().window().color() == QColor(chosen.background)
-        box = QCheckBox("tick")
-        qtbot.addWidget(box)
-        box.setChecked(True)
-        image = picture(box)
-        width = int(22 * image.devicePixelRatio())
-        seen = {image.pixelColor(x, y).rgb() for x in range(width) for y in range(image.height())}
-        assert QColor(chosen.text).rgb() in seen  # the box is filled
-        assert QColor(chosen.background).rgb() in seen  # and the tick stands out from it
-        box.setChecked(False)
-        assert picture(box) != image
-        for made, ground_at in ((level_map, 0.0), (share_map, 0.0), (error_map, 0.5), (displacement_map, 0.5)):
-            ground, much = made().map([ground_at, 1.0], mode="qcolor")
-            assert theme.contrast(ground.name(), chosen.panel) < 1.25
-            assert theme.contrast(much.name(), chosen.panel) > 3
 
 
 EVIL = "<img src=evil>"

@@ -17,7 +17,7 @@ from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
 from app.playing.pair import Pair
-from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
+from app.views.dialogs.abx_dialog import DEVICE_CHANGED, SAME, TRIVIAL, AbxDialog
 from app.views.file_places import FilePlaces
 from engine.voices import Mixer
 from tests.app.gestures import named
@@ -184,13 +184,6 @@ def test_a_vanished_device_ends_it(qtbot, open_dialog, sound, devices, tmp_path)
     qtbot.waitUntil(lambda: not dialog.testing)
     assert saved(tmp_path).remark == DEVICE_CHANGED
     assert saved(tmp_path).through["device"] == "Headphones"
-
-
-def test_without_a_device_it_cannot_start(qtbot, open_dialog):
-    with Sound() as silent:
-        dialog = open_dialog(through=silent)
-        qtbot.waitUntil(lambda: NO_DEVICE in texts(dialog))
-        assert not start_button(dialog).isEnabled()
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Plots: their line, axes, legend and table, and what spectrum and waveform draw of a signal."""
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -9,22 +8,19 @@ import pyqtgraph as pg
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
+from PySide6.QtGui import QColor, QGuiApplication, QImage
 from PySide6.QtWidgets import QApplication
 
-from app.analysis.moment import StringFrame
 from app.presets.library import Library
-from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.session.shown import DEFAULT_SOURCES
 from app.stage.session import Session
 from app.views import theme
-from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
+from app.views.plots.axis_label import sparse
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow
-from app.views.plots.legend import SHARE, Legend
 from app.views.plots.time_plot import TimePlot
-from app.views.string.view import StringView
-from app.window.panels.spectrum import COLUMNS, Analyser, SpectrumPanel
+from app.window.panels.spectrum import Analyser, SpectrumPanel
 from app.window.panels.waveform import WaveformPanel, extremes
-from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, Paints, move, press_keys, reported, turn_wheel
+from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, move, press_keys, reported, turn_wheel
 
 Key = Qt.Key
 Show = Callable[..., Any]
@@ -57,9 +53,9 @@ def line_columns(plot: TimePlot) -> list[int]:
     return list(np.flatnonzero((pixels(plot) == QColor(theme.TEXT).rgb()).sum(axis=0) > 100))
 
 
-def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot, plot):
+def test_the_line_is_where_it_was_put_and_a_new_curve_is_seen(plot):
     plot.move_line(9.0)
-    without, paints, places = pixels(plot), Paints(plot.viewport()), []
+    without, places = pixels(plot), []
     for at in (0.8, 2.0, 3.2):
         plot.move_line(at)
         (column,) = line_columns(plot)
@@ -70,19 +66,6 @@ def test_the_line_is_where_it_was_put_and_the_plot_beneath_stays_as_it_was(qtbot
     assert (changed != without).any()
     plot.move_line(9.0)
     assert line_columns(plot) == []
-    qtbot.waitUntil(lambda: bool(paints.rects))
-    whole = pixels(plot)
-
-    def moved_alone() -> bool:
-        paints.rects.clear()
-        plot.move_line(1.0 if plot.line_at != 1.0 else 2.0)
-        qtbot.waitUntil(lambda: bool(paints.rects))
-        return all(rect.width() < plot.width() / 2 for rect in paints.rects)
-
-    qtbot.waitUntil(moved_alone)  # once what else was to be painted is
-    for _ in range(2):
-        plot.move_line(9.0)
-        assert (pixels(plot) == whole).all()
 
 
 def test_the_keyboard_seeks_and_zooms_and_a_click_reports_its_place(qtbot, plot):
@@ -126,12 +109,8 @@ def test_the_wheel_zooms_about_the_mouse_and_the_right_button_pans_to_the_ends(q
     qtbot.mouseRelease(view, RIGHT, pos=end)
 
 
-def test_the_view_stays_for_a_take_of_the_same_length_and_training_is_seen(qtbot, plot):
+def test_the_view_stays_for_a_take_of_the_same_length(plot):
     assert (plot.horizon.isVisible(), plot.horizon.value()) == (True, 0.25)
-    shaded, unshaded = (
-        pixels(plot)[place_of(plot, time_s, 0.9).y(), place_of(plot, time_s, 0.9).x()] for time_s in (0.12, 2.0)
-    )
-    assert shaded != unshaded
     plot.show_range(0.5, 0.7)
     plot.set_times(4.0, 0.5)
     assert plot.times_s == pytest.approx((0.5, 0.7))
@@ -140,63 +119,11 @@ def test_the_view_stays_for_a_take_of_the_same_length_and_training_is_seen(qtbot
     assert not plot.horizon.isVisible()
 
 
-def numbers(axis: pg.AxisItem) -> dict[str, float]:
-    """The heights in pixels at which an axis writes its numbers, from below."""
-    image = QImage(10, 10, QImage.Format.Format_RGB32)
-    painter = QPainter(image)
-    specs = axis.generateDrawSpecs(painter)
-    painter.end()
-    written = sorted(((rect.center().y(), text) for rect, _, text in (specs[2] if specs else [])), reverse=True)
-    return {text: y for y, text in written}
-
-
-def test_a_label_and_numbers_of_an_axis_give_way_where_there_is_little_room(qtbot, show):
-    for room, kept in ((1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))):
-        assert [text for _, text in sparse(TICKS, room)] == [str(number) for number in kept], "the ends go last"
-    assert sparse([], 1) == []
-    plot = show(pg.PlotWidget(), 300, 300)
-    item = plot.getPlotItem()
-    axis = item.getAxis("left")
-    label = UprightLabel(item, ("amplitude (mm)", "mm"))
-    for height, words in ((300, "amplitude (mm)"), (100, "mm"), (300, "amplitude (mm)")):
-        plot.resize(300, height)
-        qtbot.waitUntil(lambda words=words: axis.labelText == words)
-        assert axis.label.isVisible()
-    plot.resize(300, 100)
-    qtbot.waitUntil(lambda: axis.labelText == "mm")
-    label.set("a much longer wording than that", "a wording that is too long as well")
-    assert not axis.label.isVisible()
-    plot.resize(300, 400)
-    qtbot.waitUntil(axis.label.isVisible)
-    ticks = UprightTicks(axis, item.vb)
-    item.setYRange(0, 10, padding=0)
-    ticks.set(TICKS, between=(0.5,))
-    for height, highest, most in ((400, 10, 11), (90, 10, 6), (90, 3, 4)):
-        plot.resize(300, height)
-        item.setYRange(0, highest, padding=0)
-        qtbot.waitUntil(lambda most=most: 2 <= len(numbers(axis)) <= most)
-        first, *_, last = numbers(axis)
-        assert (first, last) == ("0", str(highest))
-        assert all(below - above >= TICK_PIXELS - 1 for below, above in pairwise(numbers(axis).values()))
-
-
-def test_the_legend_stands_in_the_corner_and_gives_way(qtbot, show):
-    plot = show(pg.PlotWidget(), 900, 200)
-    legend, seen = Legend(plot), {}
-    long = "Classical guitar, nylon B3, plucked anywhere"
-    for title in (long, long.replace("plucked", "struck")):
-        difference = ShownSource("difference", "B", "difference", gain_db=20.0)
-        legend.show_sources((ShownSource("preset:long", "A", title, heard=True), difference))
-        assert legend.text == f"A  {title} · heard   B  difference +20 dB"
-        for width in (900, 400, 260):
-            plot.resize(width, 200)
-            area = plot.getPlotItem().vb.sceneBoundingRect
-            qtbot.waitUntil(lambda area=area: abs(legend.geometry().right() + 5 - area().right()) < 4)
-            assert legend.width() <= SHARE * area().width() + 1
-            seen[title, width] = legend.width()
-    assert seen[long, 900] > seen[long, 400] > seen[long, 260] > 100
-    legend.show_sources(DEFAULT_SOURCES, "mode 2, left")
-    assert legend.accessibleName() == "Drawn: mode 2, left   A  model · heard   B  truth"
+@pytest.mark.parametrize(
+    ("room", "kept"), [(1, range(11)), (2, (0, 2, 4, 6, 8, 10)), (4, (0, 4, 10)), (10, (0, 10)), (99, (0,))]
+)
+def test_where_numbers_give_way_the_ends_go_last(room, kept):
+    assert sparse([(float(place), f"{place}") for place in range(11)], room) == [(each, f"{each}") for each in kept]
 
 
 @pytest.fixture
@@ -285,22 +212,3 @@ def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(wa
     time_s, connect = shown(48_000)
     assert (len(time_s), connect) == (pytest.approx(96, abs=3), "all")
     assert len(shown(10)[0]) == 0, "nothing of what is in view"
-
-
-def test_animated_plots_survive(qtbot, waveform, show):
-    """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
-    spectrum, string = (show(view, 600, 240) for view in (SpectrumPanel(Session(), Library([])), StringView()))
-    spectrum.set_rate(16_000)
-    random = np.random.default_rng(0)
-    for frame in range(150):
-        noise = random.standard_normal(16_000).astype(np.float32)
-        if frame % 4 == 0:
-            spectrum.show_signal("model", noise, Analyser(16_000))
-            waveform.show_signal("model", noise, 16_000)
-        waveform.plot.show_playhead(frame / 150)
-        shapes = {"model": noise[:101], "truth": noise[101:202]}
-        string.show_frame(StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()}))
-        qtbot.wait(1)
-    assert drawn(waveform).getData()[1].max() > 2
-    levels = [curve.getData()[0] for curve in spectrum.plot.getPlotItem().listDataItems()]
-    assert COLUMNS in {len(level) for level in levels if level is not None}
