@@ -2,8 +2,8 @@
 
 from typing import Any, TypeVar
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, Qt, SignalInstance
-from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPaintEvent, QWheelEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, SignalInstance
+from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -71,17 +71,3 @@ def colour_at(image: QImage, place: QPoint | QPointF) -> QColor:
     """The colour of a picture at a place in the pixels of its widget."""
     ratio = image.devicePixelRatio()
     return image.pixelColor(round(place.x() * ratio), round(place.y() * ratio))
-
-
-class Paints(QObject):
-    """The rectangles that a widget paints, from now on."""
-
-    def __init__(self, widget: QWidget) -> None:
-        super().__init__(widget)
-        self.rects: list[QRect] = []
-        widget.installEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if isinstance(event, QPaintEvent):
-            self.rects.append(event.rect())
-        return False

@@ -1,4 +1,4 @@
-"""Audio settings are shown and asked for; help and about name everything that there is."""
+"""Help and about name everything that there is."""
 
 import re
 

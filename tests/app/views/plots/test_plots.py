@@ -1,4 +1,4 @@
-"""Plots: their line, axes, legend and table, and what spectrum and waveform draw of a signal."""
+"""Plots: their line, axes and table, and what spectrum and waveform draw."""
 
 from collections.abc import Callable
 from typing import Any
