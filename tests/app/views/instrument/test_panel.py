@@ -60,6 +60,14 @@ def test_either_surface_is_played_and_sees_what_sounds(qtbot, panel):
         panel.show_surface("neck")
 
 
+def test_in_a_low_window_the_strings_knobs_take_the_place_of_the_keys(qtbot, panel):
+    panel.set_low(True)
+    panel.set_unfolded(True)
+    assert panel.knobs.isVisible() and not panel.keys.isVisible()
+    click(qtbot, panel, "Surface: Keys")
+    assert panel.keys.isVisible() and not panel.unfolded and not panel.knobs.isVisible()
+
+
 def test_the_touch_is_chosen_and_fingers_are_lifted_by_a_button(qtbot, panel):
     chosen, switched = reported(panel.touch_chosen), reported(panel.technique_switched)
     for part, names in ((panel.touch, "legato slide pluck"), (panel.techniques, "strum tremolo strum harmonics")):
