@@ -119,6 +119,13 @@ def test_a_sound_is_taken_by_every_usual_ending(name, form, library, tmp_path):
         assert receive(tmp_path / name, library).body == "a" == body_names()[-1]
 
 
+def test_a_broken_sound_is_a_notice(library, tmp_path):
+    for size, words in ((None, "no sound file that can be read"), (5, "no impulse response")):
+        if size:
+            soundfile.write(tmp_path / "a.wav", np.zeros(size), 8000)
+        assert words in receive(tmp_path / "a.wav", library).notice
+
+
 def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first():
     entries, _ = list_presets(SHIPPED)
     assert len({one.title for one in entries}) == len(entries) > 2

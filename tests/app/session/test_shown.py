@@ -73,7 +73,6 @@ def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small
         (3e-5, "displacement", 1e6, "µm"),
         (0.0, "displacement", 1e3, "mm"),
         (6.0, "velocity", 1.0, "m/s"),
-        (0.02, "velocity", 1e3, "mm/s"),
         (1e-12, "velocity", 1e9, "nm/s"),
     ],
 )
@@ -136,7 +135,6 @@ def test_a_model_that_runs_away_is_reported_with_the_reason(small_preset):
     assert why_ran_away(take) == ""
     take.model_ends_s = 0.0
     at_once = why_ran_away(take)
-    assert take.info.title in at_once
     assert "cannot play this pluck" in at_once
     assert "amplitude 20 mm is outside" in at_once
     take.model_ends_s = 0.25

@@ -23,7 +23,7 @@ from app.shared.parameters import Parameter, Taper
 from app.views.controls.knob import DRAG_PIXELS, Knob
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
 from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
-from app.views.controls.number_box import CountBox, NumberBox
+from app.views.controls.number_box import NumberBox
 from app.views.controls.playing_keys import X11, PlayingKeys
 from tests.app.gestures import (
     CONTROL,
@@ -217,15 +217,6 @@ def test_a_refused_text_leaves_the_value_and_presses_no_button(qtbot, show):
         assert QToolTip.isVisible() and "0.650 m is" in QToolTip.text()
     type_over(qtbot, box, "1,2")
     assert len(pressed) == 1 and box.value() == 1.2
-
-
-def test_counts_are_whole(qtbot, show):
-    box = show(CountBox("trials", 5000, 16, ""))
-    for text, value in (("12", 12), ("2.5", 12), ("1 234", 1234), ("5001", 1234), ("0", 1234), ("8.0", 8), ("a", 8)):
-        type_over(qtbot, box, text)
-        assert (box.value(), box.text()) == (value, str(value)), text
-    qtbot.keyClick(box, Qt.Key.Key_Up)
-    assert box.value() == 9
 
 
 DOWN, UP = QEvent.Type.KeyPress, QEvent.Type.KeyRelease
