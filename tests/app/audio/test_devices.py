@@ -2,7 +2,6 @@
 
 import builtins
 import math
-import subprocess
 import sys
 from operator import attrgetter
 from types import SimpleNamespace
@@ -181,20 +180,3 @@ def test_no_portaudio_is_said(monkeypatch, error, kind):
     with pytest.raises(AudioProblem) as caught:
         output_devices()
     assert (caught.value.kind, caught.value.detail) == (kind, "PortAudio library not found")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="ALSA is Linux's")
-def test_alsa_prints_nothing_into_the_terminal():
-    """In a process of its own: the handler stays."""
-    script = (
-        "import ctypes, contextlib, sys; from app.audio.devices import output_devices\n"
-        "with contextlib.suppress(Exception): sys.argv[1:] and output_devices()\n"
-        "ctypes.CDLL('libasound.so.2').snd_pcm_open(ctypes.byref(ctypes.c_void_p()), b'no_such_device', 0, 0)"
-    )
-    loud, quiet = (
-        subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=False)
-        for words in ([], ["quiet"])
-    )
-    if "ALSA lib" not in loud.stderr:
-        pytest.skip("there is no ALSA")
-    assert (quiet.returncode, quiet.stderr) == (0, "")

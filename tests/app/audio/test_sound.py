@@ -323,12 +323,3 @@ def test_a_fault_while_a_device_is_opened_is_reported_and_tried_again(desk, stag
         assert desk.kinds == [ProblemKind.UNEXPECTED]
         assert "internal error" in desk.problems[0].message and "a mistake" in desk.problems[0].detail
         plays_on(sound, desk)
-
-
-def test_a_fault_where_problems_are_shown_stops_nothing(desk):
-    desk.refuses = busy
-    with desk.sound(on_problem=broken) as sound:
-        opened(sound)
-        opened(sound, SPEAKERS)
-        wait_for(lambda: sound.status().problem is not None)
-        plays_on(sound, desk)

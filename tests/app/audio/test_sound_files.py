@@ -137,25 +137,6 @@ def test_odd_files_cost_no_samples(path):
     assert read.digest == sha256(path.read_bytes()).hexdigest()
 
 
-@pytest.mark.parametrize("name", [b"DISP", b"_PMX", b"LIST"])
-@pytest.mark.parametrize(("length", "filled"), [(1, 33), (17, 0), (603, 100)])
-def test_odd_chunks_may_lack_their_padding(name, length, filled, path):
-    """A name less its first letter, and a size of 100, look like a name too."""
-    odd = chunk(b"strc", bytes([filled]) * length, padded=False)
-    text = chunk(name, (b"INFO" if name == b"LIST" else b"") + bytes([filled]) * 100)
-    assert samples_of(path, riff(odd, text, format_of(), DATA)) == [1, 2, 3]
-
-
-@pytest.mark.parametrize(("subtype", "kind"), [("ULAW", 7), ("ALAW", 6)])
-def test_a_compressed_body_with_an_extensible_header(subtype, kind, path):
-    raw = path.with_suffix(".raw")
-    soundfile.write(raw, DECAYING[:, 0], 48_000, subtype=subtype, format="RAW")
-    head = struct.pack("<HHIIHH", 0xFFFE, 1, 48_000, 48_000, 1, 8) + struct.pack("<HHIH", 22, 8, 0, kind) + GUID
-    path.write_bytes(riff(chunk(b"fmt ", head), chunk(b"data", raw.read_bytes())))
-    whole = soundfile.read(raw, channels=1, samplerate=48_000, subtype=subtype, format="RAW")[0]
-    np.testing.assert_array_equal(read_impulse(path).samples[:, 0], whole)
-
-
 # FLAC
 
 

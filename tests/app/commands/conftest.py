@@ -36,28 +36,7 @@ DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_
 HORIZON = 500  # frames of `tiny`
 STEEL_G3 = find_string("steel_g3")
 EVENTS = [TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.1, NoteOff(57))]
-CONFIGURATION = """
-title = "Tiny"
-model = "koopman_var"
-model_configuration = { state_size = 8, multiplier_widths = [4] }
-data = { initial = "gaussian", rate_hz = 4000, modes = 5, steps = 50, count = 20 }
-[recipe]
-epochs = 3
-batch_size = 8
-steps_per_batch = 8
-first_horizon = 10
-validate_every = 1
-"""
-PLAN = """
-description = "Two runs."
-data = { count = 10, steps = 60 }
-[[block]]
-models = ["koopman_var", "koopman"]
-strings = ["linear"]
-initials = ["noise"]
-rates_hz = [4000]
-horizons = [60]
-"""
+CONFIGURATION, PLAN = (Path(__file__).with_name(name).read_text() for name in ("tiny.toml", "plan.toml"))
 ARRAYS = {
     "flat": np.zeros(101),
     "deep": np.zeros((1, 2, 101)),

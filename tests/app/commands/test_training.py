@@ -18,7 +18,6 @@ from engine.presets import load_preset, preset_digest
 from engine.schema import read, write
 from tests.app.commands.conftest import CONFIGURATION
 from training.cell import Cell, configuration_of
-from training.cli import console
 from training.cli.sweep import Shown
 from training.fitting.fit import FitProgress
 from training.fitting.log import read_log
@@ -186,37 +185,17 @@ def test_files_of_other_machines_are_merged(run, tmp_path):
     assert here.read_bytes() == before
 
 
-def progress_of(seconds: float, seconds_left: float) -> FitProgress:
-    return FitProgress(2, 8, 1, 4, 60, 1e-3, 0.5, RelativeError(0.25, 0.125), seconds, seconds_left)
-
-
-ONE, OTHER = (SimpleNamespace(name=name) for name in "ab")
-
-
 def test_the_time_left_follows_from_the_runs_so_far():
-    ended: list[str] = []
-    shown = Shown(lambda what: lambda share, *_: ended.append(what) if share == 1 else None, 5, 2)
-    assert shown.summary() == "0 done, 0 running, 5 waiting"
-    shown.started(ONE)
-    shown.started(OTHER)
+    shown = Shown(lambda what: lambda *_: None, 5, 2)
+    one, other = (SimpleNamespace(name=name) for name in "ab")
+    for each in (one, other):
+        shown.started(each)
     assert shown.seconds_left() is None
-    shown.progressed(ONE, progress_of(10, 30))
+    shown.progressed(one, FitProgress(2, 8, 1, 4, 60, 1e-3, 0.5, RelativeError(0.25, 0.125), 10, 30))
     assert shown.seconds_left() == (30 + 4 * 40) / 2
     shown.finished(row_of("a", seconds=20.0))
-    assert shown.seconds_left() == 4 * 20 / 2
     shown.finished(row_of("b", status="diverged", seconds=None))
     assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
-    assert ended == ["a", "b"]
-
-
-def test_runs_under_way_are_shown(capsys):
-    for every_s in (60.0, 0.0):
-        with console.bars(every_s) as begin:
-            shown = Shown(begin, 3, 2)
-            shown.started(ONE)
-            shown.progressed(ONE, progress_of(1, 3))
-    facts = "3 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125"
-    assert capsys.readouterr().err == f"learned-strings: a: 25%, {facts}\n"
 
 
 def test_tables_are_printed_written_or_made_again_in_a_document(run, folder):

@@ -45,10 +45,6 @@ def test_there_are_many_and_none_is_broken():
     counted = Counter(instrument.category for instrument in INSTRUMENTS)
     assert all(counted[category] >= 5 for category in CATEGORIES), counted
     assert len({instrument.name for instrument in INSTRUMENTS}) == len(INSTRUMENTS)
-    assert (
-        len({instrument.mode for instrument in INSTRUMENTS}) > 1
-        and sum(bool(instrument.tuning.scale) for instrument in INSTRUMENTS) >= 4
-    )
 
 
 @pytest.mark.parametrize("instrument", INSTRUMENTS, ids=lambda instrument: instrument.name)
@@ -60,7 +56,6 @@ def test_every_instrument_can_be_played_over_all_its_keys(instrument):
         return
     every_key_is_a_string_that_the_model_knows(instrument)
     hardest = float(np.nanmax(glides_cents(instrument)[:, 127]))
-    print(f"{instrument.name}: starts {hardest:.1f} cents sharp at most")
     assert instrument.category == "experimental" or instrument.name in GLIDING or hardest <= MOST_GLIDE_CENTS
     assert instrument.name not in GLIDING or hardest > MOST_GLIDE_CENTS
 
@@ -102,7 +97,6 @@ def every_key_is_a_drum_that_drops_as_drums_do(instrument: Instrument, strings: 
         assert drum is not None and np.isfinite(block_of(drum)).all()
         drops.append(drum.drop_cents(127, instrument.pluck.curve))
         assert drum.drop_cents(30) < drops[-1] <= MOST_DROP_CENTS
-    print(f"{instrument.name}: drops by {max(drops):.0f} cents at most")
 
 
 def macros_stand_where_the_fields_are(instrument: Instrument) -> None:

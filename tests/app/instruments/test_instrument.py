@@ -1,7 +1,9 @@
 """An instrument: what it refuses, and what its numbers mean."""
 
 import itertools
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,50 +21,21 @@ def macro_of(field: str, low: float, high: float) -> list[dict[str, Any]]:
     return [{"name": "m", "targets": [{"field": field, "low": low, "high": high}]}]
 
 
-REFUSED: list[tuple[str, dict[str, Any]]] = [
-    ("name", {"name": ""}),
-    ("name", {"name": "../other"}),
-    ("name", {"name": "two\nlines"}),
-    ("name", {"name": "x" * 61}),
-    ("preset", {"preset": "/etc/passwd"}),
-    ("version", {"version": 2}),
-    ("category", {"category": "strings"}),
-    ("colour", {"colour": 1}),
-    ("range", {"range": [60, 40]}),
-    ("range", {"range": [0, 128]}),
-    ("bend_semitones", {"bend_semitones": math.nan}),
-    ("bend_semitones", {"bend_semitones": "2"}),
-    ("pluck.softest_mm", {"pluck": {"softest_mm": math.inf}}),
-    ("softest_mm", {"pluck": {"softest_mm": 4, "hardest_mm": 3}}),
-    ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
-    ("damping.let_ring", {"damping": {"let_ring": 1}}),
-    ("pluck.stops", {"pluck": {"stops": "no"}}),
-    ("flux_mm", {"pickup": {"flux_mm": 0.5}}),
-    ("octaves", {"course": {"strings": 2, "octaves": 7}}),
-    ("javari", {"javari": {"distance_mm": 10}, "course": {"strings": 2, "bridge": 1.0}}),  # one bridge has no edge
-    ("javari", {"javari": {"distance_mm": 10}, "course": {"bridge": 0.5}}),
-    ("pluck.variation", {"pluck": {"variation": 1.5}}),
-    ("polarisations\n.*angle_deg", {"polarisations": {"angle_deg": 90}}),
-    ("polarisations\n.*conductance_s_kg", {"polarisations": {"conductance_s_kg": -1}}),
-    ("losses\n.*friction", {"losses": {"friction": 1}}),
-    ("sympathy_s_kg", {"sympathy_s_kg": -0.1}),
-    ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
-    ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
-    ("mod_wheel", {"mod_wheel": "name"}),
-    ("mod_wheel", {"mod_wheel": "pickup.points.1"}),
-    ("macros.0", {"macros": macro_of("tuning.scale", 0, 1)}),
-    ("knobs.decay", {"macros": macro_of("knobs.decay", 0, 1)}),
-    ("level_db", {"macros": macro_of("level_db", 0, 99)}),
-    ("strings.fretted.string\n.*length_m", {"strings": {"kind": "fretted", "string": {**STRING, "length_m": 0}}}),
-    ("strings", {"strings": {"kind": "set", "strings": [{"note": n, "string": STRING} for n in (50, 50)]}}),
-    ("strings", {"strings": {"kind": "bow"}}),
-]
+LENGTHLESS = {**STRING, "length_m": 0}
 
 
 def test_impossible_values_are_refused_by_name():
-    for field, changes in REFUSED:
+    text = Path(__file__).with_name("refused.txt").read_text(encoding="utf-8")
+    for name, meant in (
+        ("LENGTHLESS", json.dumps(LENGTHLESS)),
+        ("STRING", json.dumps(STRING)),
+        ("LONG", "x" * 65_537),
+    ):
+        text = text.replace(f": {name}", f": {meant}").replace(f'"{name}"', f'"{meant}"')
+    for line in text.splitlines()[2:]:
+        field, _, changes = line.partition(" | ")
         with pytest.raises(ValidationError, match=field):
-            make_instrument(**changes)
+            make_instrument(**json.loads(changes))
 
 
 def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise():

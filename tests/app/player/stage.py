@@ -32,7 +32,7 @@ Timed = tuple[float, Event]
 def changed(instrument: Instrument, **parts: object) -> Instrument:
     """An instrument with other parts; a part that is a mapping changes the values that it names."""
     whole = {
-        name: {**dict(getattr(instrument, name) or {}), **p} if isinstance(p, dict) else p
+        name: {**(vars(value) if (value := getattr(instrument, name)) else {}), **p} if isinstance(p, dict) else p
         for name, p in parts.items()
     }
     return Instrument.model_validate({**dict(instrument), **whole})

@@ -17,13 +17,12 @@ import numpy as np
 import pytest
 
 from app.instruments.drums import Drums
-from app.instruments.instrument import Course, Instrument, Noise, Pickup
+from app.instruments.instrument import Instrument, Pickup
 from app.instruments.library import read_instrument
 from app.player import events
 from app.player.events import KEYS, Bend, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn
 from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
-from engine.values.string import Losses, Polarisations
 from tests.app.player.stage import PRESET, RATE_HZ, Sound, Stage, changed
 from tests.engine.resonators.test_recorded import recorded
 
@@ -118,32 +117,8 @@ def released_once(played: list[tuple[int, Event]]) -> list[tuple[int, Event]]:
     return found
 
 
-TWO = Polarisations(angle_deg=30.0, second_heard=0.4, second_cents=3.0, conductance_s_kg=0.02)
-INSTRUMENTS = [
-    ("classical_guitar", {}),  # wheel on a knob
-    ("electric_bass", {}),  # velocity
-    ("concert_harp", {}),  # rings
-    ("cimbalom", {}),  # added to the motion
-    ("felt_on_wires", {"mod_wheel": "knobs.tension"}),
-    ("guitar_in_nineteen_tones", {}),
-    ("fretless_bass", {}),  # guitar, by length, wheel on the pluck, velocity
-    ("oud", {"mod_wheel": "damping.release_t60_s"}),  # guitar
-    ("sitar", {"pluck": {"stops": False}}),  # guitar, velocity, added
-    ("koto", {"mode": "mpe", "mod_wheel": "pluck.curve"}),
-    ("jazz_guitar", {"mode": "mpe"}),
-    ("flamenco_guitar", {"polarisations": TWO, "losses": Losses(), "mod_wheel": "knobs.decay"}),
-    ("cimbalom", {"polarisations": TWO, "pluck": {"release_ms": 3.0, "release_hard_ms": 0.7}}),
-]
-NOISE = Noise(kind="finger", onset_db=-10.0, release_db=-10.0)
-EDGE = {"distance_mm": 10.0, "gap_um": 3.0, "stiffness_n_m": 2e4, "loss_s_m": 0.5}
-COURSE = Course(strings=3, cents=2, apart_ms=3, bridge=1)
-WITH_TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
-    ("oud", {"polarisations": TWO, "course": COURSE, "technique": {"strum_ms": 7.0, "tremolo_hz": 16.0}}),
-    ("sitar", {"javari": EDGE, "noise": NOISE, "damping": {"mute": 0.1}, "mod_wheel": "technique.vibrato_cents"}),
-    ("classical_guitar", {"mode": "poly", "technique": {"harmonic": 3}, "noise": NOISE, "course": Course(strings=2)}),
-    ("concert_toms", {"noise": NOISE}),
-    ("timpani", {"noise": NOISE}),
-]
+PLAYED = json.loads(FROZEN_INSTRUMENTS.with_suffix(".json").read_text())  # instruments with other parts
+INSTRUMENTS, WITH_TECHNIQUES = PLAYED["random"], PLAYED["techniques"]
 
 
 @pytest.mark.parametrize("number", range(len(INSTRUMENTS)), ids=[name for name, _ in INSTRUMENTS])

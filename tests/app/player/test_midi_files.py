@@ -29,7 +29,7 @@ from app.player.events import (
     release_all,
 )
 from app.player.general_midi import FAMILIES
-from app.player.midi_file import MidiFileError, SongPart, event_of, midi_bytes, read_midi, read_parts, read_song
+from app.player.midi_file import MidiFileError, SongPart, midi_bytes, read_midi, read_parts, read_song
 from app.player.midi_messages import NotMidi, read_messages
 
 FILES = 400
@@ -233,22 +233,6 @@ def test_what_is_written_is_read_again_also_by_another_program(file, instrument)
     assert read.length == pytest.approx(1.5, abs=1e-3)
     assert [message.type for message in read.tracks[0]][1:3] == ["note_on", "pitchwheel"]
     assert midi_bytes([TimedEvent(0.0, InstrumentTurned(instrument)), *PLAYED]) == WHOLE, "a knob is no MIDI"
-
-
-@pytest.mark.parametrize(
-    ("message", "event"),
-    [
-        ((0xF8,), None),
-        ((0xC0, 3), None),
-        ((0xA0, 3, 4), None),
-        ((0xE0, 0, 0), Bend(-1.0)),
-        ((0xE0, 127, 127), Bend(1.0)),
-        ((0x94, 3, 0), NoteOff(3, 4)),
-        ((0xB0, 121, 127), ControlChange(121, 0)),  # others are the program's own
-    ],
-)
-def test_messages_are_events_or_nothing(message, event):
-    assert event_of(message) == event
 
 
 INSTRUMENT = read_instrument(SHIPPED / "long_wire.json").model_copy(update={"range": (0, 127)})

@@ -1,8 +1,6 @@
 """The player itself: more events than fit, threads, other players, knobs, plucks by hand, and what it reports."""
 
-import gc
 import threading
-import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -15,8 +13,8 @@ from app.instruments.library import read_instrument
 from app.instruments.tuning import TuningChoice
 from app.player import events
 from app.player.compiled import InstrumentPlayer
-from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, PluckAt, TimedEvent
-from app.player.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, channels_played, render_events, render_note
+from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, TimedEvent
+from app.player.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, render_events, render_note
 from app.player.strings import StringKeys, on_string
 from app.shared.parameters import OF_INSTRUMENTS
 from engine import bounds
@@ -30,8 +28,8 @@ from engine.values.effects import Room
 from engine.values.string import Polarisations
 from engine.voices import Mixer, Voice, plain_program
 from tests.app.player.conftest import STEEL
-from tests.app.player.seen import seen, sounding
-from tests.app.player.stage import KEY, PRESET, RATE_HZ, SOURCES, Stage, changed, level_db, relative, string_of
+from tests.app.player.seen import seen
+from tests.app.player.stage import KEY, PRESET, RATE_HZ, SOURCES, Stage, changed, relative
 
 
 def shipped(name: str, **parts: Any) -> Instrument:
@@ -69,31 +67,6 @@ def test_threads_may_give_more_events_than_the_ring_holds_while_the_mixer_plays(
         stage.mixer.render(QUANTUM)
     assert [compiled.channel(channel).bend for channel in range(5)] == [1, 1, 1, 1, 0]
     assert int(compiled.record["taken"]) == 4 * count + 1
-
-
-def test_tables_are_freed_when_the_kernel_has_left_them(stage):
-    tables = []
-    for number in range(20):
-        stage.take(stage.player.instrument.with_value("knobs.decay", 1 + number / 100))
-        tables.append(weakref.ref(stage.player.table))
-        stage.run((), QUANTUM)
-    gc.collect()
-    assert sum(table() is not None for table in tables) <= 2
-
-
-def test_a_single_note_can_be_released_and_its_events_cancelled(stage):
-    player = stage.player
-    one, other = (player.handle(NoteOn(key, 90)) for key in (50, 57))
-    stage.run((), 10 * QUANTUM)
-    player.release(one, 0.01)
-    player.release(other, 0.01, frame=5_000)
-    stage.run((), 20 * QUANTUM)
-    assert [each.key for each in player.compiled.ringing()] == [57]
-    player.cancel(other)
-    later = player.handle(NoteOn(60, 90), 6_000)
-    player.cancel(one)
-    stage.run((), 120 * QUANTUM)
-    assert {each.key for each in player.compiled.ringing()} == {57, 60} and later in [each.id for each in stage.begun]
 
 
 def test_notes_of_the_player_before_ring_on_and_can_be_stopped(stage):
@@ -188,27 +161,6 @@ def test_reports_say_what_was_plucked():
         )
 
 
-def test_strokes_vary_where_the_instrument_says_so():
-    instrument = shipped("koto", pluck={"variation": 1.0, "release_ms": 2.0, "release_hard_ms": 1.0})
-    found = []
-    for varied in (True, False):
-        stage = Stage(instrument, varied=varied)
-        stage.run([(64 * number, NoteOn(60, 90)) for number in range(5)], 512)
-        found.append(np.array([(each.position, each.amplitude_mm, each.width) for each in stage.begun]))
-    apart = np.abs(found[0] / found[1] - 1)
-    assert (apart > 0).all() and (apart < [0.08, 0.13, 0.12]).all()
-    assert [len(np.unique(each, axis=0)) for each in found] == [5, 1]
-
-
-@pytest.mark.parametrize(("name", "key"), [("classical_guitar", 52), ("fretless_bass", 40), ("cimbalom", 60)])
-def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(name, key):
-    instrument, heard = shipped(name, pluck={"variation": 0.0}), []
-    pluck = on_string(string_of(instrument, key), instrument.pluck.pluck(90))
-    for event in (NoteOn(key, 90), NoteOn(key, 1, pluck=pluck)):
-        heard.append(Stage(instrument).run([(0, event)], 6_400))
-    np.testing.assert_allclose(*heard, rtol=0, atol=1e-9 * np.abs(heard[0]).max())
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_pluck_by_hand_is_exactly_itself(shape):
     instrument = shipped("classical_guitar", noise=Noise(), pluck={"variation": 0.0})
@@ -221,20 +173,6 @@ def test_a_pluck_by_hand_is_exactly_itself(shape):
         assert (begun.position, begun.amplitude_mm, begun.width) == (0.3, 2.5, 0.2)
         heard.append(sound / begun.gain)
     np.testing.assert_allclose(heard[1], heard[0], rtol=0, atol=1e-9 * np.abs(heard[0]).max())
-
-
-@pytest.mark.parametrize(
-    ("switch", "moves_to"), [(ControlChange(midi.TREMOLO, 127), 52), (ControlChange(midi.LEGATO, 127), 53)]
-)
-def test_a_string_plucked_by_hand_rings_until_a_key_of_it_is_released(switch, moves_to):
-    stage = Stage(shipped("classical_guitar"))
-    by_hand = NoteOn(52, 90, pluck=Pluck(0.3, 1.0, stage.player.instrument.pluck.shape, 0.03))
-    moved = [(6_400, NoteOn(53, 90))] if moves_to == 53 else []
-    stage.run([(0, switch), (64, by_hand), *moved], 200 * QUANTUM)
-    assert [(each.key, each.damped) for each in sounding(stage.player)] == [(moves_to, False)]
-    assert len(stage.begun) == 1 + len(moved)
-    stage.run([(0, NoteOff(moves_to))], 128)
-    assert [(each.key, each.damped) for each in sounding(stage.player)] == [(moves_to, True)]
 
 
 def test_another_player_begins_as_the_hands_are(stage):
@@ -271,15 +209,6 @@ def test_the_wheel_turns_whatever_it_may(instrument):
 
     for field in WHEEL:
         assert field == "damping.mute" or "technique" in field or heard(field, 0) != heard(field, 127), field
-
-
-def test_the_wheel_brings_the_room_whose_echo_has_two_sides(instrument):
-    wheel = changed(instrument, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
-    timed = [TimedEvent(0.0, ControlChange(midi.MOD_WHEEL, 127)), *timed_key(0.2)]
-    for played, channels, loudest in ((timed[1:], 1, (0, 1e-5)), (timed, 2, (1e-4, 1))):
-        assert channels_played(wheel, played) == channels
-        sound = np.concatenate(list(render_events(wheel, PRESET, played, RATE_HZ, seconds=1.4)))
-        assert loudest[0] <= np.abs(sound[RATE_HZ:]).max() < loudest[1] and sound.shape[1] == channels
 
 
 def test_a_parameter_changes_as_by_a_turned_instrument():
@@ -350,12 +279,6 @@ def test_a_file_ends_when_nothing_is_heard_whatever_controllers_follow(instrumen
     assert heard > 0.2 * RATE_HZ and len(followed) == len(sound) <= heard + 2 * BLOCK_FRAMES
 
 
-def test_the_pedal_after_the_last_note_of_a_file_is_followed(instrument):
-    pedal = [TimedEvent(0.05, ControlChange(midi.SUSTAIN, 127)), TimedEvent(1.0, ControlChange(midi.SUSTAIN, 0))]
-    sound = np.concatenate(list(render_events(instrument, PRESET, timed_key(0.1) + pedal, RATE_HZ)))
-    assert RATE_HZ < len(sound) < 2 * RATE_HZ and level_db(sound[:, 0], 0.8, 0.95) > -60
-
-
 def timed_key(seconds: float) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(60, 100)), TimedEvent(seconds, NoteOff(60))]
 
@@ -397,18 +320,3 @@ HIGH = {"range": (0, 127), "tuning": TuningChoice(a4_hz=880, transpose=48)}
 def test_what_cannot_be_played_is_an_error(instrument, ask, reported):
     with pytest.raises(ValueError, match=reported):
         ask(instrument)
-
-
-@pytest.mark.parametrize(
-    ("name", "event", "kinds"),
-    [
-        ("koto", NoteOn(10, 90), [of.REFUSED]),
-        ("concert_toms", NoteOn(52, 90), [of.REFUSED]),
-        ("koto", PluckAt(Pluck()), []),
-    ],
-)
-def test_what_is_no_key_of_an_instrument_is_silent(name, event, kinds):
-    stage = Stage(read_instrument(INSTRUMENTS / f"{name}.json"))
-    stage.player.handle(event)
-    stage.run((), 128)
-    assert [each.kind for each in stage.reports] == kinds and not stage.mixer.active

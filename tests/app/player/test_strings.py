@@ -12,7 +12,7 @@ from app.instruments.tuning import TuningChoice
 from app.player.events import NoteOn
 from app.player.facts import FIGURES, bright_mode, knob_for, outside_of_key, t60_s
 from app.player.glide import START_S, glides_cents
-from app.player.strings import KNOBS, Strings, decay_rates
+from app.player.strings import KNOBS, Strings
 from app.shared.parameters import OF_INSTRUMENTS
 from engine.kernels import strings as law
 from engine.kernels.constants import D1, LENGTH, TENSION
@@ -46,23 +46,6 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert all(in_tune(string, hz_of(key) * 443 / 440) for key, string in strings.items())
     assert strings[30].tension_n < 0.5 * strings[40].tension_n
     assert strings[30].length_m == pytest.approx(strings[40].length_m, rel=1e-3)
-
-
-def test_a_set_may_be_asked_for_a_string(guitar):
-    own = ((50, 60.0), (55, 70.0), (59, 80.0))
-    strings = tuple(OpenString(note=note, string=replace(STEEL, tension_n=tension_n)) for note, tension_n in own)
-    chosen = changed(guitar, strings=StringSet(strings=strings))
-
-    def tension_n(key: int, string: int | None) -> float:
-        found = string_of(chosen, key, string).parameters
-        assert in_tune(found, hz_of(key))
-        return found.tension_n
-
-    by_key = {50: 60.0, 54: 60.0, 55: 70.0, 58: 70.0, 59: 80.0, 60: 80.0}  # open strings sound at their own keys
-    assert {key: tension_n(key, None) for key in by_key} == by_key
-    assert [tension_n(64, string) for string in (None, 0, 1, 2, 3)] == [80.0, 80.0, 70.0, 60.0, 80.0]
-    assert [tension_n(53, string) for string in (None, 0, 2)] == [60.0, 60.0, 60.0]  # 0 is too far above
-    assert tension_n(57, 0) == pytest.approx(80 * 2 ** (-4 / 12), rel=0.01)  # it is slackened
 
 
 def test_bends_and_slides_reach_the_pitch_and_a_damper_adds_its_decay_to_every_partial():
@@ -123,21 +106,6 @@ def test_an_impossible_key_is_named(instrument, strings, key, error):
     assert found.of_key(27) is found.of_key(89) is None, "beyond the range"
     with pytest.raises(ValueError, match=error):
         found.of_key(key)
-
-
-def test_each_tenth_of_the_mute_knob_shortens_a_string_alike():
-    instrument = read_instrument(SHIPPED / "steel_string_acoustic.json")
-    string, knob, t60_s = string_of(instrument, 40), OF_INSTRUMENTS["damping.mute"], []
-    own, modes = string.parameters, string.modes
-    squares = np.array([own.undamped_frequency(mode) ** 2 for mode in range(1, modes + 1)])
-    energies, times_s = np.arange(1.0, modes + 1) ** -2, np.geomspace(0.01, 20, 2000)
-    for tenth in range(11):
-        out = np.concatenate([squares, decay_rates(instrument, own, modes)])
-        law.mute(own.row, modes, 0, knob.value(tenth / 10), out)
-        left = (energies / out[modes:] * np.exp(-2 * np.outer(times_s, out[modes:]))).sum(1)
-        t60_s.append(3 * times_s[np.argmax(left < 0.01 * (energies / out[modes:]).sum())])
-    ratios = np.array(t60_s[1:]) / t60_s[:-1]
-    assert t60_s[0] > 20 * t60_s[-1] and 0.6 < ratios.min() < ratios.max() < 0.8
 
 
 # How far a hard stroke begins above its pitch

@@ -135,18 +135,6 @@ def test_a_fault_is_reported_and_the_others_go_on(at, monkeypatch):
     at.finished()
 
 
-def test_what_nobody_wants_is_rendered_no_further(at, monkeypatch):
-    slow_down(monkeypatch, speed=4.0)
-    voice = at.render(seconds=60.0)
-    at.wait(lambda: voice.given > 1_000)
-    at.notes[-1].cut = True
-    given = -1
-    while voice.given != given:  # a block may be under way
-        given = voice.given
-        time.sleep(0.1)
-    assert not voice.finished
-
-
 def test_the_one_that_is_heard_soonest_goes_first(at, monkeypatch):
     slow_down(monkeypatch, speed=5.0)
     first, second = (at.render(seconds=20.0) for _ in range(2))

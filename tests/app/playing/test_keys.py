@@ -13,9 +13,8 @@ from app.instruments.instrument import BodyChoice, Instrument
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import read_instrument
 from app.player.compiled import InstrumentPlayer
-from app.player.drum_keys import DrumKeys
 from app.player.effects import body_curves
-from app.player.events import KEYS, Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, parameter_set
+from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, parameter_set
 from app.playing import recorder
 from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
@@ -129,17 +128,6 @@ def test_a_stop_ends_strings_that_ring_in_sympathy_too(played):
         assert np.abs(played.hear(4_800)).max() < 1e-6
 
 
-def test_a_soloed_mode_is_as_loud_as_in_the_note(played):
-    """So that the other modes do not thunder when the solo ends."""
-    whole, gains = played.strike(NoteOn(45, 100)).gain, []
-    for ear in (replace(EAR, solo=5), Ear((0.0,)), EAR):
-        played.notes.listen(ear)
-        played.settle()
-        gains.append(played.strike(NoteOn(45, 100)).gain)
-    assert [gains[0], gains[2]] == pytest.approx([whole] * 2)
-    assert gains[1] <= 1, "nothing is heard of it: no gain would help"
-
-
 def test_a_key_waits_for_no_knob(played, monkeypatch):
     begun, held, struck = Event(), Event(), list[object]()
 
@@ -221,23 +209,6 @@ def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played
     played.strike(NoteOn(45, 60))
 
 
-def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(played, monkeypatch):
-    begun, held, computed = Event(), Event(), list[int]()
-
-    def slow(self: DrumKeys, key: int) -> None:
-        computed.append(key)
-        begun.set()
-        held.wait(30)
-
-    monkeypatch.setattr(DrumKeys, "of_key", slow)
-    played.notes.set_instrument(FRAME_DRUM, EAR)
-    played.wait(begun.is_set)
-    played.notes.set_instrument(INSTRUMENT, EAR)
-    held.set()
-    played.choose(INSTRUMENT)
-    assert len(computed) == 1
-
-
 @pytest.mark.parametrize("loaded", [True, False])
 @pytest.mark.parametrize("pedal", [True, False])
 def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(played, pedal, loaded):
@@ -250,16 +221,6 @@ def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(played, pe
         played.choose(FRAME_DRUM)
     played.handle(ControlChange(midi.SUSTAIN, 0) if pedal else NoteOff(45))
     assert played.now(held).damped
-
-
-def test_switches_hold_for_another_instruments_player_too(played):
-    switches = [ControlChange(number, 127, KEYS) for number in (midi.LEGATO, midi.TREMOLO)]
-    for event in (*switches, ControlChange(midi.STRUM, 127), ControlChange(midi.RESET, 0)):
-        played.handle(event)
-    for other in (FRAME_DRUM, INSTRUMENT):
-        played.choose(other)
-    played.player.compiled.catch_up(played.sound.mixer.address)
-    assert played.player.at_hand == switches
 
 
 def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compared(played):

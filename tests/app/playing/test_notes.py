@@ -24,7 +24,6 @@ from app.playing.note import PluckVoices
 from app.playing.notes import Notes
 from app.playing.playback import Due
 from app.playing.sources import Sources
-from app.rendering.subject import Loaded
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
@@ -232,14 +231,6 @@ def test_levels_are_matched_once_they_are_known(lab, tmp_path, loudness, gain):
     assert gains(again)["model"] == 1.0
 
 
-@pytest.mark.parametrize("seconds", [0.5, 1.5])
-def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(lab, seconds):
-    lab.notes.set_monitor(hears("model", level_match=True))
-    note = lab.strike(lab.small_preset, position=0.43, seconds=seconds)
-    lab.wait(lambda: lab.notes.poll() is None and note.match is not None)
-    assert note.match is not None and 0 < abs(note.match["model"] - 1.0) < 0.3
-
-
 def test_latencies_are_noted_once_a_note_unless_they_cannot_be(lab):
     """The clock of gestures and that of the device's calls may have two bases, or one of them none."""
     lab.strike()
@@ -303,15 +294,6 @@ def test_notes_ring_on_where_the_device_changes_its_rate(lab, which, request):
     assert [note.seconds for note in struck[2:]] == pytest.approx([0.25] * 4, abs=4 * QUANTUM_S)
     lab.strike(path)
     assert lab.notes.ringing == 5
-
-
-def test_another_rate_while_a_model_is_rendered(lab, slow_model):
-    note = lab.strike(lab.small_preset, seconds=0.6)
-    lab.wait(lambda: note.waits_s > 0)
-    lab.mixer = Mixer(44_100)
-    lab.wait(lambda: not note.pending)
-    assert note.mixer is lab.mixer and {v.program.rate_hz for v in note.voices.values()} == {44_100}
-    assert np.abs(lab.hear(0.05)).max() > 0.01
 
 
 def test_keys_of_a_single_string_are_places_along_it_and_ring(lab):
@@ -399,14 +381,3 @@ def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(lab, monkeypatch, 
     again = lab.strike()
     lab.mixer.render(4800)
     assert again.began and not again.over and is_loud(lab.sound)
-
-
-def test_a_report_that_fails_stops_nothing(lab, monkeypatch):
-    notes = Notes(lab.sound, lab.sources, lambda name: None, lambda *_: 1 / 0)  # type: ignore[arg-type, return-value]
-    notes.set_monitor(hears("model"))
-    notes.choose(lab.pluck_of())
-    monkeypatch.setattr(Loaded, "voice", once(Loaded.voice, at=1))
-    first, second = notes.ring(), notes.ring()
-    assert first is not None and second is not None
-    assert first.cut and not second.over and is_loud(lab.sound)
-    notes.close()
