@@ -47,7 +47,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
         yield f"// All of it is {-gain_db:.2f} dB softer than the instrument, so that no note clips."
     yield "<control>"
     yield f"default_path={folder}/"
-    yield ""  # sfzlint reads a value that ends with a slash on into the next line
+    yield ""  # some readers take a value that ends with a slash on into the next line
     yield "<global>"
     # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
     yield f"loop_mode={'one_shot' if instrument.damping.let_ring else 'no_loop'}"

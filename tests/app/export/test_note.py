@@ -233,33 +233,18 @@ def test_a_decay_ends_where_it_is_so_far_down_and_files_of_one_have_one_length(p
 # Recipes, names and keys
 
 
-RECIPES = {
-    "string": '{"format":1,"program":"Learned Strings","version":"0.2.0","preset":"studio_any_string",'
-    '"preset_sha256":"c2","pluck":{"position":0.3,"amplitude_mm":2.0,"shape":"rounded","width":0.1},"listen":0.37,"listen_right":null,'
-    '"pickup":"bridge","seconds":0.3,"decay_db":null,"source":"model","difference_gain_db":0.0,"preset_rate_hz":48000,'
-    '"horizon_s":0.5,"full_scale_m":0.01,"rate_hz":44100,"bits":"24","normalise":false,"fade_out_s":0.01,"string":'
-    '{"length_m":0.648,"area_m2":5.0671e-8,"second_moment_m4":2.0432e-16,"density_kg_m3":7850.0,"youngs_modulus_pa":'
-    '220000000000.0,"damping_d1_kg_m_s":0.00039498,"damping_d3_kg_m_s":2.679e-6,"tension_n":72.592},"modes":12,'
-    '"through":null,"struck":null}',
-    "key": '{"format":1,"program":"Learned Strings","version":"0.2.0","preset":"studio_any_string",'
-    '"preset_sha256":"c2","pluck":{"position":0.4,"amplitude_mm":4.0,"shape":"gaussian","width":0.06},"listen":0.1,"listen_right":0.6,'
-    '"pickup":"velocity","seconds":9.0,"decay_db":60.0,"source":"difference","difference_gain_db":20.0,'
-    '"preset_rate_hz":48000,"horizon_s":0.5,"full_scale_m":0.01,"rate_hz":48000,"bits":"16","normalise":true,'
-    '"fade_out_s":0.05,"string":null,"modes":null,"through":null,"struck":{"instrument":"Classical guitar",'
-    '"instrument_sha256":"7d","key":52,"velocity":90,"channel":16,"place":null,"string":1,"pluck":{"position":0.2,'
-    '"amplitude_mm":2.0,"shape":"gaussian","width":0.06}}}',
-}
+RECIPES = Path(__file__).with_name("recipes")
 
 
 def test_recipes_of_earlier_files_are_read():
     """Texts that version 0.2.0 wrote."""
-    recipe = SoundRecipe.model_validate_json(RECIPES["string"])
+    recipe = SoundRecipe.model_validate_json((RECIPES / "string.json").read_bytes())
     sound = recipe.sound(MANY, Path("a.wav"))
     assert isinstance(sound.preset, StringOf) and sound.preset.string.tension_n == 72.592
     assert (sound.load().info.modes, sound.load().info.rate_hz) == (12, 48_000)
     assert (sound.pluck, sound.ear, sound.seconds) == (Pluck(0.3, 2.0, "rounded", 0.1), Ear((0.37,), "bridge"), 0.3)
     assert recipe.settings == WavSettings("24", 44_100, fade_out_s=0.01)
-    recipe = SoundRecipe.model_validate_json(RECIPES["key"])
+    recipe = SoundRecipe.model_validate_json((RECIPES / "key.json").read_bytes())
     sound = recipe.sound(MANY, Path("a.wav"))
     assert sound.struck == Struck(GUITAR, NoteOn(52, 90, 16, string=1, pluck=Pluck(0.2, 2.0)))
     assert (sound.preset, sound.ear, sound.seconds) == (MANY, Ear((0.1, 0.6), "velocity"), 9.0)

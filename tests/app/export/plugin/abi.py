@@ -3,6 +3,7 @@
 import ctypes as c
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -32,9 +33,10 @@ def function(result: str, *arguments: str) -> Any:
     return c.CFUNCTYPE(KINDS[result], *(KINDS[each] for each in arguments))
 
 
-def structures(declarations: str) -> SimpleNamespace:
-    """Structures `name { … }` of fields `kind name`, `kind[length] name` and `result(arguments) name`, with ;."""
+def structures(format: str) -> SimpleNamespace:
+    """A format's structures, `name { … }` of fields `kind name`, `kind[length] name`, `result(arguments) name`."""
     made: dict[str, Any] = {}
+    declarations = Path(__file__).with_name(f"{format}.txt").read_text("utf-8")
     for union, structure, fields in re.findall(r"(union )?(\w+) \{(.*?)\}", declarations, re.DOTALL):
         kinds: dict[str, Any] = {}
         for each in fields.split(";"):

@@ -15,47 +15,7 @@ NOTE_ON, NOTE_OFF, NOTE_CHOKE, NOTE_END, EXPRESSION, PARAM, MIDI = 0, 1, 2, 3, 4
 TUNING, BRIGHTNESS = 3, 5
 IN_FILE, IN_PLUGIN = 0, 1  # kinds of places of presets
 
-clap = structures("""
-Version { u32 major; u32 minor; u32 revision }
-Header { u32 size; u32 time; u16 space; u16 type; u16 flags }
-NoteEvent { Header header; i32 note_id; i16 port; i16 channel; i16 key; f64 velocity }
-ExpressionEvent { Header header; i32 id; i32 note_id; i16 port; i16 channel; i16 key; f64 value }
-ParamEvent { Header header; u32 id; ptr cookie; i32 note_id; i16 port; i16 channel; i16 key; f64 value }
-MidiEvent { Header header; u16 port; u8[3] data }
-InEvents { ptr context; u32(ptr) size; ptr(ptr, u32) get }
-OutEvents { ptr context; bool(ptr, ptr) push }
-Audio { ptr data32; ptr data64; u32 channels; u32 latency; u64 constant }
-Process { i64 steady; u32 frames; ptr transport; ptr inputs; ptr outputs; u32 inputs_count; u32 outputs_count;
-    ptr in_events; ptr out_events }
-Plugin { ptr descriptor; ptr data; bool(ptr) init; void(ptr) destroy; bool(ptr, f64, u32, u32) activate;
-    void(ptr) deactivate; bool(ptr) start_processing; void(ptr) stop_processing; void(ptr) reset;
-    i32(ptr, ptr) process; ptr(ptr, str) get_extension; void(ptr) on_main_thread }
-HostStructure { Version version; ptr data; str name; str vendor; str url; str host_version;
-    ptr(ptr, str) get_extension; void(ptr) request_restart; void(ptr) request_process; void(ptr) request_callback }
-Descriptor { Version version; str id; str name; str vendor }
-Factory { u32(ptr) count; ptr(ptr, u32) descriptor; ptr(ptr, ptr, str) create }
-Entry { Version version; bool(str) init; void() deinit; ptr(str) get_factory }
-ParamInfo { u32 id; u32 flags; ptr cookie; char[256] name; char[1024] module; f64 low; f64 high; f64 standard }
-Params { u32(ptr) count; bool(ptr, u32, ptr) info; bool(ptr, u32, ptr) value; bool(ptr, u32, f64, ptr, u32) to_text;
-    bool(ptr, u32, str, ptr) from_text }
-Stream { ptr context; i64(ptr, ptr, u64) move }
-State { bool(ptr, ptr) save; bool(ptr, ptr) load }
-Frames { u32(ptr) get }
-Render { bool(ptr) required; bool(ptr, i32) set }
-PresetLoad { bool(ptr, u32, str, str) from_location }
-HostParams { void(ptr, u32) rescan; void(ptr, u32, u32) clear; void(ptr) request_flush }
-HostPresetLoad { void(ptr, u32, str, str, i32, str) on_error; void(ptr, u32, str, str) loaded }
-UniversalId { str abi; str id }
-Receiver { ptr data; void(ptr, i32, str) on_error; bool(ptr, str, str) begin_preset; void(ptr, ptr) add_plugin_id;
-    void(ptr, str) set_soundpack_id; void(ptr, u32) set_flags; void(ptr, str) add_creator;
-    void(ptr, str) set_description; void(ptr, u64, u64) set_timestamps; void(ptr, str) add_feature;
-    void(ptr, str, str) add_extra_info }
-Location { u32 flags; str name; u32 kind; str location }
-Provider { ptr descriptor; ptr data; bool(ptr) init; void(ptr) destroy; bool(ptr, u32, str, ptr) get_metadata;
-    ptr(ptr, str) get_extension }
-Indexer { Version version; str name; str vendor; str url; str host_version; ptr data; bool(ptr, ptr) declare_filetype;
-    bool(ptr, ptr) declare_location; bool(ptr, ptr) declare_soundpack; ptr(ptr, str) get_extension }
-""")
+clap = structures("clap")
 
 
 def presets(library: Library, kind: int = IN_PLUGIN, most: int = 1_000) -> tuple[bytes, list[Any], bool, list[Any]]:

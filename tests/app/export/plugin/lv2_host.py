@@ -17,13 +17,7 @@ POD, PORTABLE = 1, 2
 EVENTS, LEFT, RIGHT, LATENCY, FIRST = range(5)
 State = dict[str, bytes]  # a property's value by its key; each is a chunk
 
-lv2 = structures("""
-Descriptor { str uri; ptr(ptr, f64, str, ptr) instantiate; void(ptr, u32, ptr) connect_port; void(ptr) activate;
-    void(ptr, u32) run; void(ptr) deactivate; void(ptr) cleanup; ptr(str) extension_data }
-UridMap { ptr handle; u32(ptr, str) map }
-Feature { str uri; ptr data }
-StateInterface { i32(ptr, ptr, ptr, u32, ptr) save; i32(ptr, ptr, ptr, u32, ptr) restore }
-""")
+lv2 = structures("lv2")
 
 
 Store = function("i32", "ptr", "u32", "ptr", "size", "u32", "u32")

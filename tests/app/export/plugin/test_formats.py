@@ -1,13 +1,8 @@
 """VST3 and LV2 in hosts of their own: they play what the CLAP plug-in plays, and keep to their interfaces."""
 
-import json
-import os
 import struct
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +12,7 @@ from app.export.plugin.image import Image
 from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from tests.app.export.plugin import host, lv2_host, vst3_host
 from tests.app.export.plugin.abi import Sound
-from tests.app.export.plugin.pieces import RATE_HZ, active, difference_db, instrument_of, midi_bytes, piece, played
+from tests.app.export.plugin.pieces import RATE_HZ, active, difference_db, instrument_of, piece, played
 
 BASS = "electric_bass"
 STRUCK = (0, bytes((0x90, 40, 100)))
@@ -251,30 +246,3 @@ def test_a_note_expression_tunes_one_note(vst3):
     both = sound(low, high, vst3_host.tuned(2, 1.0))
     assert difference_db(both, sound(low, high)) > -30
     assert difference_db(both, sound(low, vst3_host.note_on(57, 100, id=2, cents=100.0))) < -140
-
-
-PEDALBOARD = """
-import json, sys
-import numpy as np
-from pedalboard import load_plugin
-path, name, out, wanted = sys.argv[1:]
-plugin = load_plugin(path, plugin_name=name)
-messages = [(bytes(data), time_s) for data, time_s in json.loads(wanted)]
-np.save(out, np.asarray(plugin(messages, duration=1.6, sample_rate=48_000, num_channels=2, buffer_size=480)).T)
-"""
-
-
-def test_pedalboard_plays_it(built, bank, tmp_path):
-    python = os.environ.get("PEDALBOARD_PYTHON") or (sys.executable if find_spec("pedalboard") else "")
-    if not python:
-        pytest.skip("needs pedalboard; PEDALBOARD_PYTHON may be a Python that has it")
-    music, out = piece(instrument_of(SAVED)), tmp_path / "sound.npy"
-    events = json.dumps([([*midi_bytes(event)], time_s) for time_s, event in music])
-    words = [str(built("vst3")), instrument_of(SAVED).name, str(out), events]
-    done = subprocess.run([python, "-c", PEDALBOARD, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-600:]
-    sound, wanted = np.load(out), played(active(bank, SAVED), music)
-    count = min(len(sound), len(wanted))
-    assert count > RATE_HZ
-    latest = min(difference_db(sound[skip:][:count], wanted[: len(sound[skip:][:count])]) for skip in (0, 64, 96))
-    assert latest < -120

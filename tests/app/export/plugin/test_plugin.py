@@ -338,21 +338,6 @@ def test_a_release_belongs_to_the_stroke_before_it(ringing, on, off):
     assert ringing(*struck, off(4_900), off(6_000)) < 0.01 * held
 
 
-def test_tuning_one_note_leaves_the_others(bank):
-    def sound(*events: Event) -> Sound:
-        return active(bank, "fretless_bass").render(9_600, events)  # without an amplifier sounds add
-
-    one, other, bend = (
-        note_on(0, 40, 100, note_id=1),
-        note_on(0, 47, 100, note_id=2),
-        host.tune(2_000, 2.0, note_id=2),
-    )
-    bent, plain, alone = sound(one, other, bend), sound(one, other), sound(one)
-    assert np.array_equal(bent[:2_000], plain[:2_000])
-    assert difference_db(bent - alone, plain - alone) > -20
-    assert difference_db(bent - alone, sound(other, bend)) < -100  # in the sum only single precision is lost
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_after_a_reset_it_is_as_a_new_one(bank, name):
     instrument = instrument_of(name)
@@ -378,18 +363,6 @@ def test_after_a_reset_it_is_as_a_new_one(bank, name):
     wanted = played(fresh, piece(instrument))
     assert np.abs(wanted).max() > 1e-3
     assert np.array_equal(played(instance, piece(instrument)), wanted)
-
-
-def test_the_last_of_many_values_counts(bank):
-    instance, other = (active(bank, "electric_bass") for _ in range(2))
-    moved = [each for name, each in instance.parameters.items() if name not in ("Source", "volume")][:6]
-    ends = [param(511, each.id, each.low + 0.4 * (each.high - each.low)) for each in moved]
-    swept = [param(frame, each.id, each.high) for frame in range(511) for each in moved]
-    instance.render(512, swept + ends)
-    other.render(512, ends)
-    found, wanted = (each.render(57_600, [note_on(48_000, 40, 100)]) for each in (instance, other))
-    assert instance.save() == other.save()
-    assert difference_db(found, wanted) < -80  # of body and room, which glide
 
 
 @pytest.fixture(scope="module")

@@ -24,28 +24,7 @@ NOTE_ON, NOTE_OFF, EXPRESSION = 0, 1, 4
 TUNING, BEND = 2, 129
 AUDIO, EVENTS, INPUT, OUTPUT = 0, 1, 0, 1
 
-vst3 = structures("""
-Class3 { u8[16] id; i32 cardinality; char[32] category; u16[64] name; u32 flags; char[128] subcategories;
-    u16[64] vendor; u16[64] version; u16[64] sdk }
-Parameter { u32 id; u16[128] title; u16[128] short_title; u16[128] units; i32 steps; f64 standard; i32 unit;
-    i32 flags }
-Note { i16 channel; i16 key; f32 cents; f32 velocity; i32 length; i32 id }
-NoteOff { i16 channel; i16 key; f32 velocity; i32 id; f32 cents }
-Expressed { u32 type; i32 note; f64 value }
-union Content { Note on; NoteOff off; Expressed expressed }
-Event { i32 bus; i32 frame; f64 quarter; u16 flags; u16 type; Content content }
-Setup { i32 mode; i32 sample_size; i32 most_frames; f64 rate_hz }
-Buffers { i32 channels; u64 silence; ptr data }
-Process { i32 mode; i32 sample_size; i32 frames; i32 inputs_count; i32 outputs_count; ptr inputs; ptr outputs;
-    ptr changes; ptr changes_out; ptr events; ptr events_out; ptr context }
-Stream { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr, ptr, i32, ptr) read;
-    i32(ptr, ptr, i32, ptr) write }
-EventList { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr) count; i32(ptr, i32, ptr) event }
-Queue { i32(ptr) query; i32(ptr) hold; i32(ptr) release; u32(ptr) id; i32(ptr) count; i32(ptr, i32, ptr, ptr) point;
-    i32(ptr, i32, f64, ptr) add }
-Changes { i32(ptr) query; i32(ptr) hold; i32(ptr) release; i32(ptr) count; ptr(ptr, i32) queue;
-    ptr(ptr, ptr, ptr) add }
-""")
+vst3 = structures("vst3")
 
 
 class Interface:
