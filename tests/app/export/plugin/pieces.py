@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,25 +43,13 @@ EQUAL_DB = -140.0
 
 
 def instrument_of(name: str) -> Instrument:
-    shipped = {LEARNED: "falling_nylon", MEMBERS: "classical_guitar", OTHERS: "timpani"}.get(name, name)
+    if name == OTHERS:
+        return read_instrument(Path(__file__).with_name("others.json"))
+    shipped = {LEARNED: "falling_nylon", MEMBERS: "classical_guitar"}.get(name, name)
     instrument = read_instrument(INSTRUMENTS / f"{shipped}.json")
     changes: dict[str, object] = {} if shipped == name else {"name": name.capitalize().replace("_", " ")}
     if name == MEMBERS:
         changes |= {"mode": "mpe", "bend_semitones": 12.0}
-    if name == OTHERS:
-        one = instrument.strings.drums[0]
-        shapes: dict[int, dict[str, object]] = {
-            50: {"shell_m": 0.4, "cavity_m3": 0.0},
-            54: {"length_m": 0.33, "width_m": 0.31, "cavity_m3": 0.02, "uneven": 0.01},
-            57: {"shape": "rectangle", "length_m": 0.3541, "width_m": 0.0612, "cavity_m3": 0.0, "shell_m": 0.2},
-            62: {"youngs_modulus_pa": 9e11},
-        }
-        drums = tuple(
-            one.model_copy(update={"note": note, "drum": replace(one.drum, **shape)})
-            for note, shape in shapes.items()
-        )
-        strings = instrument.strings.model_copy(update={"drums": drums, "keys": "pads"})
-        changes |= {"strings": strings, "range": (50, 62)}
     return instrument.model_copy(update=changes)
 
 

@@ -110,6 +110,7 @@ def test_it_sounds_as_the_app_renders(bank, name, rate_hz, turned, seed, request
     for number in range(len(instrument.macros) if turned is macros_anywhere else 0):
         wanted = wanted.turned(number, values[f"macros.{number}"])
     instance.block(64, moves(values))
+    assert turned is not macros_anywhere or instance.callbacks == 1  # the host must read what they moved
     restart(instance, rate_hz)
     sound, source = played(instance, piece(instrument), rate_hz), values.get("source", 0.0)
     if source < 2.0:
@@ -149,11 +150,8 @@ def test_it_follows_parameters_and_controllers_while_it_plays(bank, name, steps,
             continue
         if isinstance(change, dict):
             turned, values = turned.with_values(change), change
-        else:  # a macro of those that do not move the room
-            dry = [
-                n for n, macro in enumerate(instrument.macros) if all(t.field != "room.mix" for t in macro.targets)
-            ]
-            number, place = dry[change[0]], change[1]
+        else:
+            number, place = change
             turned, values = turned.turned(number, place), {f"macros.{number}": place}
         changes.append((time_s, InstrumentTurned(turned)))
         events += moves(values, time_s)
@@ -163,22 +161,10 @@ def test_it_follows_parameters_and_controllers_while_it_plays(bank, name, steps,
     assert difference_db(sound, rendered(instrument)) > -60
 
 
-def test_a_bounce_of_a_swept_body_waits_for_its_thread(bank):
-    def bounced() -> Sound:
-        instance = active(bank, MOVED)
-        instance.go_offline()
-        sweep = [each for step in range(20) for each in moves({"body.size": 0.6 + 0.1 * step}, 0.01 * step)]
-        return played(instance, piece(instrument_of(MOVED)), more=sweep)
-
-    assert np.array_equal(bounced(), bounced())
-
-
-def test_values_are_words_which_lead_back(bank):
+def test_words_of_a_host_become_values_within_their_range_or_none(bank):
     instance = active(bank, MOVED)
-    strokes, harmonic, volume = (instance.parameters[name] for name in ("strokes of strums", "harmonic", "volume"))
+    volume, strokes = (instance.parameters[name] for name in ("volume", "strokes of strums"))
     assert [instance.text(strokes.id, value) for value in range(3)] == ["down", "up", "both"]
-    assert [instance.text(harmonic.id, value) for value in (1, 5)] == ["1", "5"]
-    assert instance.text(volume.id, -1.4e-6) == "0 dB"  # what a host in single precision makes of 0
     assert [instance.number(volume.id, text) for text in (b"nan", b"", b"loud", b"\xff\xfe")] == [None] * 4
     assert [instance.number(volume.id, text) for text in (b"-1e400 dB", b"inf")] == [volume.low, volume.high]
 
@@ -213,26 +199,6 @@ def test_blocks_of_any_size_and_neighbours_change_nothing(bank):
 # State and presets
 
 
-def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank):
-    instrument, instance = instrument_of(MOVED), active(bank, MOVED)
-    macro = instrument.macros[0]
-    control = instance.parameters[macro.name]
-    assert (control.low, control.high, control.standard) == (0.0, 1.0, macro.value)
-    before = {name: instance.value(each.id) for name, each in instance.parameters.items()}
-    instance.block(512, [param(100, control.id, 1.0)])
-    moved = {name for name, each in instance.parameters.items() if instance.value(each.id) != before[name]}
-    assert macro.name in moved and len(moved) > 1
-    assert instance.callbacks == 1  # the host must read the other parameters again
-    state, sound = instance.save(), played(instance, piece(instrument))
-    new, running = bank.create_named(instrument.name), active(bank, MOVED)
-    for other in (new, running):
-        assert other.load(state)
-    new.activate(RATE_HZ)
-    for other in (new, running):
-        assert other.save() == state
-        assert difference_db(played(other, piece(instrument)), sound) < -80  # here a knob glided to where it was set
-
-
 def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank):
     id, places, done, reported = host.presets(bank)
     assert (id, done) == (b"org.learned-strings.bank.presets", True)
@@ -250,42 +216,30 @@ def test_the_browser_of_presets_lists_each_instrument_and_nothing_else(bank):
     assert not bank.entry.get_factory(b"unknown")
 
 
-@pytest.mark.parametrize("name", (MOVED, "timpani"))
-def test_a_preset_brings_back_the_instrument_as_it_was(bank, name):
-    music, fresh = piece(instrument_of(name)), active(bank, name)
-    state, sound = fresh.save(), played(fresh, music)
-    key = bank.id_of(instrument_of(name).name)
-    all_at_the_top = [param(0, each.id, each.high) for each in fresh.parameters.values()]
-    for playing in (False, True):
-        instance = active(bank, name)
-        instance.render(24_000, all_at_the_top)
-        assert instance.save() != state
-        if not playing:
-            instance.deactivate()
-        assert instance.load_preset(key)
-        assert instance.save() == state
-        assert instance.rescans == [1]  # of values
-        assert instance.loaded == [(host.IN_PLUGIN, None, key.encode())]
-        if playing:  # knobs glide, the room follows
-            instance.render(96_000, [])
-            assert difference_db(played(instance, music), sound) < -80
-        else:
-            instance.activate(RATE_HZ)
-            assert np.array_equal(played(instance, music), sound)
-
-
-def test_the_preset_of_another_instrument_is_refused(bank):
-    instance, other = active(bank, MOVED), active(bank, "timpani")
+@pytest.mark.parametrize("playing", [False, True])
+def test_a_preset_brings_back_the_instrument_as_it_was_and_that_of_another_is_refused(bank, playing):
+    music, fresh, instance = piece(instrument_of(MOVED)), active(bank, MOVED), active(bank, MOVED)
     own, foreign = (bank.id_of(instrument_of(name).name) for name in (MOVED, "timpani"))
-    instance.block(512, [param(0, instance.parameters[instrument_of(MOVED).macros[0].name].id, 1.0)])
-    state = instance.save()
+    state, sound = fresh.save(), played(fresh, music)
+    instance.render(24_000, [param(0, each.id, each.high) for each in fresh.parameters.values()])
+    moved = instance.save()
     for key, kind in ((foreign, host.IN_PLUGIN), (None, host.IN_PLUGIN), ("", host.IN_PLUGIN), (own, host.IN_FILE)):
         assert not instance.load_preset(key, kind)
     assert instance.errors == [b"the preset belongs to another instrument"] * 4
-    assert (instance.save(), instance.rescans, instance.loaded) == (state, [], [])
-    other.offers.clear()  # as a host that has no extensions
-    assert not other.load_preset(own)
-    assert other.load_preset(foreign)
+    assert (instance.save(), instance.rescans, instance.loaded) == (moved, [], [])
+    if not playing:
+        instance.deactivate()
+    assert instance.load_preset(own)
+    assert instance.save() == state != moved
+    assert instance.rescans == [1]  # of values
+    assert instance.loaded == [(host.IN_PLUGIN, None, own.encode())]
+    if playing:  # knobs glide, the room follows
+        instance.render(96_000, [])
+    else:
+        instance.activate(RATE_HZ)
+    assert difference_db(played(instance, music), sound) < (-80 if playing else -400)
+    instance.offers.clear()  # as a host that has no extensions
+    assert instance.load_preset(own) and not instance.load_preset(foreign)
 
 
 # Notes, resets and other calls of a host
@@ -324,18 +278,11 @@ def test_a_choked_note_is_silent_at_once_and_others_ring_on(ringing):
         assert ringing(note_on(0, 40, 120, note_id=1), choked, *again) < 2 * ringing(*again)
 
 
-@pytest.mark.parametrize(
-    ("on", "off"),
-    [
-        (lambda frame: note_on(frame, 40, 120), lambda frame: note_off(frame, 40)),
-        (lambda frame: midi(frame, 0x90, 40, 120), lambda frame: midi(frame, 0x80, 40, 64)),
-    ],
-)
-def test_a_release_belongs_to_the_stroke_before_it(ringing, on, off):
-    struck = on(0), on(4_800)
+def test_a_release_belongs_to_the_stroke_before_it(ringing):
+    struck = note_on(0, 40, 120), note_on(4_800, 40, 120)
     held = ringing(*struck)
-    assert ringing(*struck, off(4_900)) == held  # of the first stroke
-    assert ringing(*struck, off(4_900), off(6_000)) < 0.01 * held
+    assert ringing(*struck, note_off(4_900, 40)) == held  # of the first stroke
+    assert ringing(*struck, note_off(4_900, 40), note_off(6_000, 40)) < 0.01 * held
 
 
 @pytest.mark.parametrize("name", NAMES)

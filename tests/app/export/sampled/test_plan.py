@@ -36,15 +36,6 @@ def test_each_key_and_velocity_has_one_zone(keys, every, layers):
     assert sorted(sounded) == [(k, v) for k in range(keys[0], keys[1] + 1) for v in range(1, 128)]
 
 
-def test_no_key_is_transposed_unless_asked():
-    assert {(zone.keys, zone.key) for zone in SampledPlan(instrument_of()).zones} == {
-        ((key, key), key) for key in range(45, 65)
-    }
-    spans = {(zone.keys, zone.key) for zone in SampledPlan(instrument_of(), every=3).zones}
-    assert {((45, 47), 46), ((63, 64), 63)} < spans
-    assert len(spans) == 7
-
-
 @pytest.mark.parametrize("every", [1, 3])
 def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every):
     plan = SampledPlan(instrument_of(pluck={"hardest_mm": 20.0}), layers=3, every=every)
@@ -180,19 +171,3 @@ def test_a_string_follows_its_plucks_at_every_velocity_also_where_a_layer_is_sil
         np.testing.assert_allclose(levels(instrument, *wanted[rendered(instrument, layers)]), wanted, atol=1e-9)
     hardest = rendered(instrument, 2)[-1]
     np.testing.assert_allclose(levels(instrument, -120.0, -20.0), wanted - wanted[hardest] - 20)
-
-
-def test_what_was_measured_holds_where_it_was_and_beyond_it_is_as_steep_as_between_the_nearest_two():
-    found = levels(instrument_of(), -40.0, -25.0, -22.0)
-    first, second, third = rendered(instrument_of(), 3)
-    assert list(found[[first, second, third]]) == pytest.approx([-40, -25, -22])
-    assert (np.diff(found[1:]) > 0).all()
-    assert found[first] - found[1] == pytest.approx(15 * (first - 1) / (second - first))
-    assert found[127] - found[third] == pytest.approx(3 * (127 - third) / (third - second))
-
-
-def test_plucks_of_one_strength_differ_in_width_alone():
-    instrument = instrument_of(pluck={"softest_mm": 2.0, "hardest_mm": 2.0})
-    first, second = rendered(instrument, 2)
-    between = levels(instrument, -30.0, -26.0)[first : second + 1]
-    assert between == pytest.approx(np.linspace(-30, -26, second - first + 1))
