@@ -189,14 +189,8 @@ def test_where_an_export_fails_what_was_there_stays(plucked, tmp_path, monkeypat
     ],
 )
 def test_a_sound_out_of_range_is_refused(plucked, change, message):
-    wanted = {
-        "points": (0.3,),
-        "pickup": "displacement",
-        "seconds": 0.2,
-        "source": "model",
-        "file": "a.wav",
-        **change,
-    }
+    usual = {"points": (0.3,), "pickup": "displacement", "seconds": 0.2, "source": "model", "file": "a.wav"}
+    wanted = {**usual, **change}
     with pytest.raises(ValueError, match=message):
         ear = Ear(wanted.pop("points"), wanted.pop("pickup"))
         sound, file = replace(plucked, seconds=wanted.pop("seconds"), ear=ear), Path(wanted.pop("file"))

@@ -1,7 +1,6 @@
 """Sounds become files of the same bytes in blocks of any size, of which memory holds one."""
 
 import io
-import json
 import math
 import tracemalloc
 from collections.abc import Sequence
@@ -12,8 +11,7 @@ import pytest
 import soundfile
 
 from app.export import recording
-from app.export.recording import Recording, blocks
-from app.export.wav import LONGEST_TAG_BYTES, NORMALISED_PEAK, WavSettings, faded_out, quantised, write_wav
+from app.export.wav import NORMALISED_PEAK, WavSettings, faded_out, quantised, write_wav
 from app.rendering.note_sound import NoteSound
 from engine.pluck import Pluck
 from engine.values.ear import Ear
@@ -36,19 +34,6 @@ def written(
 
 def samples_of(file: io.BytesIO) -> np.ndarray:
     return soundfile.read(file)[0]
-
-
-def test_a_recording_is_what_was_appended():
-    samples = np.random.default_rng(0).normal(size=(1000, 2)).astype(np.float32)
-    made = Recording(2)
-    for part in np.split(samples, [1, 400, 401]):
-        made.append(part)
-    assert len(made) == 1000
-    np.testing.assert_array_equal(made[:], samples)
-    np.testing.assert_array_equal(made[399:403], samples[399:403])
-    np.testing.assert_array_equal(np.concatenate([block for _, block in blocks(made, 64)]), samples)
-    made.cut(10)
-    assert len(made) == len(made[:]) == 10 and made[5:5].shape == (0, 2)
 
 
 @pytest.mark.parametrize("bits", ["16", "24", "32f"])
@@ -100,13 +85,6 @@ def test_normalising_takes_one_gain_for_all_channels_and_companions():
     alone, _ = written(0.1 * SINE, settings, beside=[0.2 * SINE])
     peaks = [*np.abs(samples_of(both)).max(axis=0), np.abs(samples_of(alone)).max()]
     assert peaks == pytest.approx([NORMALISED_PEAK, NORMALISED_PEAK / 2, NORMALISED_PEAK / 2], rel=1e-6)
-
-
-@pytest.mark.parametrize("bits", ["16", "32f"])
-def test_tags_survive_up_to_the_longest(bits):
-    tags = {"title": "Saite № 1", "comment": json.dumps("x" * (LONGEST_TAG_BYTES - 2))}
-    with soundfile.SoundFile(written(SINE, WavSettings(bits), tags)[0]) as file:
-        assert {name: getattr(file, name) for name in tags} == tags
 
 
 def test_what_cannot_be_stored_is_refused():

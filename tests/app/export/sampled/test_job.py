@@ -84,19 +84,6 @@ def test_cancelling_ends_within_a_note_or_while_a_soundfont_is_written_and_leave
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("rendered", "words"),
-    [
-        (lambda *_, advanced: np.full((100, 1), np.inf), r"key050_vel\d+\.flac: the note .* not finite"),
-        (failing(ValueError("key 50 has no string")), "key 50 has no string"),
-    ],
-)
-def test_a_note_that_cannot_be_rendered_is_reported(rendered, words, tmp_path):
-    with pytest.raises(WriteError, match=words):
-        export_sampled(small(), tmp_path / "a.sfz", rendered)
-    assert not list(tmp_path.iterdir())
-
-
 @KINDS
 def test_a_place_that_cannot_be_written_is_reported_before_the_work(kind, tmp_path):
     (tmp_path / f"a.{kind}").mkdir()

@@ -2,7 +2,6 @@
 
 import io
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from hypothesis import strategies as st
 from app.export.sampled.levels import velocity_levels
 from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan
 from app.export.sampled.sample import StoredSample, encoded, sample_of
-from app.instruments.instrument import Fretted, Instrument
+from app.instruments.instrument import Instrument
 from app.player.glide import glides_cents
 from tests.app.export.sampled.conftest import RATE_HZ, instrument_of, small
 
@@ -49,13 +48,6 @@ def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every):
         assert errors[-1] > 1.5 * min(errors)  # as it was rendered at the hardest
     assert plan.pitch_error_cents > 10
     assert SampledPlan(plan.instrument, layers=32, every=every).pitch_error_cents < 0.5 * plan.pitch_error_cents
-
-
-def test_a_string_that_does_not_glide_is_rendered_at_its_hardest():
-    string = replace(WHOLE.strings.string, youngs_modulus_pa=0.0, second_moment_m4=0.0)
-    plan = SampledPlan(instrument_of(strings=Fretted(string=string)), layers=3)
-    assert [zone.velocity for zone in plan.zones if zone.key == 50] == [42, 84, 127]
-    assert plan.pitch_error_cents == 0
 
 
 FIVE = {"scale": "! five.scl\nfive equal steps\n 5\n 240.\n 480.\n 720.\n 960.\n 2/1\n"}
@@ -150,17 +142,13 @@ def test_a_file_holds_the_sample_and_is_the_same_each_time(form, bits, error):
 # Levels
 
 
-def stored(level_db: float) -> StoredSample:
-    return StoredSample(frames=64, channels=1, gain_db=0.0, level_db=level_db)
-
-
 def rendered(instrument: Instrument, layers: int) -> list[int]:
     return [zone.velocity for zone in small(instrument, keys=(60, 60), layers=layers).zones]
 
 
 def levels(instrument: Instrument, *measured_db: float) -> np.ndarray:
     layers = list(small(instrument, keys=(60, 60), layers=len(measured_db)).zones)
-    return velocity_levels(instrument, layers, [stored(level) for level in measured_db])
+    return velocity_levels(instrument, layers, [StoredSample(64, 1, 0.0, level) for level in measured_db])
 
 
 @pytest.mark.parametrize("curve", [-0.5, 0.0, 0.5])
