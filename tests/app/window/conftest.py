@@ -3,12 +3,9 @@
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
@@ -80,7 +77,7 @@ class FakeBackend:
 
 
 @pytest.fixture
-def backend(monkeypatch: pytest.MonkeyPatch) -> FakeBackend:
+def backend(monkeypatch) -> FakeBackend:
     """The MIDI system of every window."""
     made = FakeBackend()
     made_with = lambda receive, load, release: MidiInput(receive, lambda: made, release)  # noqa: E731
@@ -89,14 +86,7 @@ def backend(monkeypatch: pytest.MonkeyPatch) -> FakeBackend:
 
 
 @pytest.fixture
-def opened(
-    qtbot: QtBot,
-    backend: FakeBackend,
-    preset_folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    threads_begun: Callable[[], list[str]],
-) -> Iterator[Open]:
+def opened(qtbot, backend, preset_folder, tmp_path, monkeypatch, threads_begun) -> Iterator[Open]:
     """Opens windows with the presets `first` and `second` and these shipped ones; none leaves a thread.
 
     `settings`: fields of `Settings`; the other words are `choices`. Exports are short, and go to `tmp_path`.
@@ -128,13 +118,13 @@ def opened(
 
 
 @pytest.fixture
-def lab(opened: Open) -> Window:
+def lab(opened) -> Window:
     """A window that shows the Lab."""
     return opened(face="lab")
 
 
 @pytest.fixture
-def guitar(opened: Open) -> Window:
+def guitar(opened) -> Window:
     """A window in which keys play a guitar."""
     made = opened("studio_any_string", instrument=read_instrument(INSTRUMENTS / "steel_string_acoustic.json"))
     made.wait_for_keys()
@@ -143,13 +133,13 @@ def guitar(opened: Open) -> Window:
 
 
 @pytest.fixture
-def speakers(numb_output: Any) -> Callable[[Any], Sound]:
+def speakers(numb_output) -> Callable[[Any], Sound]:
     """A sound with a device that takes frames at the pace of time and makes none."""
     return lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output)
 
 
 @pytest.fixture
-def themed(qapp: QApplication) -> Iterator[Callable[..., None]]:
+def themed(qapp) -> Iterator[Callable[..., None]]:
     """Puts on a theme, by default the dark one, as users see it; afterwards the look is as before."""
     sheet, font, palette = qapp.styleSheet(), qapp.font(), qapp.palette()
 

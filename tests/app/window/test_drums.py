@@ -13,12 +13,11 @@ from app.instruments.library import read_instrument
 from app.player.events import NoteOn, TimedEvent
 from app.player.offline import render_events
 from app.playing.key_note import KeyNote
-from app.rendering import BlowTake, blow
+from app.rendering import blow
 from app.window.controller import DRUMS_PLAYED
 from engine.presets import SHIPPED, load_preset
 from engine.values.effects import Room
-from tests.app.window.conftest import Open
-from tests.app.window.driver import KEY, LEFT, Window
+from tests.app.window.driver import LEFT, Window
 from tests.app.window.panels.conftest import curves
 
 PADS = range(36, 52)
@@ -27,14 +26,14 @@ KIT, TOMS = read_instrument(INSTRUMENTS / "concert_toms.json"), read_instrument(
 
 
 @pytest.fixture
-def kit(opened: Open) -> Window:
+def kit(opened) -> Window:
     made = opened("studio_any_string", instrument=KIT)
     made.wait_for_keys()
     return made
 
 
 @pytest.fixture
-def toms(opened: Open) -> Window:
+def toms(opened) -> Window:
     """The Lab with tuned toms, in mono and in slow motion."""
     mono = TOMS.model_copy(update={"pickup": TOMS.pickup.model_copy(update={"points": (0.5,)})})
     made = opened("studio_any_string", face="lab", instrument=mono, a="model", b="truth", heard="a", speed=0.02)
@@ -50,26 +49,13 @@ def strike(w: Window, x: float, y: float) -> Any:
     return w.struck[-1]
 
 
-def whole(w: Window) -> BlowTake:
-    """The motion that is shown, once it is rendered."""
-    w.wait(lambda: (take := w.performance.moment(0.0).blow) is not None and take.complete)
-    take = w.performance.moment(0.0).blow
-    assert take is not None
-    return take
-
-
 def test_pads_keys_and_channel_ten_strike(backend, kit, monkeypatch):
     assert len(DRUMS) == 7 and set(DRUMS) <= set(kit.controller.instruments.browser.listed)
-    levels: list[float] = []
-    monkeypatch.setattr(kit.window.transport.meter, "show_level", lambda peak_db, limiting: levels.append(peak_db))
     for key in (38, 45, 60):  # the last is no pad
         kit.play(key, 110)
-    kit.wait(lambda: {38, 45} <= kit.keys.sounding().keys() and max(levels, default=-99) > -40)
+    kit.wait(lambda: {38, 45} <= kit.keys.sounding().keys())
     kit.wait(lambda: kit.window.instrument.keys.level(45) > 0.1)
     assert kit.session.stage.drum_key == 45 and kit.notes.ringing == 2
-    for sounding in (False, True):
-        kit.key(KEY.Key_Space)  # strikes the drum that was struck last
-        kit.wait(lambda sounding=sounding: bool(kit.keys.sounding()) == sounding)
     kit.controller.inputs.strike(0.1, -0.2, 100.0)
     event = kit.struck[-1].event
     assert (event.key, event.velocity, event.place) == (45, 100, (0.1, -0.2))
@@ -92,18 +78,12 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit):
     window, panel = kit.window, kit.window.instrument
     kit.change(face="lab")
     assert {each.covered for each in kit.panels if each.of_strings} == {DRUMS_PLAYED}
-    covered = kit.panel("space_time")
-    kit.wait(lambda: covered.height() > 50)
-    cover = covered.grab().toImage()
-    assert len({cover.pixelColor(3, y).name() for y in range(3, cover.height() - 3)}) == 1, "nothing shines through"
     assert not kit.performance.ready, "no string is plucked"
     of_string = [window.transport.knobs["position"], kit.find(QComboBox, "Pick-up"), kit.find(QToolButton, "Loop")]
     assert not any(each.isEnabled() for each in of_string) and window.transport.knobs["listen"].isEnabled()
     kit.change(face="play", loop=True, solo=3, pickup="bridge", listen=0.7)
     play, fold = kit.find(QPushButton, "Strike or stop"), kit.find(QToolButton, "Drum knobs")
     assert play.text() == "▶  Strike"
-    assert "Bass drum 22 inch" in panel.knobs.facts.accessibleDescription()
-    assert not panel.knobs.knobs["knobs.gauge"].isEnabled() and panel.knobs.knobs["knobs.decay"].isEnabled()
     panel.show_surface("neck")
     assert panel.keys.isVisible() and not panel.neck.isVisible(), "drums have no strings"
     kit.play(36, 127, hold=True)
@@ -140,7 +120,8 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(t
     model, truth = (view.frame.pictures_m[name] for name in ("model", "truth"))
     assert np.abs(truth).max() > 0 and np.abs(model - truth).max() < 1e-4 * np.abs(truth).max()
     toms.wait(lambda: "Error of this blow" in toms.window.error_label.text())
-    take = whole(toms)
+    toms.wait(lambda: (blow := toms.performance.moment(0.0).blow) is not None and blow.complete)
+    take: Any = toms.performance.moment(0.0).blow
     assert take.request.struck.event.place == note.event.place
     dry = toms.instrument.model_copy(update={"room": Room(mix=0.0)})
     preset = load_preset(SHIPPED / "studio_any_string.safetensors")
@@ -152,6 +133,9 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(t
         panel = toms.panel(key)
         toms.wait(lambda panel=panel: len(curves(panel.plot)["model"][0]) > 3)
         assert key != "error_time" or (curves(panel.plot)["model"][1] < -4).all(), "the model agrees with the truth"
+    table = toms.controller.drum.columns().values
+    assert np.abs(table["x (half-lengths)"]).max() == 1
+    assert any(np.abs(values).max() > 0 for name, values in table.items() if name.endswith("(m)"))
     above, motion = take.listened.signals["model"].read().copy(), take.motions["model"].size_m.copy()
     foot = QPoint(round(view.axes.x(0.5)), round(view.axes.bottom) + 8)
     toms.drag(view, foot, QPoint(round(view.axes.x(0.97)), foot.y()))
@@ -169,20 +153,3 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(t
     assert toms.performance.position_s == 0.2
     toms.controller.play_or_stop()
     assert toms.notes.ringing == 1
-
-
-def test_keys_strike_at_the_chosen_place_and_each_instrument_has_its_own(toms):
-    drum: Any = toms.controller.drum
-    (x, y), timpani = TOMS.strings.drums[0].place, read_instrument(INSTRUMENTS / "timpani.json")  # type: ignore[union-attr]
-    drum.view.setFocus()
-    for key in (KEY.Key_Right, KEY.Key_Up, KEY.Key_Return):
-        toms.key(key, on=drum.view)
-    assert drum.place == pytest.approx((x + 0.05, y + 0.05)) == toms.struck[-1].event.place
-    toms.wait(lambda: toms.performance.moment(0.0).blow is not None)
-    toms.change(played=timpani)
-    assert toms.performance.moment(0.0).blow is None
-    assert drum.place == timpani.strings.drums[0].place  # type: ignore[union-attr]
-    toms.wait(lambda: drum.view.frame is None)
-    toms.change(preset="first")
-    assert toms.controller.string.isVisible() and not drum.isVisible()
-    toms.wait_for_take()

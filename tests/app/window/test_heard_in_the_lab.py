@@ -3,9 +3,6 @@
 No instrument has any part in it, whichever was played before.
 """
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import soundfile
@@ -25,7 +22,7 @@ from app.player.events import NoteOn, PluckAt
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.rendering.note_sound import NoteSound
-from app.rendering.subject import StringOf, path_of
+from app.rendering.subject import StringOf
 from app.shared.vocabulary import Source
 from app.views.controls.number_box import CountBox
 from app.views.dialogs.abx_dialog import AbxDialog
@@ -40,7 +37,6 @@ from engine.presets import SHIPPED
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
 from tests.app.sounds import render_sound
-from tests.app.window.conftest import Open
 from tests.app.window.driver import CONTROL, KEY, Window, find, press
 
 RATE_HZ = 48_000
@@ -78,7 +74,7 @@ class HeldOutput(Output):
 
 
 @pytest.fixture
-def held(opened: Open) -> Window:
+def held(opened) -> Window:
     """The Lab with a preset of each kind, the instruments, and an output that stands until frames are taken."""
     made = opened(
         *KINDS.values(),
@@ -260,13 +256,6 @@ def test_the_lab_says_what_is_heard_and_how_far_it_was_trained(held, monkeypatch
     ):
         held.change(**changes)
         assert label.text() == words
-    held.pluck()
-    held.controller.exports.open("note")
-    dialog = held.controller.exports.dialog
-    assert dialog is not None
-    held.wait(lambda: dialog.note.through_words.text() == "None: the string alone, as it is heard")
-    assert path_of(dialog.note.job().sound.preset).stem == KINDS["s5"]  # type: ignore[union-attr]
-    dialog.reject()
     held.change(heard="a", preset=KINDS["lru"], shape="rounded", position=0.1, level_match=True)
     assert not label.text() and not label.isVisible()
     assert not warned[-1][1], "not measured yet"
@@ -279,7 +268,7 @@ def test_the_lab_says_what_is_heard_and_how_far_it_was_trained(held, monkeypatch
 
 
 @pytest.fixture
-def paired(opened: Open, speakers: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+def paired(opened, speakers, tmp_path, monkeypatch) -> Window:
     """A window whose pluck is rendered, with a device that makes no sound."""
     monkeypatch.setattr("app.views.dialogs.abx_dialog.default_folder", lambda: tmp_path / "records")
     made = opened(sound=speakers, settings={"abx": AbxChoices(trials=2), "files": FileChoices()}, volume_db=-6)
@@ -303,16 +292,11 @@ def sounds(w: Window) -> bool:
 
 
 def test_the_test_has_the_sound_for_itself(paired, tmp_path, monkeypatch):
-    """Keys are silent meanwhile; a pedal that is lifted then is up afterwards, a fader moves the sound afterwards."""
-    levels, taken, handle = list[tuple[float, bool]](), list[object](), paired.notes.handle
-    monkeypatch.setattr(paired.window.transport.meter, "show_level", lambda *level: levels.append(level))
+    """Keys are silent meanwhile; a pedal that is lifted then is up afterwards."""
+    taken, handle = list[object](), paired.notes.handle
     monkeypatch.setattr(paired.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
-
-    def volume_is(level_db: float) -> bool:
-        return bool(paired.controller.sound.mixer.record["wanted_volume"] == pytest.approx(10 ** (level_db / 20)))
-
     paired.pluck()
-    paired.wait(lambda: sounds(paired) and levels and levels[-1][0] > -60)
+    paired.wait(lambda: sounds(paired))
     dialog = open_test(paired)
     assert dialog.isModal() and not paired.performance.playing
     paired.wait(lambda: not sounds(paired))
@@ -323,13 +307,11 @@ def test_the_test_has_the_sound_for_itself(paired, tmp_path, monkeypatch):
         paired.controller.inputs.play(event)  # a MIDI keyboard
     paired.key(KEY.Key_Space)
     assert taken == released and paired.choices == before and len(paired.struck) == count and not sounds(paired)
-    paired.controller.inputs.midi.performed.emit({"volume_db": 12.0})
-    assert paired.choices.volume_db == 12.0 and volume_is(-6)
     press(dialog, "▶  Hear B")
     paired.wait(lambda: sounds(paired))
     find(dialog, CountBox, "Number of trials").setValue(25)
     paired.key(KEY.Key_Escape, on=dialog)
-    paired.wait(lambda: not sounds(paired) and volume_is(12))
+    paired.wait(lambda: not sounds(paired))
     paired.pluck()
     paired.wait(lambda: paired.performance.position_s > 0.3)
     dialog = open_test(paired)
@@ -338,9 +320,6 @@ def test_the_test_has_the_sound_for_itself(paired, tmp_path, monkeypatch):
     for key in (KEY.Key_X, KEY.Key_A, KEY.Key_B):
         paired.key(key, on=trial)
         paired.wait(lambda: sounds(paired))
-        del levels[:]
-        paired.wait(lambda: len(levels) > 1)
-        assert set(levels) == {(-float("inf"), False)}, "nothing gives X away"
     paired.key(KEY.Key_1, on=trial)
     paired.close()
     (path,) = (tmp_path / "records").iterdir()

@@ -121,7 +121,7 @@ COMMAND = "import sys; from app.commands.cli import main; sys.exit(main(sys.argv
 
 
 @pytest.fixture
-def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def log(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv(FILE_VARIABLE, str(tmp_path / "logs" / "here.log"))
     return tmp_path / "logs" / "here.log"
 
@@ -188,16 +188,10 @@ def test_what_is_recorded_while_the_process_ends_is_left_whole(tmp_path, end):
     journal.close()
     assert played is not None
     kinds = [type(each.event) for each in played.events]
-    assert [kind for kind in kinds if kind is not InstrumentTurned][:5] == [
-        NoteOn,
-        ControlChange,
-        Bend,
-        NoteOff,
-        NoteOn,
-    ]
-    assert [each.event.instrument.level_db for each in played.events if isinstance(each.event, InstrumentTurned)][
-        -1
-    ] == -7.5
+    struck = [kind for kind in kinds if kind is not InstrumentTurned]
+    assert struck[:5] == [NoteOn, ControlChange, Bend, NoteOff, NoteOn]
+    turned = [each.event for each in played.events if isinstance(each.event, InstrumentTurned)]
+    assert turned[-1].instrument.level_db == -7.5
     first_s = times_s[kinds.index(NoteOn)]
     wanted = [max(0.0, time_s - first_s) for time_s in sorted(times_s)]
     assert [each.time_s for each in played.events][: len(wanted)] == wanted

@@ -1,7 +1,6 @@
 """A panel with a take of known motion, and what its plots show."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF
 from PySide6.QtGui import QColor
-from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
 from app.rendering import Take
@@ -30,7 +28,7 @@ Hear = Callable[[Take, Ear], None]
 
 
 @pytest.fixture
-def take(small_preset: Path, hear: Hear) -> Take:
+def take(small_preset, hear) -> Take:
     """A decaying first mode of 4 mm; the model is 1 % too loud."""
     made = Take("small", read_info(small_preset), Pluck(0.5, 4.0, "gaussian", 0.06), 1.0, Choices().ear)
     time_s = np.arange(FRAMES)[:, None] / 4000
@@ -42,7 +40,7 @@ def take(small_preset: Path, hear: Hear) -> Take:
 
 
 @pytest.fixture
-def make(qtbot: QtBot, take: Take, threads_begun: Callable[[], list[str]]) -> Iterator[Make]:
+def make(qtbot, take, threads_begun) -> Iterator[Make]:
     """Makes panels that can be seen, with the take; at their end none leaves a thread."""
     panels: list[Panel] = []
     dress_plots()
@@ -65,7 +63,7 @@ def make(qtbot: QtBot, take: Take, threads_begun: Callable[[], list[str]]) -> It
 
 
 @pytest.fixture
-def watch(qtbot: QtBot, take: Take) -> Callable[[Panel, Callable[[], object]], None]:
+def watch(qtbot, take) -> Callable[[Panel, Callable[[], object]], None]:
     """Shows a panel moments of the take until it is so."""
 
     def watched(panel: Panel, until: Callable[[], object], position_s: float = 0.5) -> None:

@@ -96,46 +96,19 @@ class AnyPanel(Panel):
     key = "any"
 
 
-class Growing:
-    """A take that grows with each look at it, until it has grown so often."""
-
-    complete, looks = False, 0
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-
-    @property
-    def ready_frames(self) -> int:
-        self.looks = min(self.looks + 1, self.most)
-        self.complete = self.looks == self.most > 0
-        return self.looks
-
-
-@pytest.mark.parametrize(("looks", "complete"), [(5, True), (0, False)], ids=["rendered", "abandoned"])
-def test_a_job_rests(qtbot, monkeypatch, looks, complete):
-    monkeypatch.setattr(base, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
-    panel, take, resting = AnyPanel(Session(), Library([])), Growing(looks), Event()
-    panel.take_started(take)  # type: ignore[arg-type]
-
-    def work(job: Job) -> bool:
-        job.report(0.5)
-        return take.complete
-
-    with qtbot.waitSignal(panel.background.finished) as finished:
-        panel.compute(work)
-    assert finished.args == [complete]
+def test_a_job_rests_while_nobody_looks(qtbot, monkeypatch):
     monkeypatch.setattr(base, "UNSEEN_S", 0.2)
-    shares, ended = reported(panel.background.progressed), reported(panel.background.finished)
+    panel, resting = AnyPanel(Session(), Library([])), Event()
+    ended = reported(panel.background.finished)
 
-    def work_on(job: Job) -> None:
+    def work(job: Job) -> None:
         time.sleep(base.UNSEEN_S + 0.05)
         resting.set()
-        job.report(0.5, so_far="half")
+        job.report(0.5)
 
-    panel.compute(work_on)
+    panel.compute(work)
     assert resting.wait(60)
     qtbot.wait(50)
-    assert shares == []
-    qtbot.waitUntil(lambda: panel.look() or bool(ended))  # again and again: each look holds for UNSEEN_S
-    assert len(shares) == 1
+    assert ended == []
+    qtbot.waitUntil(lambda: panel.look() or bool(ended))
     panel.end()

@@ -109,11 +109,6 @@ def test_the_spectrogram_has_one_scale(make, take, hear, watch):
     watch(panel, lambda: column().argmax() != highest)
     assert int(column().argmax()) / rows * 2000 == pytest.approx(take.fundamental_hz, abs=30)
     assert panel.plot.getPlotItem().vb.viewRange()[1][1] == pytest.approx(2000)
-    panel.begin_picture(2, 3, 0.1)
-    panel.show_columns(np.full((2, 3), -95.0, np.float32))
-    assert panel.readout.text() == "all levels are below −90 dB"
-    choose_in(panel.ranges, 130)
-    assert panel.readout.text() == "" and bar_of(panel.plot).levels() == (-130, 0)
     for pickup, label in (("displacement", "dB re 10 mm"), ("velocity", "dB re 30 m/s")):
         choose(panel, pickup=pickup)
         assert bar_of(panel.plot).getAxis("left").labelText == label
@@ -137,15 +132,6 @@ def test_the_error_over_time_is_one_per_cent_and_its_level_a_tenth_of_a_db(make,
     assert panel.readout.text() == ""
     press(panel, "MAE and RMSE")
     assert "validation 70.7 %, 25.0 %" in panel.readout.text()
-    press(panel, "Render 10 s")
-    assert panel.session.choices.seconds == 10
-    panel.choices_changed(frozenset({"seconds"}))
-    assert not panel.longer.isEnabled()
-    for error in (3e-8, 2e-4, 0.5, 40.0):  # of any size it is in view
-        both = {name: np.full(9, error) for name in ("rmse", "mae")}
-        panel.show_curves(np.linspace(0.0, 2.0, 9), both | {"level_db": np.zeros(9)})
-        low, high = panel.plot.getPlotItem().vb.viewRange()[1]
-        assert low < np.log10(error) < high
 
 
 def test_the_spectrum_is_read_by_pointer_and_keys(qtbot, make, take, watch):
@@ -173,9 +159,6 @@ def test_the_spectrum_is_read_by_pointer_and_keys(qtbot, make, take, watch):
         qtbot.keyClick(plot, key)
         assert plot.line_at - before == pytest.approx(side * math.log10(whole_hz[1] / whole_hz[0]) / 20)
         assert f"{10**plot.line_at:.1f} Hz" in plot.accessibleDescription()
-    for hz, words in ((440 * 2 ** (30 / 1200), "A4 +30 cents"), (261.6256 * 2 ** (-0.1 / 12), "C4 -10 cents")):
-        plot.hovered.emit(math.log10(hz), -50.0)
-        assert words in panel.readout.text() and "A −" in panel.readout.text().replace("-", "−")
     panel.point_at(math.nan)
     assert panel.readout.text() == "" and not partial.isVisible()
     look(panel, take, 1.0)  # the end of the last window
@@ -205,10 +188,6 @@ def test_waveform_and_spectrum_have_the_unit(make, take, hear, watch):
         watch(waveform, lambda unit=unit: whole(waveform, "truth") and label_of(waveform.plot) == unit)
         assert drawn(waveform, "truth").max() == pytest.approx(0.004 * factor, rel=0.02)
         assert full in label_of(spectrum.plot)
-    choose(waveform, pickup="velocity", listen=0.999)
-    hear(take, waveform.session.choices.ear)
-    watch(waveform, lambda: "mm/s" in label_of(waveform.plot))
-    assert drawn(waveform, "truth").max() == pytest.approx(4 * omega * np.sin(0.001 * np.pi), rel=0.05)
     for panel in (waveform, spectrum):
         choose(panel, pickup="displacement", b="difference", heard="b", difference_gain_db=20.0, listen=0.5)
     hear(take, waveform.session.choices.ear)
@@ -217,8 +196,6 @@ def test_waveform_and_spectrum_have_the_unit(make, take, hear, watch):
     watch(spectrum, lambda: len(drawn(spectrum, "difference")) > 0)
     gap_db = drawn(spectrum, "model").max() - drawn(spectrum, "difference").max()
     assert gap_db == pytest.approx(20.1, abs=0.1)
-    top = max(items(waveform.plot, pg.PlotDataItem), key=lambda item: item.zValue())
-    assert (top.getData()[1] == drawn(waveform, "difference")).all(), "the heard curve is on top"
     choose(waveform, a="truth", b="truth", solo=2, stereo=True)
     assert curves(waveform.plot).keys() == {"truth"} and waveform.legend.text.startswith("mode 2, left   ")
 
@@ -266,6 +243,10 @@ def test_the_string_shows_one_moment(make, take, monkeypatch):
         choose(panel, solo=solo)
         panel.show_moment(Moment(take, 0.5, False, 0.016))
         assert frames[-1].caption.startswith(words) and ("mode" in frames[-1].caption) == bool(solo)
+    assert frames[-1].envelopes
+    press(panel, "Envelope")
+    panel.show_moment(Moment(take, 0.5, False, 0.016))
+    assert not frames[-1].envelopes
     late = Take(take.preset_name, take.info, take.pluck, take.seconds, take.listened.ear)
     model, truth = take.motion_m("model"), take.motion_m("truth")
     append_to(late, model[:400], truth[:400])
