@@ -77,7 +77,6 @@ def test_what_is_dragged_is_what_would_be_exported(guitar, tmp_path, dropped):
     origin: Any = read_origin(recording)
     assert (recording.name, origin.instrument) == (f"{NAME}.wav", NAME)
     guitar.controller.instruments.recordings.forget_all()
-    assert handle.subject == "note"
     guitar.change(preset="first")
     guitar.drop(note)
     assert guitar.choices.played == start

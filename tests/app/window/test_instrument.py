@@ -248,7 +248,9 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     guitar.wait(lambda: guitar.performance.playable)
     note = guitar.pluck()
     assert note.event.key == key and abs(note.event.velocity - guitar.choices.velocity) <= 1
-    assert guitar.session.undo_words.startswith("instrument")
+    guitar.choose("classical_guitar")
+    guitar.play(52)
+    guitar.wait_for_string()
     guitar.change(played=HARP, string=low.parameters, position=0.2, shape=HARP.pluck.shape)
     assert (guitar.choices.string, guitar.choices.position) == (low.parameters, 0.2)
     guitar.wait(lambda: guitar.performance.playable)
