@@ -67,27 +67,19 @@ def run(*words: object, folder: Path, status: int = 0, environment: dict[str, st
 
 
 @LINUX
-def test_its_command_line_renders_the_same_note(program, tmp_path):
+def test_a_bundle_renders_the_same_note_opens_its_window_and_finds_its_kernels(program, tmp_path):
+    kernels = program.parent / "_internal/engine/kernels/__pycache__"
+    before = {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")}
     run(program, "render", "studio_any_string", "bundle.wav", *NOTE, folder=tmp_path)
     assert cli.main(["render", "studio_any_string", str(tmp_path / "source.wav"), *NOTE]) == 0
     bundle, source = (soundfile.read(tmp_path / f"{name}.wav")[0] for name in ("bundle", "source"))
     np.testing.assert_allclose(bundle, source, atol=2e-5)  # other instructions of the processor round differently
 
-
-@LINUX
-def test_it_finds_its_compiled_kernels_where_it_was_moved(program, tmp_path):
-    kernels = program.parent / "_internal/engine/kernels/__pycache__"
-    before = {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")}
-    run(program, "-P", "-m", "engine.warm", folder=tmp_path)
-    assert before
-    assert {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")} == before
-
-
-@LINUX
-def test_its_window_opens_and_it_says_that_it_builds_no_plugins(program, tmp_path):
     run(program, "-P", "-c", WINDOW, folder=tmp_path)
     assert list(tmp_path.rglob("settings.json"))
     assert "start the program with Python" in run(program, "plugin", "concert_harp", folder=tmp_path, status=1)
+    run(program, "-P", "-m", "engine.warm", folder=tmp_path)
+    assert before and {path: path.stat().st_mtime_ns for path in kernels.rglob("*.nb?")} == before
 
 
 def test_a_wheel_has_presets_recipes_and_pictures(tmp_path):

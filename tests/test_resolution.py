@@ -17,25 +17,23 @@ SYSTEMS = {  # uv's names, and those of docs/install.md
     "aarch64-apple-darwin": "| macOS, Apple silicon | macOS 14 |",
     "x86_64-pc-windows-msvc": "| Windows, x64 |",
 }
-MACOS = "14.0"
 # Nothing is built, and no other Python is fetched: this one stands in for it.
 COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build", "--no-python-downloads")
 EXTRAS = ("dev", "midi", "docs", "cluster", "bundle")
 WHAT = ("pyproject.toml", "--constraints", "constraints.txt", *(word for e in EXTRAS for word in ("--extra", e)))
 CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
-AT_ONCE = 8
 
 
 def test_every_python_and_system_installs_from_wheels():
     uv = pytest.importorskip("uv", reason="uv is not installed")
-    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": MACOS, "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "14.0", "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
 
     def resolve(python: str, system: str) -> subprocess.CompletedProcess[str]:
         target = ("--python", sys.executable, "--python-version", python, "--python-platform", system)
         command = [uv.find_uv_bin(), *COMPILE, *target, *WHAT]
         return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
 
-    with ThreadPoolExecutor(AT_ONCE) as pool:
+    with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(resolve, *zip(*product(PYTHONS, SYSTEMS), strict=True)))
     if unreachable := [done.stderr for done in found if "Failed to fetch" in done.stderr]:
         pytest.skip(f"the package index cannot be reached: {unreachable[0].strip()}")

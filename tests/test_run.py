@@ -78,28 +78,23 @@ def test_words_are_understood_and_files_open_in_the_app(run, monkeypatch, capsys
     assert capsys.readouterr() == ("", "")
 
 
-ANSWERS = {  # the status, and the words of the output and of the error
-    **dict.fromkeys(["render", "setup now", "docs now", "--frob", "song.mid now", "--frob.mid"], (2, "", None)),
-    "song.mid gone.wav": (2, "", "run.py: no such file: gone.wav; check the name\n"),
-    "--help": (0, "python3 run.py -- render", ""),
-}
-
-
-@pytest.mark.parametrize("words", ANSWERS)
-def test_other_words_are_answered_with_the_usage(run, words, monkeypatch, capsys, tmp_path):
-    status, out, err = ANSWERS[words]
+@pytest.mark.parametrize(
+    ("words", "status", "reported"),
+    [
+        ("song.mid now", 2, "not understood: song.mid now"),
+        ("--frob.mid", 2, "not understood: --frob.mid"),
+        ("song.mid gone.wav", 2, "run.py: no such file: gone.wav; check the name\n"),
+        ("--help", 0, "python3 run.py -- render"),
+    ],
+)
+def test_other_words_are_answered_with_the_usage(run, words, status, reported, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "song.mid").touch()
     monkeypatch.setattr(run, "prepare", lambda *_, **__: pytest.fail("prepared"))
     with pytest.raises(SystemExit) as exit:
         run.main(words.split())
-    printed = capsys.readouterr()
-    assert exit.value.code == status and out in printed.out
-    if err is None:
-        assert printed.out == "" and "python3 run.py setup" in printed.err
-        assert f"not understood: {words}" in printed.err
-    else:
-        assert printed.err == err
+    assert exit.value.code == status
+    assert reported in capsys.readouterr()[0 if status == 0 else 1]
 
 
 @pytest.mark.parametrize(
@@ -163,18 +158,6 @@ def test_changed_kernels_are_compiled_once_and_that_is_said(run, action, monkeyp
     assert capsys.readouterr().err.count("compiling the sound engine") == 2
 
 
-def test_a_moved_folder_is_seen(run, tmp_path):
-    before = run.fingerprint()
-    moved = tmp_path / "moved"
-    moved.mkdir()
-    for name in ("run.py", "pyproject.toml", "constraints.txt", ".venv"):
-        (tmp_path / name).rename(moved / name)
-    run = load(moved / "run.py")
-    assert run.fingerprint() != before
-    assert run.read_stamp() is None
-    assert not run.sound()
-
-
 def test_a_sound_environment_is_installed_into_another_is_made_again_and_midi_may_fail(run, monkeypatch, capsys):
     steps = []
 
@@ -214,13 +197,6 @@ def test_torch_comes_without_cuda_only_where_no_card_is_and_the_builds_are_in_re
     assert said in err and (said or err == "")
 
 
-def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
-    monkeypatch.setattr(run, "run_step", lambda command, trouble: None)
-    with run.locked():
-        run.make_venv()
-    assert list(run.VENV.iterdir()) == [run.LOCK]
-
-
 @pytest.mark.parametrize("cut", ["file", "size", "record"])
 def test_a_package_cut_short_is_made_to_look_absent(run, cut):
     """Or pip would take it for installed and leave it as it is."""
@@ -249,8 +225,7 @@ def test_a_failed_step_shows_its_last_lines_and_leaves_no_stamp(run, monkeypatch
 
 
 def test_a_second_set_up_waits_for_the_first_and_does_nothing_more(run, monkeypatch):
-    begun, waited_for, said, made = threading.Event(), threading.Event(), [], []
-    environment = run.environment
+    begun, waited_for, made, environment = threading.Event(), threading.Event(), [], run.environment
 
     def slow(absent):
         begun.set()
@@ -259,21 +234,14 @@ def test_a_second_set_up_waits_for_the_first_and_does_nothing_more(run, monkeypa
         environment(absent)
 
     monkeypatch.setattr(run, "environment", slow)
-    monkeypatch.setattr(run, "say", lambda message: said.append(message) or waited_for.set())
+    monkeypatch.setattr(run, "say", lambda message: waited_for.set() if "another set-up" in message else None)
     run.STAMP.unlink()
     first = threading.Thread(target=run.prepare, args=("start", False))
     first.start()
     assert begun.wait(10)
     run.prepare("start", False)
     first.join()
-    assert made == [[]] and (run.WINDOWS or any("waiting for another set-up" in message for message in said))
-
-
-def test_signs_of_system_packages_are_found_where_they_are(run):
-    for there in ("import ensurepip", "libc.so.6", "/proc/*/stat", "sh") if sys.platform == "linux" else ():
-        assert run.present(there)
-    for absent in ("import nothing_of_the_kind", "libnothing.so.6", "/proc/nothing", "nothing-of-the-kind"):
-        assert not run.present(absent)
+    assert made == [[]] and (run.WINDOWS or waited_for.is_set())
 
 
 @pytest.fixture
@@ -316,24 +284,3 @@ def test_root_installs_and_those_of_the_tests_only_for_them_and_a_failure_is_a_w
     machine.run.STAMP.unlink()
     assert machine.run.main(["setup"]) == 0
     assert "warning: apt-get install failed; going on without" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("lint", [None, "mypy"])
-def test_the_check_runs_the_tests_in_parallel_and_names_a_failed_lint(run, lint, monkeypatch, capsys):
-    pytests = []
-    failed = lambda command: int(lint is not None and lint in command[2:3])  # noqa: E731
-    done = lambda command, **_: subprocess.CompletedProcess(command, failed(command), b"")  # noqa: E731
-    monkeypatch.setattr(run.subprocess, "run", done)
-    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command[3:], env)))
-    for name in ("QT_QPA_PLATFORM", "OMP_NUM_THREADS"):
-        monkeypatch.delenv(name, raising=False)
-    assert run.main(["test", *(["tests/test_run.py"] if lint else [])]) == (1 if lint else None)
-    ((words, env),) = pytests
-    out, err = capsys.readouterr()
-    assert env["QT_QPA_PLATFORM"] == "offscreen" and out.count("passed") == len(run.LINTS) - bool(lint)
-    if lint:
-        assert words == ["tests/test_run.py"]
-        assert "mypy: FAILED" in out and err == "run.py: failed before the tests: mypy\n"
-    else:
-        assert words[0] == "-n" and words[-2:] == ["--dist", "loadfile"] and err == ""
-        assert env["OMP_NUM_THREADS"] == "1"

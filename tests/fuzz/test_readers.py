@@ -6,30 +6,24 @@ import os
 import random
 import threading
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
-from app.export.recipe import SoundRecipe
-from app.instruments.instrument import Instrument
 from app.instruments.library import list_instruments
-from app.instruments.tuning import Tuning, TuningChoice
 from app.player.bodies import own_bodies
-from app.player.midi_file import MOST_EVENTS, read_midi
+from app.player.midi_file import MOST_EVENTS
 from app.presets.library import Library, list_presets
-from app.session.choices import Choices
 from app.window.dropped_files import receive
 from app.window.settings import Settings, load_settings
 from engine import bounds
 from engine.folders import usable_files
 from engine.plain_text import LONGEST_MESSAGE, one_line
-from engine.presets import PresetInfo, preset_digest
+from engine.presets import preset_digest
 from engine.resonators.string import resonator_of
-from engine.schema import SchemaError, explained, parse_json, read, read_toml, write
+from engine.schema import SchemaError, parse_json, read_toml, write
 from engine.truth import SplittingSolver
 from engine.values.string import StringParameters
 from engine.whole_file import UnusableFile, read_bounded
@@ -48,7 +42,6 @@ from tests.fuzz.readers import (
     recipe_text,
     wav,
 )
-from training.configuration import TrainingConfiguration
 from training.heard_file import read_heard
 
 EVERY = pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
@@ -120,14 +113,11 @@ def midi(track: bytes) -> bytes:
 BOMBS: dict[str, tuple[str, bytes | str]] = {  # small files that would cost gigabytes or minutes
     "a key of bare parts": ("string.toml", "a." * 30_000 + "a=1"),
     "a key of quoted parts": ("string.toml", '"=".' * 15_000 + "a=1"),
-    "a key of literal parts": ("string.toml", "'='." * 15_000 + "a=1"),
     "a key of escaped parts": ("string.toml", r'"\"".' * 12_000 + "a=1"),
-    "a key of spaced parts": ("string.toml", "a . " * 15_000 + "a=1"),
     "a key of parts inline": ("string.toml", "x={" + "a." * 30_000 + "a=1}"),
     "a table of many parts": ("string.toml", "[" + "a." * 30_000 + "a]"),
     "quotes without end": ("string.toml", '"\\"' + '\\"' * 30_000),
     "quotes of both kinds": ("string.toml", "\"'" * 30_000),
-    "words": ("string.toml", "a" * 60_000),
     "a time without end": ("song.mid", midi(b"\xff" * (2**20 - 40))),
     "a length without end": ("song.mid", midi(b"\x00\xff\x01" + b"\xff" * (2**20 - 40))),
     "a time within a chunk of another name": ("song.mid", midi(b"\x00\x90\x3c\x40" + b"\x80" * 9)),
@@ -150,22 +140,16 @@ def test_a_small_file_that_would_cost_much_is_refused(kind, folder):
     assert costs.largest_mb <= MOST_MB, costs
 
 
-def test_ordinary_dots_and_the_largest_song_are_read(folder):
+def test_ordinary_dots_are_read(folder):
     path = folder / "a.toml"
     path.write_text(f'a.b."c.d".e = [{", ".join(["0.5"] * 900)}]\nversion = "1.2.3.4.5.6.7.8"\n[x.y.z]\nk = 1e-3\n')
     assert read_toml(path)["a"]["b"]["c.d"]["e"] == [0.5] * 900
-    path, costs = folder / "song.mid", Costs()
-    path.write_bytes(midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * (MOST_EVENTS - 2) + b"\x00\xff\x2f\x00"))
-    with costs.reading():
-        read_midi(path)
-    assert costs.largest_mb <= MOST_MB, costs
 
 
 @pytest.mark.parametrize(
     ("facts", "kept"),
     [
         ({"favourites": [1] * 150_000}, False),
-        ({"instrument_favourites": [{}] * 150_000}, False),
         ({"choices": {f"{n}": 1 for n in range(80_000)}}, False),
         ({"favourites": [1] * 30_000, "window_geometry": "kept"}, True),
     ],
@@ -178,14 +162,6 @@ def test_settings_with_very_many_faults_keep_the_rest_or_are_set_aside(facts, ke
     assert settings.model_copy(update={"window_geometry": ""}) == Settings() and len(notice) <= 500
     assert (settings.window_geometry == "kept") if kept else ("set aside" in notice)
     assert costs.largest_mb <= MOST_MB, costs
-
-
-def test_numbers_of_many_digits_are_bounded_before_any_arithmetic():
-    with pytest.raises(ValueError, match="preset_rate_hz"):
-        SoundRecipe.model_validate({"preset_rate_hz": 10**400})
-    for first in ("610000.", "-610000."):  # pitches that cannot be squared
-        with pytest.raises(ValueError, match="scale"):
-            Tuning(TuningChoice.model_validate({"scale": f"! a\na\n 2\n {first}\n 2/1\n"}))
 
 
 # Folders: a stranger's file is listed or reported, and hides no other
@@ -258,51 +234,6 @@ def test_a_reading_is_bounded_and_of_an_ordinary_file(tmp_path):
         with pytest.raises(UnusableFile, match=reported):
             read_bounded(path, 10)
     assert read_bounded(tmp_path / "a", 11) == b"12345678901"
-
-
-NUMBERS = st.integers() | st.floats() | st.sampled_from([10**400, 2**63, -(2**64)])
-VALUES = st.recursive(
-    st.none() | st.booleans() | NUMBERS | st.text(max_size=50),
-    lambda inner: st.lists(inner, max_size=5) | st.dictionaries(st.text(max_size=10), inner, max_size=5),
-    max_leaves=20,
-)
-
-
-def fields_of(kind: type, *more: str) -> st.SearchStrategy[dict[str, Any]]:
-    known = getattr(kind, "model_fields", None) or kind.__dataclass_fields__
-    return st.dictionaries(st.sampled_from(sorted([*known, *more])) | st.text(max_size=8), VALUES, max_size=6)
-
-
-@pytest.mark.parametrize("kind", [PresetInfo, StringParameters, TrainingConfiguration])
-@given(data=st.data())
-def test_any_data_is_read_or_refused(kind, data):
-    plain = data.draw(fields_of(kind))
-    try:
-        value = read(kind, plain, "there")
-    except SchemaError as error:
-        assert str(error).isprintable() and len(str(error)) <= LONGEST_MESSAGE
-    else:
-        assert read(kind, write(value), "there") == value
-
-
-@given(facts=fields_of(Settings), choices=fields_of(Choices, "preset", "instrument", "keys_play"))
-def test_any_settings_file_lets_the_app_start(tmp_path_factory, facts, choices):
-    path = tmp_path_factory.getbasetemp() / "settings.json"
-    path.write_text(json.dumps({**facts, "choices": choices}))
-    settings, notice = load_settings(path)
-    assert isinstance(settings, Settings) and notice.isprintable() and len(notice) <= LONGEST_MESSAGE
-
-
-@pytest.mark.parametrize("kind", [Instrument, SoundRecipe])
-@given(data=st.data())
-def test_any_document_is_checked(kind, data):
-    facts = data.draw(fields_of(kind))
-    try:
-        value = kind.model_validate(facts)
-    except (ValueError, OverflowError) as error:
-        assert not isinstance(error, ValidationError) or explained(error)
-    else:
-        assert kind.model_validate_json(value.model_dump_json()) == value
 
 
 @given(

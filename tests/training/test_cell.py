@@ -1,33 +1,15 @@
 """Configurations: of a cell's name, of a file, and of earlier versions; each digest is for good."""
 
-import itertools
 from dataclasses import dataclass, replace
 
 import pytest
 
-from engine.models import MODELS, OF_MANY_STRINGS, build_model
+from engine.models import MODELS, build_model
 from engine.models.configurations import LRUConfiguration
 from engine.schema import SchemaError, write
 from training.cell import Cell, configuration_of, load
 from training.configuration import read_configuration
 from training.results import RESULTS, read_results
-
-OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
-INITIALS = ("gaussian", "noise")
-FIELDS = OF_CELLS, (False, True), INITIALS, (4000, 16000), (400, 4000), ("ours", "paper"), (0, 3)
-EVERY_CELL = [Cell(*values) for values in itertools.product(*FIELDS)]
-
-
-def test_every_cell_of_the_tables_can_be_built_from_its_name():
-    assert len({cell.name for cell in EVERY_CELL}) == len({cell.title for cell in EVERY_CELL}) == len(EVERY_CELL)
-    assert all(Cell.parse(cell.name) == cell for cell in EVERY_CELL)
-    some = EVERY_CELL[::31]  # of every model, string, data set, horizon, recipe and seed
-    built = [load(cell.name) for cell in some]
-    assert len({configuration.digest for configuration in built}) == len(some)
-    for cell, made in zip(some, built, strict=True):
-        found = (made.steps, made.data.modes, made.data.tension_modulated, made.recipe.seed)
-        assert found == (cell.horizon, {4000: 10, 16000: 25}[cell.rate_hz], cell.tension_modulated, cell.seed)
-
 
 DIGESTS = {
     Cell("koopman_var", True, "noise", 4000, 400, "paper"): "68b69a9cfa060660",
@@ -82,7 +64,6 @@ def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today():
         ("koopman", {"initialisation": "paper", "latent_epochs": 1000}),
         ("koopman_blind", {"blind": True, "latent_epochs": 1000}),
         ("koopman_integrated_blind", {"blind": True, "latents_per_mode": 1}),
-        ("koopman_integrated_hinted", {"blind": True, "latents_per_mode": 0}),
         ("frnn_400", {"blind": True}),
         ("lru_paper", {"blind": False, "initialisation": ""}),
     ],
@@ -112,27 +93,16 @@ def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_th
 # Refusals
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
-        ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
-        ("nylon_nonlinear_noise_4k_lru_400_theirs", "'theirs' is not one of blind, hinted, ours, paper, published"),
-        ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
-        ("no_such_thing", "no training configuration 'no_such_thing'"),
-        ("nylon_nonlinear_noise_4k_koopman_tension", "`family train` trains it"),
-    ],
-)
-def test_a_name_that_is_no_cell_is_reported(name, words):
-    with pytest.raises(SchemaError, match=words):
-        load(name)
+def test_a_name_that_is_no_cell_is_reported():
+    with pytest.raises(SchemaError, match="no training configuration 'no_such_thing'"):
+        load("no_such_thing")
+    with pytest.raises(SchemaError, match="`family train` trains it"):
+        load("nylon_nonlinear_noise_4k_koopman_tension")
 
 
 @pytest.mark.parametrize(
     ("data", "recipe", "words"),
     [
-        ({"counts": 3}, {}, "data: unknown field 'counts'"),
-        ({}, {"epoch": 3}, "unknown field 'epoch'"),
         ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
         ({}, {"batch_statistics_until": 0.0}, "batch_statistics_until"),
         ({}, {"latent_epochs": 0, "latent_polish": 1}, "latent_polish needs latent_epochs"),
@@ -163,13 +133,11 @@ epochs = 1
     ("text", "words"),
     [
         (CONFIGURATION + "[model_configuration]\nstate_size = 1_000_000_000\n", "state_size must lie in"),
-        (CONFIGURATION + "[model_configuration]\ncolour = 3\n", "unknown field 'colour'"),
         (CONFIGURATION + "[model_configuration]\ngrid_points = 51\n", "grid_points is 51, the data's are 101"),
         (CONFIGURATION + 'start = "guess"\n', "start 'guess' is not one of"),
         (CONFIGURATION.replace("modes = 10", "modes = 10\ncount = 100_000_000"), "GiB of data"),
         (CONFIGURATION.replace("modes = 10", "modes = 10\nsubsteps = 10_000_000"), "substeps must lie in"),
         (CONFIGURATION.replace("modes = 10", "modes = 100"), "cannot hold 100 modes"),
-        ("title = " + "[" * 60 + "]" * 60, "nested"),
         ("title = " + "[" * 30_000 + "]" * 30_000, "recursion"),
         ("title = '\udcff'", "not valid TOML"),
         (CONFIGURATION.replace("4000", "4" * 5000), "digits"),

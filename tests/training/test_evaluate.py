@@ -115,16 +115,6 @@ def test_any_splitting_into_blocks_gives_the_same_errors(data):
     assert np.allclose(at_once.t60_s, in_blocks.t60_s, rtol=1e-9, equal_nan=True)
 
 
-def test_some_trajectories_are_measured_and_progress_is_reported(data):
-    reported: list[float] = []
-    options = {"trajectories": slice(1), "report": reported.append}
-    found, partials = measured(Truth(data), data, 0.05, [(0, 0.05)], **options)
-    assert len(found.string.per_trajectory()[0]) == 1 and partials.energy.shape == (1, 1, 10)
-    assert reported.count(1.0) == 2 and max(reported) == 1
-    with pytest.raises(ValueError, match="at least one window"):
-        evaluate_partials(Truth(data), data, "test", [])
-
-
 def test_an_output_that_is_no_number_is_an_infinite_error(data):
     found, partials = measured(Truth(data, broken=200), data, 0.1, [(0, HORIZON_S), (0.06, 0.1)])
     assert found.string.total(199).rel_mse < 1e-11

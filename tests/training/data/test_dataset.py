@@ -1,7 +1,4 @@
 import json
-import math
-import signal
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +9,6 @@ from engine.resonators.sine_transform import analysis_matrix
 from engine.truth import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
 from training.configuration import DATA_VERSION, DatasetConfiguration, Recipe
-from training.data import draws
 from training.data.batches import TrainingData, batches
 from training.data.dataset import Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
@@ -74,29 +70,11 @@ def test_what_a_version_of_the_data_holds_is_for_good(tmp_path, initial, amplitu
     assert DATA_VERSION == 3
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX does")
-def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-        with pytest.raises(OSError, match="File too large"):
-            load_dataset(TINY, tmp_path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
-    assert [path.suffix for path in (tmp_path / "datasets").iterdir()] == [".lock"]
-
-
 DAMAGES = {  # of a file's bytes
     "cut": ("amplitudes.npy", lambda data: data[:-100]),
     "zeros": ("amplitudes.npy", lambda data: data[:-4000] + bytes(4000)),
     "type": ("amplitudes.npy", lambda data: data.replace(b"<f4", b"<f8")),
-    "json": ("dataset.json", lambda data: b"{"),
     "scale": ("dataset.json", lambda data: json.dumps({**json.loads(data), "scale_m": float("nan")}).encode()),
-    "list": ("dataset.json", lambda data: json.dumps({**json.loads(data), "scale_m": [1]}).encode()),
     "missing": ("amplitudes.npy", None),
 }
 
@@ -112,39 +90,6 @@ def test_a_damaged_cache_is_reported_with_its_remedy(tmp_path, how):
     with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as reported:
         load_dataset(TINY, tmp_path)
     assert str(folder) in str(reported.value)
-
-
-@pytest.mark.parametrize("kind", ["gaussian", "noise"])
-def test_draws_follow_the_protocol(kind):
-    drawn = draws.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
-    peaks = drawn.max(1)
-    assert drawn.shape == (500, 101)
-    assert (drawn[:, [0, -1]] == 0).all()
-    assert drawn.min() >= 0
-    # a narrow Gaussian between two grid points peaks a little below its parameter
-    assert peaks.min() >= 0.9 * draws.PEAK_RANGE_M[0]
-    assert peaks.max() <= draws.PEAK_RANGE_M[1]
-    assert float(peaks.mean()) == pytest.approx(5.5e-3, rel=0.1)
-    if kind == "gaussian":
-        centres = drawn.argmax(1) / 100
-        assert 0.29 <= float(centres.min()) <= 0.33 and 0.67 <= float(centres.max()) <= 0.71
-    again = draws.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
-    assert np.array_equal(drawn, again)
-
-
-def test_random_plucks_are_a_musicians():
-    drawn = draws.draw_plucks(600, 401, torch.Generator().manual_seed(0))
-    peaks = drawn.max(1)
-    assert drawn.shape == (600, 401) and (drawn[:, [0, -1]] == 0).all() and drawn.min() >= 0
-    assert 0.9 * draws.PLUCK_PEAK_RANGE_M[0] <= peaks.min() and peaks.max() <= draws.PLUCK_PEAK_RANGE_M[1]
-    assert float(np.log(peaks).mean()) == pytest.approx(0.5 * math.log(5e-4 * 1e-2), abs=0.1)
-    places = drawn.argmax(1) / 400
-    assert float(places.min()) < 0.08 and float(places.max()) > 0.92
-    # a triangle has two slopes and nothing else; a raised cosine is zero away from its place
-    bends = (np.abs(np.diff(drawn[1::3], n=2)) > 1e-9 * peaks[1::3, None]).sum(1)
-    assert int(bends.max()) <= 2
-    assert (drawn[2::3] == 0).mean(1).min() > 0.6
-    assert np.array_equal(drawn, draws.draw_plucks(600, 401, torch.Generator().manual_seed(0)))
 
 
 CPU = torch.device("cpu")
@@ -193,11 +138,3 @@ def test_an_epoch_holds_every_trajectory_once_and_fixed_batches_change_their_ord
     orders = [[rows.tolist() for rows in batches(recipe, 20, epoch)] for epoch in range(8)]
     assert all(sorted(order) == table for order in orders)
     assert len({str(order) for order in orders}) > 1
-
-
-def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path):
-    dataset = load_dataset(DatasetConfiguration("pluck", 4000, 5, steps=450, stride=9, count=20), tmp_path)
-    batch = TrainingData(dataset, CPU).draw(Recipe(epochs=1, flip=False, steps_per_batch=7), ROWS, 450, 0)
-    assert len(batch.frames) == 7 and not (batch.frames % 9).any() and int(batch.frames[-1]) <= 450
-    expected = dataset.amplitudes[ROWS][:, batch.frames // 9].double()
-    torch.testing.assert_close(modal(dataset, batch.target), expected, rtol=1e-5, atol=1e-9)

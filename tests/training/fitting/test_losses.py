@@ -4,11 +4,9 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import torch
-from torch.utils._python_dispatch import TorchDispatchMode
 
 from engine.models import build_model
 from engine.models.base import Physics
@@ -17,13 +15,12 @@ from engine.models.koopman_var import KoopmanVar
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.training.conftest import DATA
-from tests.training.fitting.test_fit import SMALL
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe
-from training.data.batches import Batch, TrainingData
-from training.fitting import losses, recorded, together
+from training.data.batches import Batch
+from training.fitting import losses, recorded
 from training.fitting.fit import Steps, TrainingState, take_step
-from training.fitting.losses import backward, training_loss
+from training.fitting.losses import training_loss
 from training.fitting.soap import EVERY, SOAP
 
 RECIPE = Recipe(epochs=1, consistency_weight=0.3)
@@ -155,55 +152,9 @@ def test_vectors_take_adams_step_and_weights_decay_and_no_gradient_changes_nothi
     assert weights.isfinite().all() and float(weights.detach().square().sum()) < 9
 
 
-@pytest.mark.parametrize("shape", [(6, 5), (3, 2, 5), (5, 3, 2)])
-def test_it_gets_further_than_adam_where_the_axes_are_correlated(shape):
-    mixing = torch.linalg.qr(draw(30, 30)).Q * torch.logspace(0, 1.5, 30, dtype=torch.float64)
-    mixing = mixing @ torch.linalg.qr(draw(30, 30, seed=1)).Q
-    wanted = draw(30, seed=2)
-    losses = []
-    for kind in (SOAP, torch.optim.AdamW):
-        weights = torch.zeros(shape, dtype=torch.float64, requires_grad=True)
-        optimiser = kind([{"params": [weights]}], lr=0.02, weight_decay=0.0)
-        losses.append(descend(optimiser, lambda w=weights: (mixing @ (w.flatten() - wanted)).square().sum(), 100))
-    assert losses[0] < losses[1]
-
-
-CPU, META = torch.device("cpu"), torch.device("meta")
+CPU = torch.device("cpu")
 MODELS = ("koopman", "koopman_var", "lru", "s5", "fgru", "frnn")
 EVERY_FRAME = Recipe(epochs=1, steps_per_batch=0, flip=False, koopman_terms="published")
-READS = ("local_scalar_dense", "equal", "is_nonzero", "nonzero")  # by the host, which waits for them
-
-
-class _Apart(TorchDispatchMode):
-    """Refuse what a recording cannot hold: a value that the host reads, or one that it sends."""
-
-    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        name = func.overloadpacket.__name__.strip("_")
-        assert name not in READS, f"{name}: the host reads a value"
-        given = [each for each in args if isinstance(each, torch.Tensor)]
-        sent = [each for each in given if each.device != META and (each.ndim or name in ("copy", "to_copy"))]
-        assert not sent, f"{name}: the host sends a value"
-        return func(*args, **(kwargs or {}))
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_a_step_asks_nothing_of_the_host(name, small_dataset, monkeypatch):
-    """On tensors without values, which no host can read."""
-    monkeypatch.setattr(together, "MAPPED_ON", ("meta",))
-    data = TrainingData(small_dataset, META)
-    models = [build_model(name, SMALL[name]).to(META) for _ in range(2)]
-
-    def step() -> None:
-        batches = [data.draw(EVERY_FRAME, torch.zeros(4, dtype=torch.int64, device=META), 8, 0) for _ in models]
-        if together.can_be_mapped(models, batches):
-            together.backward(models, batches, EVERY_FRAME)
-        for model, batch in zip(models, batches, strict=True):
-            backward(model, batch, EVERY_FRAME)
-            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
-
-    step()  # which makes the constants that are kept
-    with _Apart():
-        step()
 
 
 @pytest.mark.parametrize(

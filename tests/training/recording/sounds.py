@@ -127,14 +127,6 @@ def on_two_channels(random: Random, samples: Array, rate_hz: int) -> Sound:
     return np.stack([samples, other], 1), rate_hz
 
 
-def changed_thrice(random: Random, samples: Array, rate_hz: int) -> Sound:
-    """Three changes, one after another, that leave one channel."""
-    names = [name for name in CHANGES if name not in ("two channels", "three changes")]
-    for name in random.choice(names, 3, replace=False):
-        samples, rate_hz = CHANGES[name](random, samples, rate_hz)
-    return samples, rate_hz
-
-
 CHANGES: dict[str, Callable[[Random, Array, int], Sound]] = {
     "gain": quieter,
     "few samples clipped": slightly_clipped,
@@ -150,7 +142,6 @@ CHANGES: dict[str, Callable[[Random, Array, int], Sound]] = {
     "Vorbis": partial(coded, "OGG", "VORBIS"),
     "Opus": partial(coded, "OGG", "OPUS"),
     "two channels": on_two_channels,
-    "three changes": changed_thrice,
 }
 
 

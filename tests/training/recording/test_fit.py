@@ -43,15 +43,6 @@ def test_a_fit_has_the_pitch_decay_and_level_of_every_partial(seed, polarisation
     assert error.esr < (5e-4 if polarisations == 1 else 1e-2)
 
 
-def test_a_fit_without_a_glide_has_none_and_fits_worse():
-    _, note, series = modelled_note(0, 1)
-    gliding, still = (fit_note(note, series, free=0, poles_a_partial=1, glides=each) for each in (True, False))
-    samples, t = note.fitted(), np.arange(len(note.fitted())) / note.rate_hz
-    assert not still.glide.shares.any()
-    errors = [errors_of(samples, each.render(t), note.rate_hz).esr for each in (gliding, still)]
-    assert errors[0] < 0.1 * errors[1]
-
-
 def test_a_fit_that_is_cut_after_any_step_ends_bit_for_bit_as_the_whole(tmp_path):
     notes = [modelled_note(1, 2, seconds=0.3, loudness=each)[1:] for each in (1.0, 0.5)]
     settings: dict[str, Any] = {"free": 1, "seconds": 0.25}

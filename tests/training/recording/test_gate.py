@@ -1,18 +1,12 @@
 """The gate refuses what cannot be fitted, warns of what is unusual, and the verdict judges the fit."""
 
-import itertools
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from tests.training.recording.sounds import CHANGES, CHORD_DB, chord, membrane, noise, random_pluck
+from tests.training.recording.sounds import CHANGES, membrane, noise
 from tests.training.recording.synthetic import synthetic_note
-from training.recording.gate import second_series
 from training.recording.learn import NotFound, Refused, examined, learn, require_found
-from training.recording.note import note_of
-from training.recording.numbering import peaks_of, series_at
 from training.recording.preset import Source
 
 RATE_HZ = 44_100
@@ -44,9 +38,11 @@ def with_mode(x: np.ndarray, decay: float) -> np.ndarray:
     return x + np.where(T < 0.113, 0, 0.1 * np.sin(2 * np.pi * 216 * T) * np.exp(-decay * (T - 0.113)))
 
 
-CHANGED: dict[
-    str, tuple[Callable[[np.ndarray], np.ndarray], set[str], set[str]]
-] = {  # what must be found, and what refused
+def with_note(x: np.ndarray, level_db: float) -> np.ndarray:
+    return x + 10 ** (level_db / 20) * synthetic_note(1).samples  # of 148 Hz
+
+
+CHANGED = {  # what must be found, and what refused
     "many samples clipped": (lambda x: np.clip(4 * x, -0.5, 0.5), {"clipped"}, {"clipped"}),
     "clipped above alone, as with an offset": (lambda x: np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
     "clipped below alone": (lambda x: -np.minimum(x + 0.3, 0.4), {"clipped"}, {"clipped"}),
@@ -64,14 +60,8 @@ CHANGED: dict[
     "a hum behind silence": (lambda x: np.append(np.zeros(RATE_HZ), x + 3e-3 * HUM), set(), set()),
     "a mode of the body": (lambda x: with_mode(x, 40.0), set(), set()),
     "a mode of something else": (lambda x: with_mode(x, 2.0), {"off the law"}, {"off the law"}),
-    **{
-        f"a second note, {level_db} dB": (
-            lambda x, db=level_db: x + 10 ** (db / 20) * synthetic_note(1).samples,  # of 148 Hz
-            {"chord"},
-            {"chord"},
-        )
-        for level_db in (0, -5, -10)
-    },
+    "a second note": (lambda x: with_note(x, 0), {"chord"}, {"chord"}),
+    "a second note, 10 dB below": (lambda x: with_note(x, -10), {"chord"}, {"chord"}),
 }
 
 
@@ -84,22 +74,7 @@ def test_what_cannot_be_fitted_is_refused_and_what_is_unusual_is_a_warning(synth
     assert bool(findings.refusals) == bool(refused_kinds)
 
 
-@pytest.mark.parametrize("name", ["reversed", "a loop", "two attacks"])
-def test_silence_behind_what_is_edited_hides_nothing(synthetic, name):
-    assert refused(np.append(CHANGED[name][0](synthetic.samples), np.zeros(30_000)))
-
-
-def test_random_notes_of_random_strings_are_kept_and_chords_of_them_are_not():
-    """Others may pass: the verdict on their fit refuses them."""
-    for number, change in enumerate([*CHANGES.values()][:4]):
-        sound = random_pluck(40_000 + number)
-        assert refused(*sound) == refused(*change(np.random.default_rng([40_000, number]), *sound)) == set()
-    for number, level_db in itertools.product(range(2), CHORD_DB):
-        both = chord(random_pluck(45_000 + number), random_pluck(47_000 + number), level_db)
-        assert both is None or refused(*both)
-
-
-@pytest.mark.parametrize("kind", [kind for kind in CHANGES if kind != "three changes"])
+@pytest.mark.parametrize("kind", CHANGES)
 def test_a_note_is_kept_as_users_record_it(synthetic, kind):
     assert refused(*CHANGES[kind](np.random.default_rng(1), synthetic.samples, RATE_HZ)) == set()
 
@@ -124,12 +99,6 @@ def test_silence_behind_a_note_changes_nothing(synthetic, value):
     assert np.array_equal(behind.note.samples, control.note.samples)
 
 
-@pytest.mark.parametrize("hz", [500.0, 640.0, 810.0])
-def test_a_second_note_of_few_partials_is_heard(synthetic, hz):
-    other = synthetic_note(3, f0_range_hz=(hz, 1.001 * hz), highest_hz=2_500.0).samples
-    assert refused(synthetic.samples + 10 ** (-10 / 20) * other) & {"chord", "off the law"}
-
-
 def string(hz: float, count: int, decay: float, begin_s: float = 0.09) -> np.ndarray:
     """A stiff string's first partials, of 1.7 s, from a time on."""
     t = np.arange(round(1.7 * RATE_HZ)) / RATE_HZ - begin_s
@@ -150,21 +119,6 @@ def test_a_soft_second_note_is_heard_at_each_interval(hz, interval, strum_s):
     first, second = string(hz, 8, 2.0), string(interval * hz, 6, 4.0, 0.09 + strum_s)
     assert refused(together(first, second, -10)) == {"chord"}
     assert refused(together(first, second, -90)) == set()
-
-
-@pytest.mark.parametrize("low, high", [(2, 3), (3, 4)])
-def test_two_notes_that_were_numbered_as_one_are_heard(low, high):
-    sound = together(string(55.0 * low, 8, 3.0), string(55.0 * high, 8, 3.0), -3)
-    note = note_of(sound, RATE_HZ)
-    below = series_at(peaks_of(note.part(0.06, 0.76), RATE_HZ, note.noise_power), 55.0, 0.0)
-    found = second_series(note, below)
-    assert found is not None and found.reason.startswith(f"two notes sound, at {low * 55}")
-
-
-def test_an_offset_before_the_attack_is_no_hum():
-    sound, rate_hz = membrane(np.random.default_rng(3))
-    lead = 1e-6 * np.random.default_rng(0).standard_normal(rate_hz // 3)
-    assert refused(np.append(lead, sound + 0.1 * np.abs(sound))) & {"chord", "off the law"}
 
 
 def test_drums_are_refused():

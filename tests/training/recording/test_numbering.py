@@ -7,7 +7,7 @@ import pytest
 
 from tests.training.recording.synthetic import synthetic_note
 from training.recording.note import RecordingError, note_of
-from training.recording.numbering import followed, number_note, peaks_of, series_at
+from training.recording.numbering import number_note
 
 RATE_HZ = 44_100
 
@@ -68,13 +68,6 @@ def test_a_body_is_no_low_string_below_a_high_note(f0_hz, body_hz):
     sound[4_000:] += 0.3 * np.exp(-12 * t) * np.sin(2 * math.pi * body_hz * t)
     series = number_note(note_of(sound, RATE_HZ))
     assert series is not None and cents(series.f0_hz, f0_hz) < 12
-
-
-@pytest.mark.parametrize("off_cents", [-40, -15, 20])
-def test_a_string_is_followed_as_it_glides(off_cents):
-    peaks = peaks_of(stiff_note(110.0, 4e-5)[8_000:40_000], RATE_HZ)
-    series = followed(peaks, series_at(peaks, 110.0 * 2 ** (-off_cents / 1200), 4e-5))
-    assert cents(series.f0_hz, 110.0) < 2
 
 
 @pytest.mark.parametrize(

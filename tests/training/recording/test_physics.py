@@ -1,17 +1,17 @@
 """The physics of notes: of strings that are known, and of partials that a body pulls."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
 from training.family.strings import string_of
 from training.recording.fit import LearnedNote
 from training.recording.glide import CENTS, Glide
-from training.recording.physics import BUILDS, LearnedPhysics, corrections, physics_of, pluck_place, strung
+from training.recording.physics import BUILDS, corrections, physics_of, pluck_place, strung
 from training.recording.refine import Pole
 
 F0_HZ, SIGMA = 110.0, 2.0
@@ -47,18 +47,9 @@ def test_a_slow_polarisation_that_the_fit_has_among_its_free_poles_is_the_string
     assert own["second_ratio"][0] == pytest.approx(10)
 
 
-@dataclass(frozen=True)
-class Heard:
-    """A random string's partials, as a fit has them where nothing else sounds."""
-
-    resonator: Resonator
-    stiffness: float
-    place: float
-    physics: LearnedPhysics
-
-
 @pytest.fixture(scope="module", params=range(6))
-def heard(request: pytest.FixtureRequest) -> Heard:
+def heard(request: pytest.FixtureRequest) -> SimpleNamespace:
+    """A random string's partials, as a fit has them where nothing else sounds."""
     random = np.random.default_rng(request.param)
     hz, stiffness = math.exp(random.uniform(math.log(60), math.log(500))), 10 ** random.uniform(-5, -3.5)
     string = string_of(hz, stiffness, random.uniform(4, 10), random.uniform(0.4, 1.5))
@@ -69,7 +60,7 @@ def heard(request: pytest.FixtureRequest) -> Heard:
     ]
     glide = Glide(random.uniform(0, 8, 3) * CENTS)
     note = LearnedNote(44_100, hz / math.sqrt(1 + stiffness), stiffness, glide, tuple(poles))
-    return Heard(resonator, stiffness, place, physics_of(note))
+    return SimpleNamespace(resonator=resonator, stiffness=stiffness, place=place, physics=physics_of(note))
 
 
 def test_a_string_gives_its_pitch_inharmonicity_losses_and_the_place_of_its_pluck(heard):

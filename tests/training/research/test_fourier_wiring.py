@@ -7,16 +7,15 @@ import torch
 
 from engine.models.base import StringModes
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
-from engine.models.fno import FGRU, FRNN, FourierConvolution
+from engine.models.fno import FGRU, FRNN
 from engine.resonators.sine_transform import synthesis_matrix
-from tests.engine.tensors import convolved
 from tests.training.fitting.test_pursuit import motions_of
 from training.cell import Cell, configuration_of
 from training.evaluate import evaluate_model
 from training.fitting import phases
 from training.fitting.start import begin
 from training.research import fourier_wiring as wiring
-from training.research.fourier_wiring import Kernels, mean_motions, shared_coupling, store_in_fgru, store_in_frnn
+from training.research.fourier_wiring import mean_motions, store_in_fgru, store_in_frnn
 
 POINTS = 31
 
@@ -69,33 +68,6 @@ def test_an_fgru_is_a_linear_string_and_follows_the_squares():
     assert relative_error(fgru(linear), linear, 10) < 1e-2
     assert relative_error(fgru(string), string, 300) < 0.02
     assert relative_error(fgru(linear), string, 300) > 0.1
-
-
-def test_a_shared_coupling_is_found_again():
-    string = modes(1e-3)
-    everyone, others, own = shared_coupling(string.coupling, string.squares)
-    found = everyone[:, None] * others * (1 + own * torch.eye(5))
-    torch.testing.assert_close(found, string.coupling, rtol=0.02, atol=1e-4)
-    assert own == pytest.approx(0.5, abs=0.02)
-
-
-def test_kernels_pass_spread_and_gather():
-    shape = torch.rand(POINTS, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
-    kernels = Kernels(POINTS, 4)
-    kernels.add_shifted(0, 1, 2.0, lag=-3)
-    kernels.spread(0, POINTS - 1, 2, shape)
-    kernels.gather(0, 3, 7, shape)
-    kernels.bias[5, 0] = 1.5
-    layer = FourierConvolution(POINTS, 4).double()
-    kernels.store(layer.weight, layer.bias)
-    field = torch.zeros(1, POINTS, 4, dtype=torch.float64)
-    field[0, -1, 0] = 3.0
-    with torch.no_grad():
-        found = convolved(layer, field)[0]
-    expected = torch.zeros(POINTS, 4, dtype=torch.float64)
-    expected[5, 0], expected[-4, 1], expected[:, 2] = 1.5, 6.0, 3 * shape
-    torch.testing.assert_close(found[:, :3], expected[:, :3], rtol=0, atol=1e-12)
-    assert float(found[7, 3]) == pytest.approx(3 * float(shape[-1]))
 
 
 def test_a_mean_motion_is_the_linear_strings_own_or_between_those_of_soft_and_loud_strings():
