@@ -147,7 +147,7 @@ def set_machine(monkeypatch: pytest.MonkeyPatch, cores: int, memory_bytes: int, 
         (1000, 3, {}, 3),
         (1000, 100, {"threads": 4}, 2),
         (1000, 100, {"threads": 16}, 1),
-        (9, 9, {"workers": 20}, 20),
+        (9, 100, {"workers": 20}, 20),
     ],
 )
 def test_workers_fit_the_machine(monkeypatch, memory_gib, tasks, options, count):
