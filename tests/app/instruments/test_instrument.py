@@ -38,7 +38,7 @@ def test_impossible_values_are_refused_by_name():
             make_instrument(**json.loads(changes))
 
 
-def test_a_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise():
+def test_an_instrument_survives_json_and_what_plucks_it_stops_its_string_unless_it_says_otherwise():
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_instrument().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
     whole = make_instrument(strings=strings, macros=macro_of("level_db", -3, 3), pluck={"stops": False})
     assert Instrument.model_validate_json(whole.model_dump_json()) == whole

@@ -32,7 +32,7 @@ def test_what_is_saved_is_listed_and_read_again(own):
         assert library.find_instrument(name) == entry
 
 
-def test_a_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own):
+def test_an_instrument_replaces_its_own_file_where_that_is_meant_and_no_other(own):
     library.save_instrument(make_instrument(name="My-Bass"))
     with pytest.raises(library.InstrumentError, match=r"my bass: .* exists already; choose another"):
         library.save_instrument(make_instrument(name="my bass", level_db=3))

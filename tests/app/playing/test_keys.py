@@ -40,7 +40,7 @@ INSTRUMENT = SHIPPED.model_copy(  # its other strings stay silent, so that silen
 
 
 class Played:
-    """Notes whose instrument is an instrument, with what they report and which effects they ask for."""
+    """Notes whose keys play an instrument, with what they report and which effects they ask for."""
 
     def __init__(self, sound: Any, wait: Wait) -> None:
         self.sound, self.wait = sound, wait
@@ -194,7 +194,7 @@ def test_an_instrument_that_cannot_be_played_is_reported_once(played, part, valu
         assert (again.parameters, again.ear) == (made.parameters, Ear((0.1,)))
 
 
-def test_a_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played):
+def test_an_instrument_that_is_left_before_it_is_loaded_does_not_come_back(played):
     held = Event()
     played.notes.set_instrument(None, EAR, "")
     played.notes.in_background(lambda: held.wait(30) and None)

@@ -142,7 +142,7 @@ def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it():
     assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
 
 
-def test_a_instrument_whose_macro_moves_the_right_point_stays_in_stereo():
+def test_an_instrument_whose_macro_moves_the_right_point_stays_in_stereo():
     macro = {"name": "Width", "targets": ({"field": "pickup.points.1", "low": 0.5, "high": 0.9},)}
     session = Session()
     session.update(played=Instrument.model_validate({**dict(played_instrument(0.2, 0.8)), "macros": (macro,)}))

@@ -138,7 +138,7 @@ def test_knobs_and_transport_change_the_instrument_and_undo_takes_them_back(guit
     assert guitar.instrument.tuning.transpose == 2
 
 
-def test_a_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch):
+def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch):
     instruments, bar, asked = guitar.controller.instruments, guitar.window.instrument.bar, list[str]()
     names = ["AC/DC", "My Bass.", "Classical guitar", "Mine", "Yours"]
 

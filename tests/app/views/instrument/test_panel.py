@@ -148,7 +148,7 @@ def test_gestures_are_reported_with_their_field(qtbot, knobs, guitar):
     ]
 
 
-def test_what_a_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs, guitar):
+def test_what_an_instrument_does_not_have_cannot_be_turned_and_the_tip_says_why(knobs, guitar):
     keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
     changes = {"pluck.shape": "triangular", "damping.let_ring": True, "tuning.keymap": keymap}
     dead = guitar.model_dump()
