@@ -40,6 +40,19 @@ def test_links_lead_somewhere(path):
     assert [link for link in local if not (path.parent / link).exists()] == []
 
 
+@pytest.mark.parametrize(
+    ("name", "lines"), [("README.md", 120), ("RESULTS.md", 200), ("CHANGELOG.md", 60), ("docs/many-strings.md", 160)]
+)
+def test_documents_are_short(name, lines):
+    assert len(text(name).splitlines()) <= lines
+
+
+def test_sounds_and_pictures_are_small():
+    sounds, pictures = (ROOT / "docs" / name for name in ("sounds", "images"))
+    assert sum(path.stat().st_size for path in sounds.iterdir() if path.is_file()) < 1.5e6
+    assert all(path.stat().st_size < 6e5 for path in pictures.iterdir() if path.is_file())
+
+
 @cache
 def program() -> Any:
     return typer.main.get_command(cli)
@@ -125,6 +138,8 @@ def test_the_model_of_the_worked_example_is_a_linear_string():
     first, state = model.advance(model.encode(start), 100)
     second, end = model.advance(state, 200)
     assert torch.allclose(whole, torch.cat([first, second], dim=1), atol=1e-6)
+    ear = torch.rand(101, 2, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    assert torch.allclose(model.advance(model.encode(start), 300, ear)[0], whole @ ear.float(), atol=1e-5)
     assert torch.allclose(last, end)
     expected = torch.exp(300 * Physics(resonator, 16_000).log_eigenvalues)
     assert torch.allclose(last / model.encode(start), expected, atol=1e-9)

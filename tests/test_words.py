@@ -1,8 +1,9 @@
-"""Plain English: a word list over strings, comments and Markdown; sentences and docstrings are short."""
+"""Plain English: a word list over strings, comments, names and Markdown; sentences and commit subjects."""
 
 import ast
 import io
 import re
+import subprocess
 import tokenize
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -30,6 +31,7 @@ AVOIDED = {
     r"beside (the|its|our|their) (truth|paper\S*|physics|figures?)|(our|results|model) beside": "compared with",
 }
 WORDS = re.compile("|".join(rf"\b({words})\b" for words in AVOIDED), re.IGNORECASE)
+NAMES = {"told", "tells", "anew", "whoever", "errs", "obey", "believed", "tired"}  # parts of names, avoided too
 # words with which a docstring begins as a clause, not as the noun of a thing or the verb of an action
 CLAUSES = re.compile(
     r"(What|Whether|Of|How|Where|As|Which|Those|By|One|For|From|In|With|To|When|On|If|Whose|Who|That|Until)\b"
@@ -41,6 +43,9 @@ THIRD = re.compile(
 )
 LONGEST = 30  # words of a sentence
 LONGEST_OF_DOCSTRINGS = 25
+LONGEST_SUBJECT = 72
+SINCE = "5d41648"  # the last commit before subjects were checked
+SUBJECT = re.compile(r"[a-z][\w./, -]*: \S.*[^.]$")
 
 
 @cache
@@ -82,6 +87,18 @@ def test_no_word_of_the_list_is_used():
                     (remedy,) = (AVOIDED[words] for words in AVOIDED if re.fullmatch(words, hit[0], re.IGNORECASE))
                     found.append(f"{path.relative_to(ROOT)}:{number}: {hit[0]!r} (write: {remedy})")
     assert not found, "\n" + "\n".join(found)
+
+
+def test_no_name_has_a_word_of_the_list():
+    known = re.compile(rf"(?<![^\W_])({'|'.join(NAMES)})(?![^\W_])", re.IGNORECASE)
+    found = {
+        f"{path.relative_to(ROOT)}:{token.start[0]}: {token.string}"
+        for path in set(CODE) - {Path(__file__)}
+        if known.search(source(path))
+        for token in tokens(path)
+        if token.type == tokenize.NAME and NAMES & set(token.string.casefold().split("_"))
+    }
+    assert not found, "\n" + "\n".join(sorted(found))
 
 
 def paragraphs(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -135,3 +152,12 @@ def test_docstrings_begin_with_a_noun_or_a_verb_and_their_sentences_are_short(na
         long = long_sentences(enumerate(plain.splitlines(), text.lineno), LONGEST_OF_DOCSTRINGS)
         found += [f"{file}:{number}: {each}" for number, each in long]
     assert not found, "\n" + "\n".join(found)
+
+
+def test_commit_subjects_name_their_area_and_are_short():
+    log = ["git", "log", "--no-merges", "--format=%s", f"{SINCE}..HEAD"]
+    done = subprocess.run(log, cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip("the history of commits is not here")
+    wrong = [text for text in done.stdout.splitlines() if len(text) > LONGEST_SUBJECT or not SUBJECT.match(text)]
+    assert not wrong, f"\nwrite 'area: imperative', at most {LONGEST_SUBJECT} characters:\n" + "\n".join(wrong)
