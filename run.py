@@ -180,7 +180,7 @@ def check(arguments: list[str]) -> int:
             os.write(1, done.stdout)
     if not arguments:
         # A worker more than cores, for tests wait too; one numerical thread in each, or they fight over the cores.
-        arguments = ["-n", str(min((os.cpu_count() or 1) + 1, 4)), "--dist", "loadfile"]
+        arguments = ["-n", str(min((os.cpu_count() or 1) + 1, 4)), "--dist", "worksteal"]
         env = {"OMP_NUM_THREADS": "1", **env}
     status = subprocess.call([PYTHON, "-m", "pytest", *arguments], cwd=ROOT, env=env)
     return fail("failed before the tests: " + ", ".join(failed), status or 1) if failed else status
