@@ -176,7 +176,7 @@ def test_an_export_is_asked_about_before_the_window_closes(guitar, tmp_path, fin
     recordings = guitar.controller.instruments.recordings
     journal = Journal.begun(recordings_folder(), datetime.now(UTC))
     journal.write([TimedEvent(0.0, InstrumentTurned(guitar.instrument))])
-    journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(20 if finish else 3_600)])
+    journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(6 if finish else 3_600)])
     journal.close()
     guitar.window.instrument.bar.record.click()
     recordings.offer_left()
