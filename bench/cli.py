@@ -38,7 +38,7 @@ Seed = Annotated[int, typer.Option(min=0, help="Of the random keys.")]
 PLAIN = {  # benchmarks without options, on one thread, as in the app, where window and sound need the others
     "render": "Real-time factor and first-block latency of every model.",
     "voices": "Cost of a voice and of 64 notes of an instrument, and how many voices fit on a core.",
-    "plugin": "Voices of a plug-in compared with the app: how many times faster than real time each plays 30 notes.",
+    "plugin": "Voices of a plug-in compared with the app: how many times faster than real time each plays 36 notes.",
     "drums": "Frequencies and pitch drops of drums compared with published ones; cost of drums, a kit, and choosing.",
     "effects": "Cost of body and room: shares of a core, and the slowest quantum.",
 }
