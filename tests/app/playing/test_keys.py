@@ -19,6 +19,7 @@ from app.playing import recorder
 from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
 from app.playing.playback import Due
+from app.playing.recorder import EventRecorder
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import constants as of
@@ -349,6 +350,20 @@ def test_a_recording_begins_with_its_first_note_and_ends_as_the_hands_are(played
     struck = taken_up(again, mixer)
     assert {each.key: each.now for each in struck} == {key: as_heard[key] for key in (45, 52)}
     assert not any(each.damped for each in struck) and struck[0].now.tension_n > struck[0].own.tension_n
+
+
+def test_what_comes_after_the_end_of_a_recording_is_not_fetched(monkeypatch):
+    now_s = 100.0
+    monkeypatch.setattr("app.playing.recorder.time.monotonic", lambda: now_s)
+    recorder = EventRecorder(lambda *_: None)
+    recorder.begin([NoteOn(60, 90)])
+    for time_s, key in ((100.5, 62), (103.0, 64)):
+        recorder.take(NoteOn(key, 90), time_s)
+    now_s = 101.0
+    recorder.end()
+    now_s = 110.0
+    assert [(entry.time_s, entry.event.key) for entry in recorder.fetch()] == [(0.0, 60), (0.5, 62)]
+    assert recorder.fetch() == [] and recorder.ended_s == 1.0
 
 
 def test_a_full_recording_is_reported_once(played, monkeypatch):

@@ -72,7 +72,7 @@ def contents(path: Path) -> dict[Path, bytes]:
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(images, objects, tmp_path, form):
+def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(images, objects, tmp_path, form, monkeypatch):
     place, (one, two, three, *_) = tmp_path / "bank", images.values()
     path = build_plugin([one, two], form, HERE, place, objects)
     assert held_in(path) == {one.id, two.id}
@@ -81,6 +81,9 @@ def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(images, 
         build_plugin([two, three], form, HERE, place, objects)
     with pytest.raises(PluginError, match=f"two instruments are named {one.name}"):
         build_plugin([one, two, one], form, HERE, place, objects)
+    with monkeypatch.context() as small, pytest.raises(PluginError, match=r"at most 2 instruments, not 3"):
+        small.setattr("app.export.plugin.build.MOST_IMAGES", 2)
+        build_plugin([one, two, three], form, HERE, place, objects)
     assert contents(path) == before
     build_plugin([one], form, HERE, place, objects, replace=True)
     assert held_in(path) == {one.id}
