@@ -33,7 +33,7 @@ CASES: tuple[tuple[str, int, int, dict[str, int]], ...] = (  # sizes: those that
 
 @dataclass(frozen=True)
 class RenderTiming:
-    """One model on one thread.
+    """The times of a model on one thread.
 
     Attributes:
         grid, point: real-time factors, seconds of work for a second of sound (below 1: faster than real time), for

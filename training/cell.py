@@ -171,8 +171,7 @@ class RecipeBook:
 
 
 @cache
-def _recipe_book(name: str) -> RecipeBook:
-    path = RECIPES / f"{name}.toml"
+def _recipe_book(path: Path) -> RecipeBook:
     return read(RecipeBook, read_toml(path), str(path))
 
 
@@ -214,7 +213,7 @@ def configuration_of(
     path = RECIPES / f"{cell.recipe}.toml"
     if not path.is_file():
         raise SchemaError(f"{cell.name}: recipe {cell.recipe!r} is not one of {', '.join(recipe_names())}")
-    book = _recipe_book(cell.recipe)
+    book = _recipe_book(path)
     settings: dict[str, Any] = dict(book.default)
     sizes: dict[str, Any] = {}
     for case in book.case:

@@ -1,6 +1,6 @@
 """The instruments: shipped ones and the user's own, each a small JSON file; listing, reading, saving, renaming.
 
-An instrument is known by its file's name without `.json`. That name is made from its own, and is never a path.
+An instrument is known by its file's name without `.json`, which is made from its title and is never a path.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def save_instrument(instrument: Instrument, file: Path | None = None) -> Instrum
         WriteError: the folder or the file cannot be written.
     """
     path = file or own_instruments() / f"{file_stem(instrument.name)}{SUFFIX}"
-    if path.parent in (SHIPPED, own_instruments()) and (SHIPPED / path.name).exists():
+    if path.parent in instrument_folders() and (SHIPPED / path.name).exists():
         raise InstrumentError(f"{instrument.name}: a factory instrument has this name; choose another")
     if file is None and any((folder / path.name).exists() for folder in instrument_folders()):
         raise InstrumentError(

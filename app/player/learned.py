@@ -22,7 +22,7 @@ from pydantic import TypeAdapter
 from app.audio.note_file import read_note
 from app.instruments.fields import Name
 from app.instruments.instrument import BodyChoice, Category, Fretted, Instrument, Pickup, PluckChoices
-from app.instruments.library import SHIPPED, SUFFIX, InstrumentError, file_stem, own_instruments, save_instrument
+from app.instruments.library import SHIPPED, SUFFIX, InstrumentError, file_stem, instrument_folders, save_instrument
 from app.player.bodies import own_bodies
 from app.player.learned_attack import attack_of, with_attack
 from app.shared.user_files import make_folder
@@ -148,7 +148,8 @@ def check_name(name: str) -> str:
         raise InstrumentError(f"{name}: a factory instrument has this name; choose another")
     if stem in {path.stem for path in usable_files()}:
         raise InstrumentError(f"{name}: a preset of this name exists already; choose another")
-    for path in (own_instruments() / f"{stem}{SUFFIX}", own_bodies() / f"{stem}.wav"):
+    instruments = [folder / f"{stem}{SUFFIX}" for folder in instrument_folders()]
+    for path in (*instruments, own_bodies() / f"{stem}.wav"):
         if path.exists():
             raise InstrumentError(f"{path}: exists already; choose another name, or remove it")
     return stem

@@ -13,7 +13,7 @@ STOP_S = 0.012
 
 
 class Pair:
-    """Both sounds play on, and one of them is heard. For one thread.
+    """Two sounds that play on together, of which one is heard. For one thread.
 
     Args:
         samples: name -> (frames, channels) at the mixer's rate, all of one length.

@@ -32,7 +32,7 @@ Key = tuple[int, int | None]  # of an instrument, and its string of the set, as 
 
 @dataclass(frozen=True)
 class Chosen:
-    """New values of `Choices`, all or none, as of `Choices.changed`; the preset of the instrument chooses this.
+    """New values of `Choices`, all or none. With the preset of the instrument that is there, keys play that one.
 
     Attributes:
         by_user: not by a note or by undo, so that undo can take it back.

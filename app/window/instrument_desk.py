@@ -18,6 +18,7 @@ from app.instruments.library import (
     InstrumentEntry,
     InstrumentError,
     add_instrument,
+    instrument_folders,
     list_instruments,
     own_instruments,
     read_instrument,
@@ -269,7 +270,7 @@ class InstrumentDesk(BrowserDesk):
         """Save the instrument; in the user's own folder it is played from now on."""
         saved = save_instrument(instrument, file)
         self.reload()
-        if saved.path.parent == own_instruments():
+        if saved.path.parent in instrument_folders():
             self._session.update(instrument=instrument)
             self._show_instrument()
             self.browser.reveal(saved.name)

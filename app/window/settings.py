@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from platformdirs import user_config_path
-from pydantic import ValidationError, model_validator
+from pydantic import ValidationError
 
 from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
@@ -59,14 +59,6 @@ class Settings(Value):
     instrument: InstrumentChoice = InstrumentChoice()
     window_geometry: str = ""  # Qt's, in base64
 
-    @model_validator(mode="before")
-    @classmethod
-    def _take_old(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "patch_favourites" in data:  # of earlier versions
-            data = dict(data)
-            data["instrument_favourites"] = data.pop("patch_favourites")
-        return data
-
 
 def settings_file() -> Path:
     """LEARNED_STRINGS_SETTINGS, else the platform's place for a user's configuration."""
@@ -84,7 +76,7 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         reason = error.strerror or error
         return Settings(), one_line(f"The settings {path} cannot be read ({reason}); starting with defaults.")
     try:
-        return Settings.model_validate(parse_json(text, "the file")), ""
+        return Settings.model_validate(_migrated(parse_json(text, "the file"))), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
@@ -100,15 +92,23 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         return usable or Settings(), one_line(reason)
 
 
+def _migrated(data: Any) -> Any:
+    """The content of the file under the names of today, so that a fault is found under them."""
+    if isinstance(data, dict):
+        if "patch_favourites" in data:
+            data["instrument_favourites"] = data.pop("patch_favourites")
+        if isinstance(data.get("choices"), dict):
+            data["choices"] = migrated(data["choices"])
+    return data
+
+
 def _usable_settings(text: bytes) -> Settings | None:
     """The settings less what is wrong in them; None where nothing is left to keep.
 
     One fault at a time: what is dropped for one may end others, or lack in what holds it.
     """
     try:
-        data: dict[str, Any] = parse_json(text, "settings")
-        if isinstance(data, dict) and isinstance(data.get("choices"), dict):
-            data["choices"] = migrated(data["choices"])
+        data: dict[str, Any] = _migrated(parse_json(text, "settings"))
         for _ in range(MOST_FAULTS):
             try:
                 return Settings.model_validate(data)

@@ -263,14 +263,14 @@ def _moved(span: Span, frames: int) -> Span:
 
 
 def _highest(values: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
-    """At each place the maximum over the places from `first` to `last` further on."""
+    """The maximum at each place over the places from `first` to `last` further on."""
     padded = np.pad(values, (max(-first, 0), max(last, 0)))
     start = max(first, 0)
     return sliding_window_view(padded, last - first + 1)[start : start + values.size].max(axis=1)
 
 
 def _quantile(values: NDArray[np.float64], first: int, last: int, share: float) -> NDArray[np.float64]:
-    """At each place the quantile `share` over the places from `first` to `last` further on."""
+    """The quantile `share` at each place over the places from `first` to `last` further on."""
     padded = np.pad(values, (max(-first, 0), max(last, 0)))
     start = max(first, 0)
     windows = sliding_window_view(padded, last - first + 1)[start : start + values.size]

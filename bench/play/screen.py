@@ -19,7 +19,7 @@ DEPTH = 24
 
 
 class Screen:
-    """One connection to an X server, for one thread."""
+    """A connection to an X server, for one thread."""
 
     def __init__(self, name: str) -> None:
         try:

@@ -6,6 +6,7 @@ import pytest
 
 from app.export.journal import left_journals
 from app.instruments import library
+from app.player.learned import check_name
 from app.window.settings import load_settings
 from tests.app.instruments.conftest import make_instrument
 
@@ -22,6 +23,14 @@ def test_settings_keep_the_instrument_and_the_favourites(single, tmp_path):
     assert notice == ""
     assert (settings.choices.instrument, settings.choices.single) == (INSTRUMENT, single)
     assert (settings.choices.octave, settings.instrument_favourites) == (1, ("koto", "sitar"))
+
+
+def test_settings_with_a_fault_under_an_earlier_name_keep_the_rest(tmp_path):
+    path = tmp_path / "settings.json"
+    path.write_text(json.dumps({"version": 1, "favourites": ["studio_steel_e4"], "patch_favourites": 7}))
+    settings, notice = load_settings(path)
+    assert "instrument_favourites" in notice
+    assert (settings.favourites, settings.instrument_favourites) == (("studio_steel_e4",), ())
 
 
 def test_an_unsaved_recording_is_played_as_it_was(tmp_path):
@@ -48,6 +57,8 @@ def test_instruments_in_the_former_folder_are_listed_and_their_names_are_taken(t
     assert entry.own and entry.instrument == INSTRUMENT
     with pytest.raises(library.InstrumentError, match="exists already"):
         library.save_instrument(INSTRUMENT)
+    with pytest.raises(library.InstrumentError, match="exists already"):
+        check_name("Old friend")
     renamed = library.rename_instrument(entry, "New friend")
     assert (renamed.path.parent.name, entry.path.exists()) == ("instruments", False)
 

@@ -42,7 +42,7 @@ class SampledReport:
         samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: of the whole. An SFZ is softer where a note would clip; a SoundFont is raised to full level.
+        gain_db: relative to the instrument. An SFZ is softer where a note would clip; a SoundFont has full level.
         peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 

@@ -168,6 +168,8 @@ def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch
     assert guitar.instrument == saved and not bar.compare.isEnabled()
     instruments.change("knobs.decay", 5.0)
     bar.compare.click()
+    file = own_instruments().rename(own_instruments().with_name("patches")) / file.name  # the last version's folder
+    instruments.reload()
     instruments.save()  # the user's own, without a question
     assert read_instrument(file).knobs.decay == 5.0 and heard() == (False, guitar.instrument)
     instruments.browser.favourite_asked.emit("mine")
