@@ -87,7 +87,7 @@ void instrument_reset_values(instrument *own) {
 uint32_t instrument_latency(void) { return QUANTUM + AHEAD; }
 
 uint32_t instrument_tail(const instrument *own) {
-  return own->kernels ? (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz) : 0;
+  return own->effects.kernels ? (uint32_t)((own->of->longest_s + effects_tail_s(&own->effects)) * own->rate_hz) : 0;
 }
 
 /* Memory */
@@ -172,7 +172,7 @@ static void rest(instrument *own) {
 
 void instrument_reset(instrument *own) {
   own->loaded = false; /* all values are taken up */
-  double *heard = effects_mixed(own);
+  double *heard = effects_mixed(&own->effects);
   rest(own);
   own->waiting = 0;
   own->read = 0;
@@ -184,7 +184,7 @@ void instrument_reset(instrument *own) {
     if (always || value != each->standard || value != own->followed[place]) apply(own, place, value, 0);
   }
   own->mixer->volume = own->mixer->wanted_volume;
-  effects_reset(own, heard);
+  effects_reset(&own->effects, heard);
 }
 
 bool rate_is_possible(double rate_hz) { return rate_hz >= 1000 && rate_hz <= 1e6; } /* NaN is not */
@@ -206,7 +206,7 @@ static bool begin(instrument *own) {
   if (own->kit) CALL(own, kit_begin, address_of(own->kit), address_of(own->table));
   for (int32_t place = 0; place < of->parameter_count; place++) own->followed[place] = parameters_of(of)[place].standard;
   rest(own);
-  return effects_begin(own);
+  return effects_begin(&own->effects, of, own->rate_hz, own->mixer, own->player, own->table);
 }
 
 bool instrument_begin(instrument *own, double rate_hz) {
@@ -221,7 +221,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
 }
 
 void instrument_end(instrument *own) {
-  effects_end(own);
+  effects_end(&own->effects);
   void *all[] = {own->mixer, own->player, own->table, own->model, own->truth, own->kit, own->block};
   for (size_t place = 0; place < sizeof all / sizeof *all; place++) free(all[place]);
   own->mixer = NULL, own->player = NULL, own->table = NULL, own->model = NULL, own->truth = NULL, own->kit = NULL, own->block = NULL;
@@ -229,7 +229,7 @@ void instrument_end(instrument *own) {
 
 void instrument_free(instrument *own) {
   instrument_end(own);
-  effects_free(own);
+  effects_free(&own->effects);
 }
 
 /* Events */
@@ -343,7 +343,7 @@ static void render(instrument *own, uint32_t frames, float *left, float *right) 
     if (!rendered) {
       apply_due(own);
       if (own->kit) CALL(own, kit_prepare, address_of(own->kit), address_of(own->table), address_of(own->player));
-      if (effects_follow(own)) push(own, (event){.kind = PARAMETER, .key = BODY_MIX, .value = own->effects.values[EFFECT_BODY_MIX]});
+      if (effects_follow(&own->effects)) push(own, (event){.kind = PARAMETER, .key = BODY_MIX, .value = own->effects.values[EFFECT_BODY_MIX]});
       rendered = QUANTUM;
     }
     int64_t count = rendered < left_over ? rendered : left_over;
@@ -387,7 +387,7 @@ bool instrument_silent(const instrument *own) {
   const player_memory *player = own->player;
   bool events = player->pushed != player->taken || player->queued;
   const convolver_memory *convolver = own->effects.convolver;
-  bool echo = (convolver && convolver->active) || effects_wait(own);
+  bool echo = (convolver && convolver->active) || effects_wait(&own->effects);
   return !events && !echo && !own->waiting && !own->mixer->active && own->mixer->peak < 1e-9;
 }
 

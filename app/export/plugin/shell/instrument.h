@@ -1,7 +1,6 @@
 /* An instrument as the plug-in holds it: its image, its memory, its parameters, and events that come to it.
 
-   What a format's shell adds is its interface alone. layout.h is written by layout.py: records of the image and of the
-   kernels' memory, whose fields Python names and explains, and the kernels' entries. */
+   What a format's shell adds is its interface alone. */
 
 #ifndef LS_INSTRUMENT_H
 #define LS_INSTRUMENT_H
@@ -9,39 +8,14 @@
 #include <stdatomic.h>
 
 #include "abi.h"
-#include "layout.h"
-#include "thread.h"
+#include "effects.h"
 
 enum { MOST_CHANGES = 512, STATE_BYTES = 8 + 12 * MOST_PARAMETERS, MOST_STATE_BYTES = 8 + 12 * 4096 };
 
 extern const image *const images[];
 extern const int32_t image_count;
 
-/* The kernels for the processor that the plug-in runs on. Each returns 0, or that it failed. */
-#define POINTER(_, name, ...) int32_t (*name)(void *result, void **error, __VA_ARGS__);
-typedef struct { ENTRIES(POINTER, ) } kernels;
-const kernels *kernels_here(void);
-#define CALL(own, entry, ...) ((own)->kernels->entry(&(void *){NULL}, &(void *){NULL}, __VA_ARGS__))
-
-static inline int64_t address_of(const void *pointer) { return (int64_t)(intptr_t)pointer; }
-
 typedef struct { int64_t frame; int32_t parameter; double value; } change;
-
-typedef struct { double hz, size, t60_s; responses found; } prepared; /* of a body and a room; more memory follows */
-
-typedef struct {
-  double values[EFFECT_COUNT];    /* the latest */
-  convolver_memory *convolver;
-  prepared *heard;                /* what is mixed from; it is kept from rate to rate */
-  double *mixes[2], *mixing_to;   /* what is heard, and the next; the one that is mixed */
-  int64_t most_frames, most_slots, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
-  double mixing[2], weights[4];   /* of the latest mix */
-  thread thread;                  /* it computes a response of `size` and `t60_s` whenever another one is asked for */
-  _Atomic double size, t60_s;
-  atomic_uint asked, answered;
-  _Atomic(prepared *) made, spent; /* to the audio thread, and back */
-  atomic_bool ends, offline;       /* offline: the sound waits for the thread */
-} effects;
 
 typedef struct {
   const image *of;
@@ -64,19 +38,6 @@ typedef struct {
   bool moved;         /* a macro has moved other parameters since the host read them */
   atomic_bool loaded; /* a state or preset that the next block takes up */
 } instrument;
-
-/* See effects.c */
-
-bool effects_begin(instrument *); /* at its rate and its values; allocates; false where there is no memory */
-double *effects_mixed(const instrument *); /* the latest mix; NULL: none, or it is not complete */
-void effects_reset(instrument *, double *mixed); /* to a mixer at rest: nothing rings; the mix is kept where it is the wanted one */
-bool effects_follow(instrument *); /* once a quantum; whether keys have other levels now */
-bool effects_wait(const instrument *); /* whether a response is still to come */
-double effects_tail_s(const instrument *);
-void effects_end(instrument *);
-void effects_free(instrument *); /* and what is kept from rate to rate */
-
-/* See instrument.c */
 
 int32_t image_with_id(const char *id); /* its number; -1: there is none */
 const parameter *parameters_of(const image *);

@@ -1,6 +1,6 @@
 /* The compiled kernels of the processors for which they were built, and the choice between them. */
 
-#include "instrument.h"
+#include "kernels.h"
 
 #define DECLARED(number, name, ...) int32_t ls##number##_##name(void *, void **, __VA_ARGS__);
 #define ENTRY(number, name, ...) .name = ls##number##_##name,
