@@ -17,7 +17,7 @@ from app.export.sampled.plan import SampledPlan, SampledSource, Zone
 from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
-from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, number_of, pitch_words
+from app.export.sampled.words import SMALLEST_REPORTED_DB, SampledReport, megabytes, notes, number_of, pitch_words
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
 from engine.presets import Preset, load_preset
@@ -32,26 +32,6 @@ NoteRenderer = Callable[..., "NDArray[np.float32]"]
 SUFFIXES = (".sfz", ".sf2")
 LONGEST_STEM = 60
 _OURS = re.compile(r"key\d{3}_vel\d{3}\.(flac|wav)|\.?index\.(json|lock)")  # an index: of earlier versions
-
-
-@dataclass(frozen=True)
-class SampledReport:
-    """The report of an instrument that was written.
-
-    Attributes:
-        samples: how many the instrument has.
-        size_bytes: of the instrument with all its samples.
-        cut: samples that still rang at their end, and were faded out.
-        gain_db: relative to the instrument. An SFZ is softer where a note would clip; a SoundFont has full level.
-        peak_db: of its loudest note as a sampler plays it, relative to full scale.
-    """
-
-    path: Path
-    samples: int
-    size_bytes: int
-    cut: int
-    gain_db: float
-    peak_db: float
 
 
 def plain_stem(text: str) -> str:

@@ -1,17 +1,35 @@
-"""Size, notes and results of an export of samples in words, for the command line and the window alike."""
+"""Size and result of an export of samples, with notes on it in words, for the command line and the window alike."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
 
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND
 
-if TYPE_CHECKING:
-    from app.export.sampled.job import SampledReport
-
 SMALLEST_REPORTED_DB = 0.05
 _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's header, or its rows of a SoundFont
+
+
+@dataclass(frozen=True)
+class SampledReport:
+    """The report of an instrument that was written.
+
+    Attributes:
+        samples: how many the instrument has.
+        size_bytes: of the instrument with all its samples.
+        cut: samples that still rang at their end, and were faded out.
+        gain_db: relative to the instrument. An SFZ is softer where a note would clip; a SoundFont has full level.
+        peak_db: of its loudest note as a sampler plays it, relative to full scale.
+    """
+
+    path: Path
+    samples: int
+    size_bytes: int
+    cut: int
+    gain_db: float
+    peak_db: float
 
 
 def number_of(count: int, thing: str) -> str:
