@@ -69,7 +69,7 @@ def voices() -> None:
     player, mixer = CompiledPlayer(RATE_HZ, INFO.modes), Mixer(RATE_HZ)
     player.catch_up(mixer.address)
     for voice in _each():
-        voice.skip(QUANTUM / RATE_HZ, mixer)
+        mixer.skip(voice, QUANTUM / RATE_HZ)
         _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
 

@@ -437,7 +437,7 @@ class Notes:
         """Hand a note over to the mixer; begin it again where the device has one of another rate or frame by now."""
         if note.from_s > 0:
             for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
+                Mixer(voice.program.rate_hz).skip(voice, note.from_s)
         with self._lock:
             mixer = self._sound.mixer
             if note.over:

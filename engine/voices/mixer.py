@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,8 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.values.effects import Amp
 from engine.voices.ear import differentiator_taps
 from engine.voices.memory import KernelMemory, Reading
+from engine.voices.player import CompiledPlayer
 from engine.voices.voice import Voice, possible_s
-
-if TYPE_CHECKING:
-    from engine.voices.player import CompiledPlayer
 
 LIMITER_RELEASE_S = 0.08
 VOLUME_SMOOTHING_S = 0.015
@@ -108,6 +105,14 @@ class Mixer(KernelMemory):
             for voice in voices[room:]:
                 voice.refuse()
             self.publish("pushed", pushed + min(len(voices), room))
+
+    def skip(self, voice: Voice, seconds: float) -> None:
+        """Let a voice ring unheard for so long before it is handed over, in this mixer's rooms."""
+        from engine.kernels.voice import forward
+
+        forward(voice.record, self.record, round(seconds * self.rate_hz))
+        voice.record["attack"] = 0
+        voice.record["gain"] = voice.record["gain_from"] = 0.0
 
     def set_player(self, player: CompiledPlayer) -> None:
         """The events of this player are played from the next quantum on; what the one before has struck rings on.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +26,6 @@ from engine.values.ear import Ear
 from engine.voices.ear import largest
 from engine.voices.memory import KernelMemory
 from engine.voices.program import Program
-
-if TYPE_CHECKING:
-    from engine.voices.mixer import Mixer
 
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 LONGEST_WAIT_S = 10.0  # between two readings of a device's clock that are of one sound
@@ -248,14 +244,6 @@ class Voice(KernelMemory):
     def end_here(self) -> None:
         """A rendered voice has no more samples than it was given."""
         self.record["length"] = max(1, self.record["ready"])
-
-    def skip(self, seconds: float, mixer: Mixer) -> None:
-        """Let it ring unheard for so long, in a mixer's rooms; call this before it is handed over."""
-        from engine.kernels.voice import forward
-
-        forward(self.record, mixer.record, round(seconds * self.program.rate_hz))
-        self.record["attack"] = 0
-        self.record["gain"] = self.record["gain_from"] = 0.0
 
     def _set_weights(self, which: int, ear: Ear) -> None:
         n = self.program.modes

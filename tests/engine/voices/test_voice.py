@@ -73,7 +73,7 @@ def test_what_was_not_heard_is_where_it_would_have_been(kind, pickup, skipped):
     expected = rung(frames + 12_000, struck(kind, ear))[frames:]
     voice, mixer = struck(kind, ear, 1.0 if skipped else 0.0), Mixer(RATE_HZ, limited=False)
     if skipped:
-        voice.skip(frames / RATE_HZ, Mixer(RATE_HZ))
+        Mixer(RATE_HZ).skip(voice, frames / RATE_HZ)
         voice.begin_at(640)
         mixer.add(voice)
         assert not mixer.render(640).any()
