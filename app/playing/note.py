@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from app.playing.ahead import AheadSamples
+from app.playing.ahead_samples import AheadSamples
 from app.rendering import NoteSound
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER

@@ -19,7 +19,8 @@ from typing import TypeVar
 from app.audio.sound import Sound, SoundStatus
 from app.instruments.instrument import Instrument
 from app.player.events import Event, NoteOn, PluckAt
-from app.playing.ahead import STOLEN_S, Ahead, AheadSamples
+from app.playing.ahead import STOLEN_S, Ahead
+from app.playing.ahead_samples import AheadSamples
 from app.playing.key_note import SOURCES, KeyNote, drop
 from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys

@@ -26,7 +26,7 @@ from app.export.wav import WavSettings, form_of
 from app.instruments.library import find_instrument
 from app.player.events import NoteOn, TimedEvent
 from app.player.offline import render_events
-from app.playing.ahead import AheadSamples
+from app.playing.ahead_samples import AheadSamples
 from app.rendering.motion import ModelMotion
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf

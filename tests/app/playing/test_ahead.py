@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.playing.ahead import CARE, LEAST_S, Ahead, AheadSamples
+from app.playing.ahead import Ahead
+from app.playing.ahead_samples import CARE, LEAST_S, AheadSamples
 from app.playing.note import PluckVoices
 from app.rendering import NoteSound
 from app.rendering.motion import ModelMotion

@@ -17,7 +17,7 @@ from app.instruments.library import read_instrument
 from app.player.compiled import InstrumentPlayer
 from app.player.events import NoteOff, NoteOn, PluckAt
 from app.playing import notes as module
-from app.playing.ahead import LEAST_S
+from app.playing.ahead_samples import LEAST_S
 from app.playing.key_note import DROPPED, KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
 from app.playing.note import PluckVoices
