@@ -128,6 +128,11 @@ class Sound:
     def rate_hz(self) -> int:
         return self.mixer.rate_hz
 
+    @property
+    def buffer_s(self) -> float:
+        """The length of the device's buffer: so much may be rendered at once."""
+        return self._status.latency_s
+
     def now_s(self) -> float:
         """The output's time in seconds, the clock of gestures; 0 while the output is being changed."""
         try:

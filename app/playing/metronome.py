@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from app.audio.sound import Sound
 from app.player.events import Meter
-from app.playing.notes import Notes
 from app.playing.playback import AHEAD_S, Beginning
 from engine.voices import Voice, plain_program
 
@@ -22,10 +22,10 @@ STOP_S = 0.005
 
 
 class Metronome:
-    """A metronome in the time of the mixer that `notes` have. Its methods belong to the window's thread."""
+    """A metronome in the time of the sound's mixer. Its methods belong to the window's thread."""
 
-    def __init__(self, notes: Notes) -> None:
-        self._notes = notes
+    def __init__(self, sound: Sound) -> None:
+        self._sound = sound
         self._meter = Meter()
         self._beginning: Beginning | None = None
         self._next = 0  # beat, from the first of the count-in
@@ -34,7 +34,7 @@ class Metronome:
     def begin(self, meter: Meter) -> float:
         """Begin the count-in; return when the first beat after it is, on the clock of `time.monotonic`."""
         self._meter, self._next = meter, 0
-        self._beginning = Beginning(self._notes, AHEAD_S + self._notes.buffer_s)
+        self._beginning = Beginning(self._sound, AHEAD_S + self._sound.buffer_s)
         self.look()
         return self._beginning.due(meter.count_in_beats * 60 / meter.tempo_bpm).time_s
 

@@ -68,6 +68,7 @@ class Notes:
         set_effects: sets body and room of all that is heard; called in a background thread.
 
     Attributes:
+        sound: the output, whose mixer's frames are the time of events.
         keys: what the keys of an instrument sound with.
         latest: the note that an event began last.
     """
@@ -80,7 +81,7 @@ class Notes:
         report: Report,
         set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
-        self._sound = sound
+        self.sound = sound
         self._sources = sources
         self._find = find
         self._report = report = faultless(report, "while a note was reported")
@@ -174,7 +175,7 @@ class Notes:
             return None
 
     def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
-        struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
+        struck_s = self.sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._as_pluck(event)
         if not isinstance(placed, PluckAt):
             begun = self.keys.handle(placed, due, struck_s, self._keep_key_note)
@@ -183,7 +184,7 @@ class Notes:
         with self._lock:
             if self._chosen is not None:
                 self._chosen = replace(self._chosen, pluck=placed.pluck)
-            note = self._chosen_note(begin_frame=0 if due is None else due.frame_in(self._sound.mixer))
+            note = self._chosen_note(begin_frame=0 if due is None else due.frame_in(self.sound.mixer))
         if note is not None:
             note.struck_s, note.ahead_of_event = struck_s, due is not None
             self.latest = self._ring(note)
@@ -215,7 +216,7 @@ class Notes:
         """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
         loaded = self._is_loaded(note)
         if note.begin_frame:
-            note.mixer = self._sound.mixer  # whose frame it is
+            note.mixer = self.sound.mixer  # whose frame it is
         with self._lock:
             self._notes.append(note)
         begin = self._do if loaded and not note.from_s else self.in_background
@@ -230,7 +231,7 @@ class Notes:
         Args:
             event: the chosen pluck, as a note of its instrument or of the string alone.
         """
-        mixer, frame = self._sound.mixer, note.frame_at(seconds)
+        mixer, frame = self.sound.mixer, note.frame_at(seconds)
         early = frame - mixer.frames
         if self._chosen is None or early > LOOP_AHEAD_S * mixer.rate_hz:
             return None
@@ -269,7 +270,7 @@ class Notes:
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
-        rate_hz = self._sound.rate_hz
+        rate_hz = self.sound.rate_hz
         for subject in subjects:
             if not self._sources.has(subject, rate_hz):
                 self.in_background(partial(self._sources.prepare, subject, rate_hz))
@@ -279,16 +280,6 @@ class Notes:
         return self._helper.submit(work, rate_hz)
 
     # What there is
-
-    @property
-    def mixer(self) -> Mixer:
-        """The present one, whose frames are the time of events."""
-        return self._sound.mixer
-
-    @property
-    def buffer_s(self) -> float:
-        """The length of the device's buffer: so much may be rendered at once."""
-        return self._sound.status().latency_s
 
     @property
     def match(self) -> Mapping[str, float] | None:
@@ -387,12 +378,12 @@ class Notes:
 
     def _is_loaded(self, note: PluckVoices) -> bool:
         """Return True if nothing needs to be loaded for it."""
-        rate_hz = self._sound.rate_hz
+        rate_hz = self.sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
     def _move_to_new_mixer(self) -> None:
         """Let the latest plucks ring on in the new mixer of a device that has changed its rate. Keys' notes end."""
-        mixer = self._sound.mixer
+        mixer = self.sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
         plucks = [note for note in left if isinstance(note, PluckVoices) and note.seconds and not note.released]
         for note in left:
@@ -410,7 +401,7 @@ class Notes:
 
     def _begin(self, note: PluckVoices) -> None:
         """Make the voices and hand them over, at once or when those that are rendered ahead are far enough."""
-        request, rate_hz = note.request, self._sound.mixer.rate_hz
+        request, rate_hz = note.request, self.sound.mixer.rate_hz
         voices, ahead = dict[str, Voice](), list[AheadSamples]()
         for source in note.sources:
             subject = note.subject(source)
@@ -440,7 +431,7 @@ class Notes:
             for voice in note.voices.values():
                 Mixer(voice.program.rate_hz).skip(voice, note.from_s)
         with self._lock:
-            mixer = self._sound.mixer
+            mixer = self.sound.mixer
             if note.over:
                 return
             note.match = self._matches.get(note.matching_key)
@@ -466,7 +457,7 @@ class Notes:
         It looks at the keys' notes too, so that their ends are reported while the window is busy.
         """
         self.look()
-        frames, before = self._sound.mixer.frames, self._frames_looked
+        frames, before = self.sound.mixer.frames, self._frames_looked
         if frames == before:  # the load is that of the look before
             return
         self._frames_looked = frames
@@ -506,7 +497,7 @@ class Notes:
         """Compute the level match of a note, for all of the same pluck and ear."""
         key = note.matching_key
         try:
-            self._matches[key] = level_match(self._sources, note, self._sound.rate_hz)
+            self._matches[key] = level_match(self._sources, note, self.sound.rate_hz)
             if len(self._matches) > KEPT_MATCHES:
                 del self._matches[next(iter(self._matches))]
         finally:

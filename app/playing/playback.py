@@ -6,13 +6,10 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from app.audio.sound import Sound
 from app.player.events import Event, TimedEvent, channels_in, release_all
 from engine.voices import Mixer
-
-if TYPE_CHECKING:
-    from app.playing.notes import Notes
 
 AHEAD_S = 0.05  # lead of a handed-over event, besides the device's buffer: so late the thread may be
 LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
@@ -42,7 +39,7 @@ class Playback:
     """A player of one list of events at a time.
 
     Args:
-        clock: whose mixer has the frames that a device has taken.
+        sound: whose mixer has the frames that a device has taken.
         handle: plays an event when it is due, or, for None, at once; called in the playback's thread.
         cancel: ends what was handed over and is not due yet; called there as well.
         ended: is called when the last event was played, or it was stopped; in the playback's thread.
@@ -51,12 +48,12 @@ class Playback:
     def __init__(
         self,
         handle: Callable[[Event, Due | None], object],
-        clock: Notes,
+        sound: Sound,
         cancel: Callable[[], None],
         ended: Callable[[], None] = lambda: None,
     ) -> None:
         self._handle = handle
-        self._clock = clock
+        self._sound = sound
         self._cancel = cancel
         self._ended = ended
         self._stopping = threading.Event()
@@ -83,7 +80,7 @@ class Playback:
             thread.join(JOIN_S)
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
-        beginning, due = Beginning(self._clock, self._ahead_s), None
+        beginning, due = Beginning(self._sound, self._ahead_s), None
         nobody_plays = release_all(channels_in(timed_event.event for timed_event in events))
         for timed_event in events:
             due = beginning.wait(timed_event.time_s, self._ahead_s, stopping)
@@ -103,20 +100,20 @@ class Playback:
 
     @property
     def _ahead_s(self) -> float:
-        return AHEAD_S + self._clock.buffer_s
+        return AHEAD_S + self._sound.buffer_s
 
 
 class Beginning:
     """The frame at which a list of events begins, `ahead_s` from now; in another mixer it continues."""
 
-    def __init__(self, clock: Notes, ahead_s: float) -> None:
-        self._clock, self._mixer = clock, clock.mixer
+    def __init__(self, sound: Sound, ahead_s: float) -> None:
+        self._sound, self._mixer = sound, sound.mixer
         self._frame = self._mixer.frames + round(ahead_s * self._mixer.rate_hz)
         self._began_s = time.monotonic() + ahead_s
 
     def due(self, time_s: float) -> Due:
         """The time when an event is due, `time_s` after the beginning."""
-        mixer = self._clock.mixer
+        mixer = self._sound.mixer
         if mixer is not self._mixer:
             played_s = (self._mixer.frames - self._frame) / self._mixer.rate_hz
             self._mixer, self._frame = mixer, mixer.frames - round(played_s * mixer.rate_hz)

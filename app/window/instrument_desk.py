@@ -98,7 +98,7 @@ class InstrumentDesk(BrowserDesk):
         self._entries: list[InstrumentEntry] = []
         self._sounding = frozenset[int]()  # MIDI keys of the instrument for which the octave was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
-        self._playback = Playback(self._play_event, performance.notes, performance.notes.cancel)
+        self._playback = Playback(self._play_event, performance.notes.sound, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
         self._judged: object = None  # all that the words about the training depend on, as they are
         self._take: RecordedTake | None = None  # that is played as soon as its instrument can be

@@ -143,7 +143,7 @@ class Recordings(QObject):
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self._metronome = Metronome(notes)
+        self._metronome = Metronome(notes.sound)
         self._meter: Meter | None = None  # of the recording under way; None: it is not counted
         self._takes: list[RecordedTake] = []
         self._asked: RecordedTake | None = None  # for the export dialog

@@ -15,14 +15,14 @@ class Room:
     """A mixer without limiter, whose frames are taken in pieces while the metronome is looked at."""
 
     def __init__(self) -> None:
-        self.notes: Any = SimpleNamespace(mixer=Mixer(48_000, limited=False), buffer_s=0.0)
-        self.metronome = Metronome(self.notes)
-        self.notes.mixer.render(777)
+        self.sound: Any = SimpleNamespace(mixer=Mixer(48_000, limited=False), buffer_s=0.0)
+        self.metronome = Metronome(self.sound)
+        self.sound.mixer.render(777)
 
     def heard(self, seconds: float) -> np.ndarray:
         pieces = []
-        for _ in range(round(seconds * self.notes.mixer.rate_hz / 480)):
-            pieces.append(self.notes.mixer.render(480)[:, 0])
+        for _ in range(round(seconds * self.sound.mixer.rate_hz / 480)):
+            pieces.append(self.sound.mixer.render(480)[:, 0])
             self.metronome.look()
         return np.concatenate(pieces)
 
@@ -47,8 +47,8 @@ def test_another_device_continues_with_the_beat():
     room, first = Room(), 777 + round(AHEAD_S * 48_000)
     room.metronome.begin(Meter(tempo_bpm=240, metronome=True))
     room.heard(1.1)
-    played_s = (room.notes.mixer.frames - first) / 48_000
-    room.notes.mixer = Mixer(44_100, limited=False)
+    played_s = (room.sound.mixer.frames - first) / 48_000
+    room.sound.mixer = Mixer(44_100, limited=False)
     room.metronome.look()
     heard, wanted = room.heard(2.0), np.zeros(2**20, np.float32)
     for beat in range(9, 14):

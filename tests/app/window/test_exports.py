@@ -264,7 +264,7 @@ def test_a_counted_take_begins_at_its_beat(guitar, tmp_path, monkeypatch):
     bar.takes.choose({"count_in_bars": 1})
     bar.takes.choose({"tempo_bpm": 96})
     guitar.key(KEY.Key_R, CONTROL)
-    beat_s = now_s + AHEAD_S + guitar.notes.buffer_s + 4 * 60 / 96
+    beat_s = now_s + AHEAD_S + guitar.notes.sound.buffer_s + 4 * 60 / 96
     for after_s, key in ((-1.0, 50), (-0.05, 64), (0.5, 60)):  # too early, just before the beat, after it
         now_s = beat_s + after_s
         guitar.controller.inputs.play(NoteOn(key, 90, KEYS))
