@@ -34,7 +34,7 @@ from app.rendering.subject import Subject, path_of
 from app.session.monitor import Monitor
 from app.shared.log import faultless
 from app.shared.thread_priority import Rank, lower_priority
-from app.shared.vocabulary import OTHER
+from app.shared.vocabulary import DIFFERENCE, OTHER
 from engine.effects import Effects
 from engine.levels import MATCHED_S
 from engine.pluck import Pluck
@@ -92,7 +92,7 @@ class Notes:
         self.latest: PluckVoices | KeyNote | None = None
         self._chosen: NoteSound | None = None
         self._reach: PluckRange | None = None  # of a single string, which is played; None: an instrument is
-        self._dry = False
+        self._blind_test = False  # is open
         self._ahead = Ahead(self._hand_over, self._drop)
         self._latencies_s: deque[float] = deque(maxlen=100)
         self._loads: deque[float] = deque(maxlen=LOOKS)
@@ -151,19 +151,22 @@ class Notes:
             self._monitor = monitor
             self._do_for_each(self._plucks(), self._apply_monitor)
         self._set_gains_of_keys(compared)
+        self._hear_effects()
 
-    def hear_dry(self, dry: bool) -> None:
-        """Leave out body and room, or not; beside a single string, nothing rings on in them."""
-        self._dry = dry
+    def set_blind_test(self, is_open: bool) -> None:
+        """Begin or end a blind test, beside which no note begins."""
+        self._blind_test = is_open
         self._hear_effects()
 
     def _hear_effects(self) -> None:
-        self.keys.hear_dry(self._dry or self._reach is not None)
+        """Leave out body and room in a blind test, while the difference is heard, and of a single string."""
+        compares = self._blind_test or self._monitor.source_heard == DIFFERENCE
+        self.keys.hear_dry(compares or self._reach is not None)
 
     # Events
 
     def handle(self, event: Event, due: Due | None = None) -> PluckVoices | KeyNote | None:
-        """Play an event, at once or when it is due; the note that it began, or None.
+        """Play an event, at once or when it is due; the note that it began, or None, as in a blind test.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
         presets must be loaded or a model is rendered ahead. An event that fails costs itself alone, and is reported.
@@ -175,6 +178,8 @@ class Notes:
             return None
 
     def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
+        if self._blind_test and isinstance(event, NoteOn | PluckAt):
+            return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
         struck_s = self.sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._as_pluck(event)
         if not isinstance(placed, PluckAt):

@@ -340,14 +340,14 @@ class Controller(QObject):
             return
         self.performance.stop()
         render = partial(self.performance.notes.compute, partial(compared_sounds, sound))
-        self.performance.compare(True)
+        self.performance.notes.set_blind_test(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window.places, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
-        self.performance.compare(False)
+        self.performance.notes.set_blind_test(False)
         self.sound.set_volume_db(self.session.choices.volume_db)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})

@@ -39,7 +39,7 @@ class Inputs(QObject):
         super().__init__(window)
         self._session = session
         self._library = library
-        self._performance = performance
+        self._performance, self._notes = performance, performance.notes
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self.begun.connect(self.look)  # at once, or from another thread in the window's
         self._chosen.connect(self._take_values)
@@ -66,14 +66,14 @@ class Inputs(QObject):
 
     def play(self, event: Event, due: Due | None = None) -> None:
         """Play an event, at once or when it is due. Any thread."""
-        if self._performance.handle(event, due) is not None:
+        if self._notes.handle(event, due) is not None:
             self.begun.emit()
 
     def look(self) -> None:
         """Tell the session of the latest note, and of its string and pluck, which are reported within a quantum."""
-        note, stage = self._performance.notes.latest, self._session.stage
+        note, stage = self._notes.latest, self._session.stage
         if note is not None and not (note is stage.note and stage.known):
-            self._performance.notes.look()
+            self._notes.look()
             self._session.send(Begun(note))
 
     def pluck(self) -> None:

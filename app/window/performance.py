@@ -14,11 +14,9 @@ from PySide6.QtCore import QObject, Signal
 
 from app.audio.sound import Sound
 from app.instruments.instrument import Instrument
-from app.player.events import Event, NoteOn, PluckAt
 from app.playing.key_note import KeyNote
 from app.playing.note import PluckVoices
 from app.playing.notes import Notes
-from app.playing.playback import Due
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import NOTICEABLE, model_word, percent
@@ -29,7 +27,6 @@ from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
-from app.shared.vocabulary import DIFFERENCE
 from app.stage.session import Session
 from app.stage.stage import Asked, Note, Parked, Rendered, Turned
 from app.window.main_window import MainWindow
@@ -40,11 +37,7 @@ GROWN = 3.0  # times the preset's own error, from which an error has grown
 
 
 class Performance(QObject):
-    """The owner of the notes and the render worker. Times are in s from the pluck or blow.
-
-    Attributes:
-        compared: a blind test is open: no other note begins, and all is heard without body and room.
-    """
+    """The owner of the notes and the render worker. Times are in s from the pluck or blow."""
 
     _reported = Signal(str, str)  # a notice and its details, from any thread
     _rendered = Signal(object, bool)  # from the worker's thread: a take, and whether all of it is; None: it failed
@@ -58,7 +51,6 @@ class Performance(QObject):
         self._library = library
         self._sound = sound
         self._panels = panels
-        self.compared = False
         self._turn: tuple[Note, Note] | None = None  # of a loop: what rings, and what waits for its end
         self._waiting_words = self._error_words = ""
         self._reported.connect(window.notices.report)
@@ -174,8 +166,6 @@ class Performance(QObject):
         choices = self._session.choices
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
-        if names & Monitor.model_fields.keys():
-            self._hear_dry()
         if names & {"instrument", "single"}:  # ends a comparison
             self.notes.set_instrument(choices.instrument, choices.ear, choices.single)
         elif names & Listener.model_fields.keys():
@@ -204,21 +194,6 @@ class Performance(QObject):
         """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
         choices = self._session.choices
         self.notes.set_instrument(choices.instrument, choices.ear, name)
-
-    def handle(self, event: Event, due: Due | None = None) -> PluckVoices | KeyNote | None:
-        """Play an event; the note that it began, or None. Any thread."""
-        if self.compared and isinstance(event, NoteOn | PluckAt):
-            return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.notes.handle(event, due)
-
-    def compare(self, compared: bool) -> None:
-        """Begin or end a blind test, beside which no other note begins."""
-        self.compared = compared
-        self._hear_dry()
-
-    def _hear_dry(self) -> None:
-        """Leave body and room out in a blind test, and while the difference is heard."""
-        self.notes.hear_dry(self.compared or self._session.choices.source_heard == DIFFERENCE)
 
     def hear_instrument(self, instrument: Instrument | None) -> None:
         """Let keys play this instrument until another is chosen; None: the chosen one. The choices stay."""

@@ -238,7 +238,7 @@ def test_effects_are_set_once_turned_by_the_wheel_and_off_where_models_are_compa
         effects = played.effects[-1]
         assert effects is not None and (effects.room.mix if effects.room else 0.0) == pytest.approx(mix)
     for dry in (True, False):
-        played.notes.hear_dry(dry)
+        played.notes.set_blind_test(dry)
         played.settle()
         assert (played.effects[-1] is None) == dry
     for single in ("", None):

@@ -293,8 +293,8 @@ def sounds(w: Window) -> bool:
 
 def test_the_test_has_the_sound_for_itself(paired, tmp_path, monkeypatch):
     """Keys are silent meanwhile; a pedal that is lifted then is up afterwards."""
-    taken, handle = list[object](), paired.notes.handle
-    monkeypatch.setattr(paired.notes, "handle", lambda event, due=None: taken.append(event) or handle(event, due))
+    taken, handle = list[object](), paired.keys.handle
+    monkeypatch.setattr(paired.keys, "handle", lambda event, *how: taken.append(event) or handle(event, *how))
     paired.pluck()
     paired.wait(lambda: sounds(paired))
     dialog = open_test(paired)
