@@ -154,7 +154,9 @@ class Controller(QObject):
         self.keeper.failed.connect(window.notices.report)
         for problem in problems:
             self.window.notices.report(problem)
+        self.session.changed.connect(self.performance.stage_changed)  # sound before all that is shown
         self.session.changed.connect(self._stage_changed)
+        self.performance.stage_changed(frozenset(OBSERVED))
         self._stage_changed(frozenset(OBSERVED))
         self._duties = [
             Duty(KEYS_EVERY_S, self.instruments.tick),
@@ -459,7 +461,6 @@ class Controller(QObject):
     # Session → everything
 
     def _stage_changed(self, names: frozenset[str]) -> None:
-        self.performance.stage_changed(names)
         if not names.isdisjoint(OBSERVED):
             self.inputs.choices_changed(names)
             self._choices_shown(names)

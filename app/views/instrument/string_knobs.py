@@ -10,7 +10,7 @@ from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.instruments.instrument import Instrument
-from app.shared.parameters import DECAY, OF_INSTRUMENTS, PITCH, PLUCK, STRING, TECHNIQUE, in_group
+from app.shared.parameters import DECAY, PITCH, PLUCK, STRING, TECHNIQUE, in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import NO_MARGINS, filled, vertical_rule
@@ -110,7 +110,8 @@ class StringKnobs(QWidget):
         for parameter in in_group(group):
             knob = Knob(parameter, width=WIDTHS.get(parameter.id, NARROW_WIDTH), low=True)
             knob.figure_asked.connect(partial(self.figure_asked.emit, parameter.id))
-            knob.value_asked.connect(partial(self._ask, parameter.id))
+            ask = self._ask_whole if parameter.whole else self.changed.emit
+            knob.value_asked.connect(partial(ask, parameter.id))
             self.knobs[parameter.id] = knob
             row.addWidget(knob)
         column = filled(QVBoxLayout(), spacing=0)
@@ -124,8 +125,8 @@ class StringKnobs(QWidget):
         column.addWidget(name, alignment=Qt.AlignmentFlag.AlignHCenter)
         return filled(column, self.shape, None)
 
-    def _ask(self, field: str, value: float) -> None:
-        self.changed.emit(field, round(value) if OF_INSTRUMENTS[field].whole else value)
+    def _ask_whole(self, field: str, value: float) -> None:
+        self.changed.emit(field, round(value))
 
     def show_instrument(self, instrument: Instrument, saved: Instrument | None = None) -> None:
         """Show the values of an instrument; `saved`: those that a double-click resets to."""
