@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -33,6 +33,8 @@ _FIXED = {  # functions of controllers that no instrument changes; those from 12
     **dict.fromkeys((midi.REGISTERED, midi.FINE_REGISTERED, midi.OTHER, midi.FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(midi.SOUND_OFF, 128), "stops or resets what is played"),
 }
+BEND_STEPS = 8_192
+NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PROGRAM, PRESSURE, BEND = range(0x80, 0xF0, 0x10)  # kinds of messages
 LONGEST_RECORDING = 100_000  # events
 TEMPOS_BPM = 30, 300  # the slowest and the fastest
 EARLY_S = 0.12  # before the first beat, at which a key that is struck so late in the count-in counts
@@ -122,6 +124,39 @@ def moves_effects(event: object, instrument: Instrument) -> bool:
 
 
 Event = NoteOn | NoteOff | Bend | ControlChange | InstrumentTurned | PluckAt
+
+
+def event_of(message: Sequence[int]) -> Event | None:
+    """The event of a whole message of MIDI, by its bytes; None for kinds that no instrument plays."""
+    if len(message) < 3:
+        return None
+    kind, channel = message[0] & 0xF0, message[0] & 0x0F
+    first, second = message[1] & 0x7F, message[2] & 0x7F
+    if kind == NOTE_ON and second > 0:
+        return NoteOn(first, second, channel)
+    if kind in (NOTE_ON, NOTE_OFF):
+        return NoteOff(first, channel)
+    if kind == BEND:
+        steps = first + 128 * second - BEND_STEPS
+        return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
+    if kind == CONTROLLER:
+        return ControlChange(first, 0 if first == midi.RESET else second, channel)
+    return None
+
+
+def message_of(event: Event) -> list[int]:
+    """The bytes of an event as a message, as of `event_of`; empty where MIDI has no message for it."""
+    if isinstance(event, InstrumentTurned | PluckAt):
+        return []
+    channel = 0 if event.channel == KEYS else event.channel % 16
+    if isinstance(event, NoteOn):
+        return [NOTE_ON + channel, event.key, event.velocity]
+    if isinstance(event, NoteOff):
+        return [NOTE_OFF + channel, event.key, 64]
+    if isinstance(event, Bend):
+        steps = round(event.value * (BEND_STEPS if event.value < 0 else BEND_STEPS - 1)) + BEND_STEPS
+        return [BEND + channel, steps % 128, steps // 128]
+    return [CONTROLLER + channel, event.number, 0 if event.number == midi.RESET else event.value]
 
 
 def channels_in(events: Iterable[Event]) -> set[int]:

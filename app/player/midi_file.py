@@ -16,9 +16,12 @@ from app.instruments.library import FIRST, SHIPPED, SUFFIX, read_instrument
 from app.player.compiled import is_another
 from app.player.events import (
     AT_REST,
+    CONTROLLER,
+    KEY_PRESSURE,
     KEYS,
+    PRESSURE,
+    PROGRAM,
     SETS_PARAMETER,
-    Bend,
     ControlChange,
     Event,
     InstrumentTurned,
@@ -29,7 +32,9 @@ from app.player.events import (
     TimedEvent,
     bend_range,
     channels_in,
+    event_of,
     is_obeyed,
+    message_of,
 )
 from app.player.general_midi import DRUMS, KIT, instrument_of, program_words
 from app.player.midi_messages import MidiMessages, NotMidi, read_messages
@@ -45,8 +50,6 @@ MOST_EVENTS = 400_000  # an hour of 50 notes a second, with releases
 LONGEST_S = 3_600.0
 AFTER_LAST_NOTE_S = 60.0  # later than a song's last note by more, no event counts
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
-BEND_STEPS = 8_192
-NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PROGRAM, PRESSURE, BEND = range(0x80, 0xF0, 0x10)  # kinds of messages
 MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 
 
@@ -66,24 +69,6 @@ class SongPart:
     events: list[TimedEvent]
     left_out: str
     words: str = ""
-
-
-def event_of(message: Sequence[int]) -> Event | None:
-    """The event of a whole message of MIDI, by its bytes; None for kinds that no instrument plays."""
-    if len(message) < 3:
-        return None
-    kind, channel = message[0] & 0xF0, message[0] & 0x0F
-    first, second = message[1] & 0x7F, message[2] & 0x7F
-    if kind == NOTE_ON and second > 0:
-        return NoteOn(first, second, channel)
-    if kind in (NOTE_ON, NOTE_OFF):
-        return NoteOff(first, channel)
-    if kind == BEND:
-        steps = first + 128 * second - BEND_STEPS
-        return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
-    if kind == CONTROLLER:
-        return ControlChange(first, 0 if first == RESET else second, channel)
-    return None
 
 
 def read_midi(path: Path) -> list[TimedEvent]:
@@ -330,18 +315,3 @@ def _with_ranges(timed: Sequence[TimedEvent], instrument: Instrument) -> list[Ti
             set_ranges(time_s, [event.channel])
             track.append(TimedEvent(time_s, ControlChange(VOLUME, USUAL_VOLUME, event.channel)))
     return track
-
-
-def message_of(event: Event) -> list[int]:
-    """The bytes of an event as a message, as of `event_of`; empty where MIDI has no message for it."""
-    if isinstance(event, InstrumentTurned | PluckAt):
-        return []
-    channel = 0 if event.channel == KEYS else event.channel % 16
-    if isinstance(event, NoteOn):
-        return [NOTE_ON + channel, event.key, event.velocity]
-    if isinstance(event, NoteOff):
-        return [NOTE_OFF + channel, event.key, 64]
-    if isinstance(event, Bend):
-        steps = round(event.value * (BEND_STEPS if event.value < 0 else BEND_STEPS - 1)) + BEND_STEPS
-        return [BEND + channel, steps % 128, steps // 128]
-    return [CONTROLLER + channel, event.number, 0 if event.number == RESET else event.value]

@@ -6,8 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 
-from app.player.events import Event, channels_in, release_all
-from app.player.midi_file import event_of
+from app.player.events import Event, channels_in, event_of, release_all
 from app.playing.midi_backend import MidiUnavailable, RtMidi, RtMidiInput, load_backend
 
 

@@ -19,8 +19,7 @@ import pytest
 from app.instruments.instrument import Pickup
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import read_instrument
-from app.player.events import Bend, ControlChange, Event, NoteOff, NoteOn, release_all
-from app.player.midi_file import event_of, message_of
+from app.player.events import Bend, ControlChange, Event, NoteOff, NoteOn, event_of, message_of, release_all
 from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidiInput, load_backend
 from app.playing.midi_port import MidiInput

@@ -13,8 +13,7 @@ from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import read_instrument
-from app.player.events import Event, NoteOn
-from app.player.midi_file import message_of
+from app.player.events import Event, NoteOn, message_of
 from app.playing.midi_port import MidiInput
 from app.session.choices import Choices
 from app.views import theme
