@@ -208,6 +208,11 @@ class SoundRecipe(Value):
         """The settings of its file."""
         return WavSettings(**{field.name: getattr(self, field.name) for field in fields(WavSettings)})
 
+    @property
+    def points(self) -> tuple[float, ...]:
+        """The listening points, one a channel."""
+        return (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+
     def sound(self, preset: Path, file: Path) -> NoteSound:
         """The sound that it describes, checked.
 
@@ -218,12 +223,11 @@ class SoundRecipe(Value):
         Raises:
             RecipeError: values do not go together, or the instrument is not here.
         """
-        points = (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
         string, rate_hz = self.string, self.preset_rate_hz
         subject = preset if string is None else StringOf(preset, string, rate_hz, self.modes)
         try:
             struck = None if self.struck is None else self.struck.found()[0]
-            sound = NoteSound(subject, self.pluck, self.seconds, Ear(points, self.pickup), struck=struck)
+            sound = NoteSound(subject, self.pluck, self.seconds, Ear(self.points, self.pickup), struck=struck)
             check_sources(sound, (self.source,), sound.load().info.rate_hz)
         except ValueError as error:
             raise _unusable_error(file, str(error)) from error

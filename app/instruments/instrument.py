@@ -36,6 +36,7 @@ from engine.contact import Exciter
 from engine.kernels import velocities
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 from engine.schema import explained
+from engine.values.ear import Ear
 from engine.values.ear import Pickup as PickupKind
 from engine.values.effects import Amp, Room
 from engine.values.string import Losses, Polarisations
@@ -168,6 +169,11 @@ class Pickup(Value):
         if 0 < self.flux_mm < 1:
             raise ValueError("flux_mm must be 0 or at least 1; raise it")
         return self
+
+    @property
+    def ear(self) -> Ear:
+        """The ear as the engine takes it, with all modes."""
+        return Ear(self.points, self.kind)
 
 
 class Course(Value):

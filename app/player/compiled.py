@@ -175,7 +175,7 @@ class InstrumentPlayer:
         Raises:
             ValueError: the tuning is impossible, or the instrument has drums for a player of strings, or the reverse.
         """
-        ear = ear or Ear(tuple(instrument.pickup.points), instrument.pickup.kind)
+        ear = ear or instrument.pickup.ear
         near = self.keys if nearly else None
         if not isinstance(instrument.strings, Drums):
             if self.of_drums:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
 from app.instruments.drums import Drums
 from app.instruments.fields import String, parameter
-from app.instruments.instrument import Instrument
-from app.session.listener import Listener, points_of
+from app.instruments.instrument import Instrument, Pickup
 from app.session.monitor import Monitor
+from app.session.pickup import POINTS, TURNED, turned_pickup, with_pickup
+from app.shared.parameters import OF_CHOICES
 from app.shared.value import Value
 from app.shared.vocabulary import Face
 from engine.pluck import Pluck, Shape
 from engine.schema import explained
+from engine.values.ear import Ear
+
+HIGHEST_MODE = 9_999  # of any grid that a preset may have
 
 
 class ShownString(Value):
@@ -38,12 +43,15 @@ class ShownString(Value):
         return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
 
 
-class Choices(Monitor, Listener, ShownString):
+class Choices(Monitor, ShownString):
     """The choices that are restored at the next start.
 
     Attributes:
         instrument: what is there to be played, even if it is not; None: there is none.
         single: the preset whose string is played instead, at places along it; None: the instrument is played.
+        string_pickup: where a single string is heard; an instrument has its own pick-up.
+        right: the right listening point that stereo gives to a pick-up in mono.
+        solo: above 0: this mode is heard alone.
         seconds: how long the pluck is rendered.
         octave: by how many octaves the computer's keys are transposed.
         velocity: with which the computer's keys are struck, as in MIDI.
@@ -51,6 +59,9 @@ class Choices(Monitor, Listener, ShownString):
 
     instrument: Instrument | None = None
     single: str | None = ""
+    string_pickup: Pickup = Pickup()
+    right: float = parameter("listen_right")
+    solo: int = Field(0, ge=0, le=HIGHEST_MODE)
     seconds: float = parameter("seconds")
     loop: bool = False
     volume_db: float = parameter("volume_db")
@@ -88,19 +99,45 @@ class Choices(Monitor, Listener, ShownString):
         """The drums that are played; None: a string or an instrument of strings is."""
         return self.played.strings if self.played and isinstance(self.played.strings, Drums) else None
 
+    @property
+    def pickup(self) -> Pickup:
+        """The pick-up of what is played."""
+        return self.played.pickup if self.played else self.string_pickup
+
+    @property
+    def ear(self) -> Ear:
+        """The ear as the engine takes it; the first point, in stereo the left, is drawn."""
+        return replace(self.pickup.ear, solo=self.solo)
+
+    @property
+    def stereo(self) -> bool:
+        return len(self.pickup.points) > 1
+
+    @property
+    def listen(self) -> float:
+        """The listening point, in stereo the left."""
+        return self.pickup.points[0]
+
+    @property
+    def listen_right(self) -> float:
+        """The right listening point; in mono the one that stereo would have."""
+        return self.pickup.points[1] if self.stereo else self.right
+
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """Copy these choices with other values: the one way to change them.
 
-        Another preset resets `string`, and another slot or its source `difference`, unless given.
+        Another preset resets `string`, and another slot or its source `difference`, unless given. A string that is
+        played by itself after an instrument is heard where that was, unless given.
 
         Args:
             changes: fields. Also `preset`, the name of one whose single string is played from now on, and
-                `played`, an instrument that is.
+                `played`, an instrument that is. Also TURNED, of the pick-up of what is played then.
 
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the instrument cannot be heard so.
         """
-        changes = dict(changes)
+        turns = {name: value for name, value in changes.items() if name in TURNED}
+        changes = {name: value for name, value in changes.items() if name not in TURNED}
         if "played" in changes:
             changes |= {"instrument": changes.pop("played"), "single": None}
         if "preset" in changes:
@@ -114,10 +151,20 @@ class Choices(Monitor, Listener, ShownString):
         choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
         if choices.preset != self.preset and "string" not in changes:
             choices = choices.model_copy(update={"string": None})
-        return with_one_pickup(choices, changes)
+        if self.plays_instrument and not choices.plays_instrument and "string_pickup" not in changes:
+            choices = choices.model_copy(update={"string_pickup": self.pickup})
+        return choices._turned(turns) if turns else choices
+
+    def _turned(self, turns: Mapping[str, Any]) -> Choices:
+        """The choices with TURNED of the pick-up of what is played. Raise ValueError as `changed`."""
+        right = turns.get("listen_right", self.listen_right)
+        pickup = turned_pickup(self.pickup, {"listen_right": right, **turns})
+        if self.played is None:
+            return self.model_copy(update={"string_pickup": pickup, "right": right})
+        return self.model_copy(update={"instrument": with_pickup(self.played, pickup), "right": right})
 
 
-OBSERVED = (*Choices.model_fields, "preset")  # names of what may change
+OBSERVED = (*Choices.model_fields, "preset", "ear")  # names of what may change
 
 
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
@@ -125,9 +172,14 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
 
     Before there were slots, `heard` named the source itself. In the last version `instrument` had the name `patch`.
     Before there was `single`, `instrument` could be a preset alone: what is `instrument` today was then in `kept`.
-    Still earlier, `keys_play` said if `patch` was played or the string of `preset`.
+    Still earlier, `keys_play` said if `patch` was played or the string of `preset`. Listening points and pick-up
+    were fields of the choices, those of an instrument that was played too.
     """
     data = dict(data)
+    if data.keys() & {*POINTS, "stereo", "pickup"}:
+        points = [data.pop(name, OF_CHOICES[name].default) for name in POINTS]
+        count, kind = 2 if data.pop("stereo", False) else 1, data.pop("pickup", Pickup().kind)
+        data |= {"string_pickup": {"points": points[:count], "kind": kind}, "right": points[1]}
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
         data |= {"a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
     if "single" in data:
@@ -149,25 +201,3 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
         if data["single"] is None and preset not in ("", model):
             data["string"] = None  # it is of another preset
     return data
-
-
-def with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
-    """The choices in which an instrument that is played is heard where its own pick-up says.
-
-    Its pick-up and `listen`, `listen_right`, `stereo` and `pickup` agree: each follows the other. So the sound is
-    saved, recorded and exported as it is heard.
-
-    Args:
-        asked: the fields that were asked to change. Listening points and pick-up become those of the instrument;
-            where they were asked to change and the instrument was not, it takes them.
-
-    Raises:
-        ValueError: the instrument cannot be heard so.
-    """
-    instrument = choices.played
-    if instrument is None:
-        return choices
-    chosen = "instrument" in asked or "single" in asked
-    if not chosen and any(name in asked for name in Listener.model_fields if name != "solo"):
-        return choices.model_copy(update={"instrument": choices.picked_up(instrument)})
-    return choices.model_copy(update=points_of(instrument.pickup))

@@ -11,7 +11,7 @@ from app.session.slots import source_title
 from app.shared.vocabulary import DIFFERENCE
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, FULL_SCALE_PA
 
-LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
+LEGEND_FIELDS = {*Monitor.model_fields, "ear"}  # of `Choices`: what legends depend on
 _UNITS = {"displacement": "m", "velocity": "m/s", "bridge": "N", "pressure": "Pa"}  # of a pick-up's signal
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
 

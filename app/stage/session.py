@@ -16,15 +16,12 @@ from typing import Any
 from psygnal import Signal
 
 from app.session.choices import Choices, ShownString
-from app.session.listener import Listener
 from app.shared.parameters import OF_CHOICES
 from app.stage.stage import Chosen, Event, changed_names, first_stage, next_stage
 from app.stage.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset(
-    {"instrument", "single", "seconds", *ShownString.model_fields, *Listener.model_fields} - {"solo"}
-)
+RECORDED = frozenset({"instrument", "single", "seconds", "string_pickup", "right", *ShownString.model_fields})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 

@@ -21,7 +21,7 @@ from app.playing.note import PluckVoices
 from app.rendering import BlowTake, NoteSound, Take
 from app.rendering.note_sound import Struck
 from app.rendering.subject import string_of
-from app.session.choices import OBSERVED, Choices, with_one_pickup
+from app.session.choices import OBSERVED, Choices
 from app.session.slots import other_preset
 from engine.pluck import Pluck
 from engine.values.string import StringParameters
@@ -204,7 +204,7 @@ NAMES = (*OBSERVED, *(name for name in Stage.__dataclass_fields__ if name != "ch
 
 def first_stage(choices: Choices) -> Stage:
     """The stage with remembered choices, before anything is played."""
-    return _with_own_string(Stage(with_one_pickup(choices, ())), None, ())
+    return _with_own_string(Stage(choices), None, ())
 
 
 def next_stage(stage: Stage, event: Event) -> Stage:

@@ -7,20 +7,15 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from app.instruments.instrument import Instrument
-from app.session.listener import Listener
 from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
 from app.shared.value import Value
 
 MOST_NAMED = 2  # fields in one step's name
 SEVERAL = "several settings"
 CHOICES = {  # fields of `Choices`
-    **{
-        name: OF_CHOICES[name].name
-        for name in ("position", "amplitude_mm", "width", "seconds", "listen", "listen_right")
-    },
+    **{name: OF_CHOICES[name].name for name in ("position", "amplitude_mm", "width", "seconds")},
     "shape": "pluck shape",
-    "stereo": "stereo",
-    "pickup": "pick-up",
+    "right": OF_CHOICES["listen_right"].name,
     "string": "string",
 }
 INSTRUMENT = {  # fields that are no parameters, by their path; the rest are named by the last part of theirs
@@ -28,7 +23,7 @@ INSTRUMENT = {  # fields that are no parameters, by their path; the rest are nam
     "preset": "model",
     "range": "range of keys",
     "pluck.shape": "pluck shape",
-    "pickup.points": "listening point",
+    "pickup.points": "stereo",
     "pickup.kind": "pick-up",
     "mode": "playing mode",
     "bend_by": "bend mode",
@@ -36,7 +31,6 @@ INSTRUMENT = {  # fields that are no parameters, by their path; the rest are nam
     "tuning.keymap": "keyboard mapping",
     "body.name": "body",
 }
-PICKUP = {"pickup.points", "pickup.kind"}  # fields of an instrument that are those of `Listener` too
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -50,19 +44,20 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         preset = after["single"]
         return f"preset {preset}" if preset is not None else _instrument_words(None, after["instrument"])
     if "instrument" in changed:
-        old, new = before["instrument"], after["instrument"]
-        heard = [CHOICES[name] for name in changed if name in Listener.model_fields]
-        if heard and old is not None and new is not None and set(_changed(old, new)) <= PICKUP:
-            return _join_words(heard)
-        return _instrument_words(old, new)
-    return _join_words([words for name, words in CHOICES.items() if name in changed])
+        return _instrument_words(before["instrument"], after["instrument"])
+    pickups = [values["string_pickup"] for values in (before, after) if "string_pickup" in changed]
+    heard = [field_words(f"pickup.{path}") for path in _changed(*pickups)] if pickups else []
+    return _join_words([*(words for name, words in CHOICES.items() if name in changed), *heard])
 
 
 def turned_fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """The fields of a step; of an instrument that has kept its name, also "instrument.PATH" for each that changed."""
-    old, new = before.get("instrument"), after.get("instrument")
-    is_turned = isinstance(old, Instrument) and isinstance(new, Instrument) and old.name == new.name
-    return frozenset(after) | ({f"instrument.{path}" for path in _changed(old, new)} if is_turned else set())
+    """The fields of a step, and "FIELD.PATH" of what changed in a pick-up or an instrument that has kept its name."""
+    names = set(after)
+    for name in ("instrument", "string_pickup"):
+        old, new = before.get(name), after.get(name)
+        if old is not None and new is not None and getattr(old, "name", "") == getattr(new, "name", ""):
+            names |= {f"{name}.{path}" for path in _changed(old, new)}
+    return frozenset(names)
 
 
 def _instrument_words(before: Instrument | None, after: Instrument | None) -> str:
@@ -94,6 +89,8 @@ def _changed(before: object, after: object, path: str = "") -> Iterator[str]:
             continue
         if _names(new) and type(old) is type(new) and name != "strings":
             yield from _changed(old, new, f"{path}{name}.")
+        elif name == "points" and len(old) == len(new):
+            yield from (f"{path}{name}.{number}" for number in range(len(new)) if old[number] != new[number])
         else:
             yield f"{path}{name}"
 

@@ -13,6 +13,7 @@ from app.audio.impulse_file import LONGEST_FILE_S, ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, RecipeError, SoundRecipe, changed_notices, preset_of, read_recipe
+from app.instruments.instrument import Pickup
 from app.player.bodies import ENDINGS, install_body
 from app.presets.install import SUFFIX, install_preset
 from app.presets.library import Library
@@ -130,12 +131,8 @@ def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
         fields |= {
             **asdict(recipe.pluck),
             "string": None if recipe.string is None else asdict(recipe.string),
-            "listen": recipe.listen,
-            "stereo": recipe.listen_right is not None,
-            "pickup": recipe.pickup,
+            "string_pickup": Pickup(points=recipe.points, kind=recipe.pickup),
         }
-        if recipe.listen_right is not None:
-            fields["listen_right"] = recipe.listen_right
     if recipe.decay_db is None:
         fields["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     if recipe.source == "difference":

@@ -28,7 +28,7 @@ from app.window.recordings import Recordings, played_source
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "instrument"}
 ESCAPE = Qt.Key.Key_Escape
-HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", *Monitor.model_fields} - {"level_match"}
+HEARD_FIELDS = {"ear", *Monitor.model_fields} - {"level_match"}
 
 
 class Exports(QObject):

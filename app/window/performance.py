@@ -23,7 +23,6 @@ from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowTake, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
 from app.session.choices import OBSERVED
-from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
@@ -168,7 +167,7 @@ class Performance(QObject):
             self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & {"instrument", "single"}:  # ends a comparison
             self.notes.set_instrument(choices.instrument, choices.ear, choices.single)
-        elif names & Listener.model_fields.keys():
+        elif "ear" in names:
             self.notes.listen(choices.ear)
         stage = self._session.stage
         request = stage.blow if choices.drums is not None else request_of(choices, self._library)

@@ -33,7 +33,7 @@ def shape_box(picked: Callable[[Any], object]) -> QComboBox:
 
 
 def pickup_box(tip: str, picked: Callable[[Any], object]) -> QComboBox:
-    """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
+    """A narrow combo box of the pick-ups; its data is that of `Choices.pickup.kind`."""
     box = combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()], tip=tip, picked=picked)
     return _tight(box, _PICKUP_WIDTH, _PICKUP_ARROW)
 

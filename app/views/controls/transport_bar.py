@@ -104,12 +104,12 @@ class TransportBar(QFrame):
         self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
         for field in ("listen", "listen_right"):
-            self.knobs[field].set_barred(AT_BRIDGE if choices.pickup == "bridge" else "")
+            self.knobs[field].set_barred(AT_BRIDGE if choices.pickup.kind == "bridge" else "")
         # not hidden, which would move the controls beside it
-        self.knobs["listen_right"].setEnabled(choices.stereo and choices.pickup != "bridge")
+        self.knobs["listen_right"].setEnabled(choices.stereo and choices.pickup.kind != "bridge")
         with QSignalBlocker(self._stereo):
             self._stereo.setChecked(choices.stereo)
-        self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
+        self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup.kind))
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
         self._show_verb("Pluck" if choices.drums is None else "Strike")
@@ -150,7 +150,7 @@ class TransportBar(QFrame):
             f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
             f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n"
             f"{OF_THE_INSTRUMENT}",
-            partial(self.change_asked.emit, "pickup"),
+            partial(self.change_asked.emit, "pickup_kind"),
         )
         self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         return filled(QVBoxLayout(), self._stereo, self._pickup)

@@ -22,7 +22,6 @@ from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
 from app.session.choices import Choices, ShownString
-from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.shown import ShownSource, shown_sources
 from app.session.silence import why_silent
@@ -45,7 +44,7 @@ STAGE_FIELDS = {  # of `Choices`: what a picture above the decks depends on
     "preset",
     "volume_db",
     *ShownString.model_fields,
-    *Listener.model_fields,
+    "ear",
     *Monitor.model_fields,
 }
 
@@ -307,7 +306,7 @@ class StagePanel(Panel):
             view.set_plain(choices.face == "play")
             view.set_sources(self._sources)
             left, right = choices.listen, choices.listen_right if choices.stereo else None
-            at_bridge = self.of_strings and choices.pickup == "bridge"
+            at_bridge = self.of_strings and choices.pickup.kind == "bridge"
             view.set_listening_points(*((None, None) if at_bridge else (left, right)))
             view.set_warning(*self._warning())
         if names & {"motion", "envelope"}:

@@ -92,7 +92,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         return self._full_scale_mm / (self._gain[self._kind] or self._fitting_gain)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if "listen" in names and self.session.choices.listen != self._listening.value():
+        if "ear" in names and self.session.choices.listen != self._listening.value():
             self._listening.setValue(self.session.choices.listen)
 
     def take_started(self, take: Take | BlowTake) -> None:

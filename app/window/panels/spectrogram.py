@@ -90,8 +90,8 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         return 10**height if self.logarithmic else height
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if "pickup" in names:
-            self._bar_label.set(level_words(self.session.choices.pickup), "dB")
+        if "ear" in names:
+            self._bar_label.set(level_words(self.session.choices.pickup.kind), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)

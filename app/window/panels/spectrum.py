@@ -120,8 +120,8 @@ class SpectrumPanel(CurvesPanel):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         super().choices_changed(names)
-        if "pickup" in names:
-            self.plot.label.set(level_words(self.session.choices.pickup), "dB")
+        if "ear" in names:
+            self.plot.label.set(level_words(self.session.choices.pickup.kind), "dB")
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
@@ -184,7 +184,7 @@ class SpectrumPanel(CurvesPanel):
     def columns(self) -> Columns:
         """The points of the curves in view."""
         curves = {source: (analyser.column_hz, levels_db) for source, (analyser, levels_db) in self._levels.items()}
-        return aligned("frequency (Hz)", self.by_heading(curves, level_words(self.session.choices.pickup)))
+        return aligned("frequency (Hz)", self.by_heading(curves, level_words(self.session.choices.pickup.kind)))
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """The levels drawn at a frequency, by source, without sources of which it is not drawn."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import soundfile
 
+from app.instruments.instrument import Pickup
 from app.player.bodies import body_names
 from app.presets.install import install_preset
 from app.presets.library import Library, PresetEntry, list_presets
@@ -93,7 +94,7 @@ def test_an_export_restores_its_choices(library, preset_folder, tmp_path, ending
     dropped = receive(tmp_path / f"b.{ending}", library)
     assert dropped.notice == ""
     pluck = {"position": 0.61, "amplitude_mm": 2.5, "shape": "raised_cosine", "width": 0.2, "string": None}
-    ear = {"listen": 0.22, "solo": 0, "stereo": False, "pickup": "displacement"}
+    ear = {"string_pickup": Pickup(points=(0.22,)), "solo": 0}
     slots = {"single": "second", "seconds": 0.7, "a": "model", "b": "truth", "heard": "b"}
     assert dropped.choices == {**pluck, **ear, **slots}
     shutil.copy(preset_folder / "first.safetensors", preset)

@@ -12,6 +12,7 @@ from app.session.trained import brought_pluck
 from app.stage.session import Session
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, outside_training
+from engine.values.ear import Ear
 from engine.values.string import StringParameters
 
 STRING = StringParameters(density_kg_m3=7850.0, youngs_modulus_pa=2e11, tension_n=75.0)
@@ -93,6 +94,10 @@ def test_choices_from_before_the_instrument_are_understood(plays, preset):
     assert choices.single == (preset if plays == "place" else None)
     assert (choices.string is None) == (preset == "one" and plays != "place"), "it is no string of that preset"
     assert Choices.model_validate({"preset": preset}).single == preset
+    flat = {"listen": 0.2, "listen_right": 0.7, "stereo": True, "pickup": "velocity"}
+    choices = Choices.model_validate({**old, **flat, "keys_play": plays or "pitch"})
+    assert choices.string_pickup == Pickup(points=(0.2, 0.7), kind="velocity")
+    assert choices.ear == (Ear((0.2, 0.7), "velocity") if plays == "place" else Ear((0.2,)))
     assert Choices.model_validate_json(choices.model_dump_json()) == choices
 
 
@@ -120,7 +125,7 @@ def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
 def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it():
     session = Session()
     session.update(played=played_instrument(0.2))
-    session.update(pickup="velocity")
+    session.update(pickup_kind="velocity")
     session.move_listening_point(0.3)
     assert pickup_of(session) == ((0.3,), "velocity")
     session.update(stereo=True, listen_right=0.9)
@@ -129,17 +134,19 @@ def test_a_pick_up_is_that_of_the_instrument_while_keys_play_it():
     assert pickup_of(session) == ((0.3,), "velocity")
     seen = recorded(session)
     session.update(instrument=played_instrument(0.6, 0.8))  # the other way
-    choices = session.choices
-    assert (choices.listen, choices.listen_right, choices.stereo, choices.pickup) == (0.6, 0.8, True, "displacement")
-    assert seen == [frozenset({"instrument", "listen", "listen_right", "stereo", "pickup"})]
+    assert session.choices.ear == Ear((0.6, 0.8))
+    assert seen == [frozenset({"instrument", "ear"})]
+    for stereo in (False, True):
+        session.update(stereo=stereo)
+    assert pickup_of(session) == ((0.6, 0.8), "displacement"), "the right point is remembered"
     session.update(preset="one")
-    session.update(listen=0.7, pickup="velocity", stereo=True)
+    assert session.choices.ear == Ear((0.6, 0.8)), "the string is heard where the instrument was"
+    session.update(listen=0.7, pickup_kind="velocity", stereo=True)
     assert pickup_of(session) == ((0.6, 0.8), "displacement")
     session.update(instrument=played_instrument(0.4))
     assert session.choices.listen == 0.7
     session.play_instrument()  # it is heard as it is
-    choices = session.choices
-    assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
+    assert session.choices.ear == Ear((0.4,))
 
 
 def test_an_instrument_whose_macro_moves_the_right_point_stays_in_stereo():

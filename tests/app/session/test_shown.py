@@ -120,7 +120,7 @@ def test_a_difference_of_next_to_nothing_is_named(small_preset, hear):
     append_to(take, rest, rest)
     hear(take, choices.ear)
     assert "are identical" in why_difference_silent(choices, take)
-    assert why_difference_silent(choices.model_copy(update={"listen": 0.2}), take) == ""  # of there nothing is known
+    assert why_difference_silent(choices.changed({"listen": 0.2}), take) == ""  # of there nothing is known
     for off_m, gain_db, words in ((1e-7, 20, "raise its gain"), (1e-7, 60, ""), (1e-3, 0, "")):
         take = Take("small", take.info, Pluck(), 0.5, choices.ear)
         append_to(take, rest + np.float32(off_m), rest)

@@ -145,7 +145,7 @@ def test_what_is_played_and_where_it_is_heard_are_steps(hand, guitar):
     session.update(played=guitar)
     own = pickup_of(session)
     states, words = [own], []
-    changes = ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11})
+    changes = ({"pickup_kind": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11})
     for change in changes:
         hand.change(1, **change)
         states.append(pickup_of(session))

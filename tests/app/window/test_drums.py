@@ -81,7 +81,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(kit):
     assert not kit.performance.ready, "no string is plucked"
     of_string = [window.transport.knobs["position"], kit.find(QComboBox, "Pick-up"), kit.find(QToolButton, "Loop")]
     assert not any(each.isEnabled() for each in of_string) and window.transport.knobs["listen"].isEnabled()
-    kit.change(face="play", loop=True, solo=3, pickup="bridge", listen=0.7)
+    kit.change(face="play", loop=True, solo=3, pickup_kind="bridge", listen=0.7)
     play, fold = kit.find(QPushButton, "Strike or stop"), kit.find(QToolButton, "Drum knobs")
     assert play.text() == "▶  Strike"
     panel.show_surface("neck")

@@ -219,7 +219,7 @@ def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rend
     for kind in ("lru", "koopman_var"):
         choose(held, KINDS[kind])
         for pickup in (*PICKUPS, *PICKUPS[::-1]):
-            held.change(pickup=pickup)
+            held.change(pickup_kind=pickup)
             assert_same(heard(held, "a"), rendered(held, "model"), f"{kind}, {pickup}")
     play_instrument(held, PLAYED["brass_strung_harp"])
     held.controller.inputs.play(NoteOn(60, 100))  # as in the milliseconds before the window's next look

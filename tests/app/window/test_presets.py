@@ -117,7 +117,7 @@ def test_dropped_presets_and_recipes_are_taken_in_and_bad_files_change_nothing(
     monkeypatch.setattr("app.window.dropped_files.restored_choices", lambda recipe: {"listen": 3})
     (tmp_path / "five.scl").write_text(FIVE)
     for file, words in (
-        (wav, "its choices cannot be restored here (listen: "),
+        (wav, "its choices cannot be restored here (listen must"),
         (tmp_path / "foreign.txt", "not a file that is used here"),
         (tmp_path / "five.scl", "choose one first"),
     ):

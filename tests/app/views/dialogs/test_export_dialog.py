@@ -135,7 +135,7 @@ def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot, made,
 
 
 def test_both_become_two_files_which_are_named_before(qtbot, made, folder):
-    dialog = made({"source": "files"}, stereo=True, listen_right=0.7, pickup="velocity")
+    dialog = made({"source": "files"}, stereo=True, listen_right=0.7, pickup_kind="velocity")
     names = ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
     assert dialog.note.names.text() == "\n".join(names)
     run(qtbot, dialog, "Saved")

@@ -14,6 +14,7 @@ from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Choices
 from app.stage.session import Session
+from app.stage.stage import changed_names
 from app.views import theme
 from app.views.plots.plots import dress_plots
 from app.window.panels import Moment, Panel
@@ -78,8 +79,9 @@ def watch(qtbot, take) -> Callable[[Panel, Callable[[], object]], None]:
 
 def choose(panel: Panel, **choices: Any) -> None:
     """Change choices, and tell the panel as the window does."""
+    before = panel.session.stage
     panel.session.update(**choices)
-    panel.choices_changed(frozenset(choices))
+    panel.choices_changed(changed_names(before, panel.session.stage))
 
 
 def items(plot: pg.PlotWidget, kind: type[Any]) -> list[Any]:

@@ -110,7 +110,7 @@ def test_the_spectrogram_has_one_scale(make, take, hear, watch):
     assert int(column().argmax()) / rows * 2000 == pytest.approx(take.fundamental_hz, abs=30)
     assert panel.plot.getPlotItem().vb.viewRange()[1][1] == pytest.approx(2000)
     for pickup, label in (("displacement", "dB re 10 mm"), ("velocity", "dB re 30 m/s")):
-        choose(panel, pickup=pickup)
+        choose(panel, pickup_kind=pickup)
         assert bar_of(panel.plot).getAxis("left").labelText == label
 
 
@@ -181,7 +181,7 @@ def test_waveform_and_spectrum_have_the_unit(make, take, hear, watch):
         ("displacement", "10 mm", 1000, "displacement (mm)", 1 / 0.01),
     ):
         for panel in (waveform, spectrum):
-            choose(panel, pickup=pickup, listen=0.5)
+            choose(panel, pickup_kind=pickup, listen=0.5)
         hear(take, waveform.session.choices.ear)
         loudest_db = pytest.approx(20 * np.log10(0.004 * np.exp(-1.5) * level), abs=2.5)  # at 0.5 s
         watch(spectrum, lambda db=loudest_db: len(drawn(spectrum, "truth")) and drawn(spectrum, "truth").max() == db)
@@ -189,7 +189,7 @@ def test_waveform_and_spectrum_have_the_unit(make, take, hear, watch):
         assert drawn(waveform, "truth").max() == pytest.approx(0.004 * factor, rel=0.02)
         assert full in label_of(spectrum.plot)
     for panel in (waveform, spectrum):
-        choose(panel, pickup="displacement", b="difference", heard="b", difference_gain_db=20.0, listen=0.5)
+        choose(panel, pickup_kind="displacement", b="difference", heard="b", difference_gain_db=20.0, listen=0.5)
     hear(take, waveform.session.choices.ear)
     ten_times = pytest.approx(0.4, rel=1e-2)  # 1 % of 4 mm
     watch(waveform, lambda: whole(waveform, "difference") and drawn(waveform, "difference").max() == ten_times)

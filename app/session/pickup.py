@@ -1,0 +1,44 @@
+"""The pick-up as it is turned in the window: listening points, mono or stereo, and kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.instruments.instrument import Instrument, Pickup
+from app.shared.parameters import OF_CHOICES
+from engine import bounds
+
+POINTS = ("listen", "listen_right")
+TURNED = (*POINTS, "stereo", "pickup_kind")
+RIGHT_POINT = "pickup.points.1"  # of an instrument in stereo
+
+
+def turned_pickup(pickup: Pickup, turns: Mapping[str, Any]) -> Pickup:
+    """The pick-up after `turns`, by name of TURNED; `listen_right` is used in stereo.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it.
+    """
+    for name in POINTS:
+        if name in turns:
+            bounds.check(name, turns[name], OF_CHOICES[name].limits)
+    left = turns.get("listen", pickup.points[0])
+    stereo = turns.get("stereo", len(pickup.points) > 1)
+    points = (left, turns["listen_right"]) if stereo else (left,)
+    kind = turns.get("pickup_kind", pickup.kind)
+    return Pickup.model_validate({**dict(pickup), "points": points, "kind": kind})
+
+
+def with_pickup(instrument: Instrument, pickup: Pickup) -> Instrument:
+    """The instrument with this pick-up.
+
+    Raises:
+        ValueError: in mono one of its macros would have nothing to move.
+    """
+    if len(pickup.points) == 1:
+        for macro in instrument.macros:
+            if any(target.field == RIGHT_POINT for target in macro.targets):
+                reason = f"its macro {macro.name} moves the right listening point"
+                raise ValueError(f"{instrument.name} stays in stereo: {reason}")
+    return instrument.model_copy(update={"pickup": pickup})
