@@ -33,13 +33,14 @@ def info(
     if json:
         print_json({**facts, "preset_file": preset_file})
         return
-    parts = {part: facts.pop(part, None) or {} for part in ("pluck", "string")}
+    parts = {part: of_part for part, of_part in facts.items() if isinstance(of_part, dict)}
     part_values = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
-    lines = {**part_values, **facts, "preset file": preset_file}
+    plain = {name: value for name, value in facts.items() if name not in parts}
+    lines = {**part_values, **plain, "preset file": preset_file}
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")
     if not isinstance(origin, SoundRecipe):
         say(f"note: {one_line(origin.words)}")
-    elif origin.source != "truth" and (origin.decay_db is not None or origin.seconds > origin.horizon_s):
+    elif origin.source != "truth" and (origin.settings.decay_db is not None or origin.seconds > origin.horizon_s):
         say(f"note: from {duration(origin.horizon_s)} on, the model is past its training")

@@ -42,8 +42,7 @@ def play(
     The same files give the same samples. Strings leave out channel 10, except in MPE; a kit of drums plays it alone.
     A program that no instrument is like leaves the one that the channel has, at first the classical guitar.
     """
-    from app.export.sound import LONGEST_S
-    from app.export.wav import RATE_RANGE_HZ
+    from app.export.wav import LONGEST_S, RATE_RANGE_HZ
 
     arguments.check_suffix("--out", out, *WRITTEN_ENDINGS)
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")

@@ -60,7 +60,7 @@ class NoteOptions:
         seconds = _require("--seconds", self.seconds)
         pluck = options.check_pluck(position, amplitude_mm, self.shape, self.width)
         options.check(listen=self.listen, listen_right=self.listen_right)
-        from app.export.sound import LONGEST_S
+        from app.export.wav import LONGEST_S
         from app.rendering.note_sound import NoteSound
         from app.rendering.subject import StringOf, Subject
         from engine.values.ear import Ear
@@ -212,7 +212,11 @@ def _render_again(file: Path, out: Path | None) -> None:
     path, exact = preset_of(recipe, usable_files())
     if out is None:
         ending = ending if (ending := file.suffix.lower()) in WRITTEN_ENDINGS else ".wav"
-        out = Path(default_file_name(path.stem, recipe.pluck, recipe.rate_hz, recipe.source, ending))
+        out = Path(
+            default_file_name(
+                path.stem, recipe.pluck, recipe.settings.rate_hz or recipe.preset_rate_hz, recipe.source, ending
+            )
+        )
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
     sound = recipe.sound(path, file)

@@ -18,7 +18,7 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, WRITTEN_ENDINGS, PlayedSource
 from app.shared.worker import Progress
 from engine.plain_text import name_text
-from engine.presets import Preset, load_preset, preset_digest
+from engine.presets import Preset, load_preset
 from engine.whole_file import result_file
 
 RATE_HZ = 48_000
@@ -75,11 +75,8 @@ def write_played(
     form = form_of(path, settings.bits, rate_hz)
     names = " + ".join(dict.fromkeys(played.instrument.name for played, _ in parts))
     origin = InstrumentSound(
-        program=PROGRAM,
-        version=program_version(),
+        **InstrumentSound.of_preset(preset),
         instrument=names,
-        preset=preset.name,
-        preset_sha256=preset_digest(preset.path),
         source=source,
         difference_gain_db=gain_db if source == DIFFERENCE else 0.0,
         rate_hz=rate_hz,

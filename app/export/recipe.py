@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from app.audio.sound_file import UnreadableSound, open_sound
-from app.export.sound import LONGEST_S, check_sources
-from app.export.wav import RATE_RANGE_HZ, WavSettings
+from app.export.sound import check_sources
+from app.export.wav import LONGEST_S, RATE_RANGE_HZ, WavSettings
 from app.instruments.fields import Name, String
 from app.instruments.instrument import Instrument
 from app.instruments.library import list_instruments
 from app.player.bodies import body_digest
-from app.player.events import KEYS, NoteOn
+from app.player.events import NoteOn
 from app.rendering.note_sound import NoteSound, Struck
 from app.rendering.subject import StringOf
 from app.shared.value import Value
@@ -33,9 +33,7 @@ from engine.plain_text import LineError, name_text
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, preset_digest
 from engine.schema import explained, parse_json
-from engine.values.ear import Ear, Pickup
-
-Side = Annotated[float, Field(ge=-1, le=1)]
+from engine.values.ear import Ear
 
 
 class RecipeError(LineError):
@@ -50,7 +48,30 @@ class NotesElsewhere(RecipeError):
     """The error that a file was played on an instrument: its notes are in a MIDI file."""
 
 
-class InstrumentSound(Value):
+class Origin(Value):
+    """The program and the preset that made a sound file."""
+
+    program: str
+    version: str
+    preset: str
+    preset_sha256: str
+
+    @staticmethod
+    def of_preset(preset: Preset) -> dict[str, Any]:
+        """These fields of what this program makes of a preset.
+
+        Raises:
+            PresetError: its file cannot be read any more.
+        """
+        return {
+            "program": PROGRAM,
+            "version": program_version(),
+            "preset": preset.name,
+            "preset_sha256": preset_digest(preset.path),
+        }
+
+
+class InstrumentSound(Origin):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
@@ -64,11 +85,7 @@ class InstrumentSound(Value):
 
     format: Literal[1] = 1
     kind: Literal["instrument"] = "instrument"
-    program: str
-    version: str
     instrument: str
-    preset: str
-    preset_sha256: str
     source: PlayedSource
     difference_gain_db: float = 0.0
     rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
@@ -90,83 +107,37 @@ def source_words(source: str, difference_gain_db: float) -> str:
     return f"the difference of model and truth at {difference_gain_db:+g} dB"
 
 
-class StruckKey(Value):
-    """Names the instrument, as the library has it, and says how its key is struck.
-
-    Attributes:
-        instrument_sha256: of its content and of the file of its body.
-        channel: of MIDI, which chooses the string of a guitar; `KEYS`: none.
-        place, pluck: of a drum and of a string, as in `NoteOn`.
-    """
-
-    instrument: Name
-    instrument_sha256: str
-    key: int = Field(ge=0, le=127)
-    velocity: int = Field(ge=1, le=127)
-    channel: int = Field(KEYS, ge=0, le=KEYS)
-    place: tuple[Side, Side] | None = None
-    string: int | None = Field(None, ge=0, le=127)
-    pluck: Pluck | None = None
-
-    @classmethod
-    def of(cls, struck: Struck) -> StruckKey:
-        instrument = struck.instrument
-        return cls(instrument=instrument.name, instrument_sha256=_digest(instrument), **asdict(struck.event))
-
-    def found(self) -> tuple[Struck, bool]:
-        """The instrument of that name with this key, and whether it is the same to the last value.
-
-        Raises:
-            ValueError: there is none.
-        """
-        for entry in list_instruments()[0]:
-            if entry.instrument.name == self.instrument:
-                event = NoteOn(**{field.name: getattr(self, field.name) for field in fields(NoteOn)})
-                return Struck(entry.instrument, event), _digest(entry.instrument) == self.instrument_sha256
-        raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
-
-
-def _digest(instrument: Instrument) -> str:
+def instrument_digest(instrument: Instrument) -> str:
+    """The SHA-256 of an instrument's content and of the file of its body."""
     content = instrument.model_dump_json() + body_digest(instrument.body.name)
     return hashlib.sha256(content.encode()).hexdigest()
 
 
-class SoundRecipe(Value):
+class SoundRecipe(Origin):
     """A `NoteSound` and its `WavSettings`, as a file has them; a field that is absent has its default.
 
     Attributes:
-        preset_rate_hz: the rate at which the model played.
         string: the string that a preset of many played, with so many `modes`; None: the preset's own.
+        event: how a key of `instrument` is struck, which is named as the library has it; None: no instrument plays.
+        preset_rate_hz: the rate at which the model played.
         horizon_s: the training horizon, past which the model extrapolates.
         full_scale_m: the displacement that is 0 dBFS, of a string alone.
-        through: always null.
     """
 
-    format: Literal[1] = 1
-    program: str
-    version: str
-    preset: str
-    preset_sha256: str
+    format: Literal[2] = 2
     pluck: Pluck
-    listen: float = Field(ge=0, le=1)
-    listen_right: float | None = Field(None, ge=0, le=1)
-    pickup: Pickup = "displacement"
+    ear: Ear
     seconds: float = Field(gt=0, le=LONGEST_S)
-    decay_db: float | None = None
+    string: String | None = None
+    modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
+    instrument: Name | None = None
+    instrument_sha256: str = ""
+    event: NoteOn | None = None
     source: Source
-    difference_gain_db: float = 0.0
+    settings: WavSettings
     preset_rate_hz: int = Field(ge=1, le=HIGHEST_RATE_HZ)
     horizon_s: float
     full_scale_m: float
-    rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
-    bits: Bits
-    normalise: bool
-    fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
-    level_match: bool = False
-    string: String | None = None
-    modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
-    through: None = None
-    struck: StruckKey | None = None
 
     @classmethod
     def of(cls, sound: NoteSound, preset: Preset, source: Source, settings: WavSettings) -> SoundRecipe:
@@ -175,43 +146,41 @@ class SoundRecipe(Value):
         Raises:
             PresetError: the preset's file cannot be read any more.
         """
-        info, ear = preset.info, sound.ear
-        many = info.family is not None and sound.struck is None
+        info, struck = preset.info, sound.struck
         gain_db = settings.difference_gain_db if source == DIFFERENCE else 0.0
+        made = cls.of_preset(preset)
+        if struck is not None:
+            digest = instrument_digest(struck.instrument)
+            made |= {"instrument": struck.instrument.name, "instrument_sha256": digest, "event": struck.event}
+        elif info.family is not None:
+            made |= {"string": info.string, "modes": info.modes}
         return cls(
-            program=PROGRAM,
-            version=program_version(),
-            preset=preset.name,
-            preset_sha256=preset_digest(preset.path),
+            **made,
             pluck=sound.pluck,
-            listen=ear.points[0],
-            listen_right=ear.points[1] if len(ear.points) > 1 else None,
-            pickup=ear.pickup,
+            ear=replace(sound.ear, solo=0),
             seconds=sound.seconds,
             source=source,
+            settings=replace(settings, rate_hz=settings.rate_hz or info.rate_hz, difference_gain_db=gain_db),
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
             full_scale_m=FULL_SCALE_M,
-            **asdict(replace(settings, rate_hz=settings.rate_hz or info.rate_hz, difference_gain_db=gain_db)),
-            string=info.string if many else None,
-            modes=info.modes if many else None,
-            struck=None if sound.struck is None else StruckKey.of(sound.struck),
         )
 
-    @model_validator(mode="after")
-    def _check_settings(self) -> SoundRecipe:
-        assert self.settings  # which checks their ranges
-        return self
+    @model_validator(mode="before")
+    @classmethod
+    def _take_old(cls, data: Any) -> Any:
+        return _composed(data) if isinstance(data, dict) and data.get("format") == 1 else data
 
-    @property
-    def settings(self) -> WavSettings:
-        """The settings of its file."""
-        return WavSettings(**{field.name: getattr(self, field.name) for field in fields(WavSettings)})
+    def find_instrument(self) -> tuple[Instrument, bool]:
+        """The instrument of that name, and whether it is the same to the last value.
 
-    @property
-    def points(self) -> tuple[float, ...]:
-        """The listening points, one a channel."""
-        return (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+        Raises:
+            ValueError: there is none.
+        """
+        for entry in list_instruments()[0]:
+            if entry.instrument.name == self.instrument:
+                return entry.instrument, instrument_digest(entry.instrument) == self.instrument_sha256
+        raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
 
     def sound(self, preset: Path, file: Path) -> NoteSound:
         """The sound that it describes, checked.
@@ -223,15 +192,28 @@ class SoundRecipe(Value):
         Raises:
             RecipeError: values do not go together, or the instrument is not here.
         """
-        string, rate_hz = self.string, self.preset_rate_hz
-        subject = preset if string is None else StringOf(preset, string, rate_hz, self.modes)
+        subject = preset if self.string is None else StringOf(preset, self.string, self.preset_rate_hz, self.modes)
         try:
-            struck = None if self.struck is None else self.struck.found()[0]
-            sound = NoteSound(subject, self.pluck, self.seconds, Ear(self.points, self.pickup), struck=struck)
+            struck = None if self.event is None else Struck(self.find_instrument()[0], self.event)
+            sound = NoteSound(subject, self.pluck, self.seconds, self.ear, struck=struck)
             check_sources(sound, (self.source,), sound.load().info.rate_hz)
         except ValueError as error:
             raise _unusable_error(file, str(error)) from error
         return sound
+
+
+def _composed(data: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a recipe of format 1, which had those of ear and settings itself, and `struck` for the key."""
+    data = {name: value for name, value in data.items() if name != "through"}
+    points = [data.pop(name, None) for name in ("listen", "listen_right")]
+    ear = {"points": [point for point in points if point is not None], "pickup": data.pop("pickup", "displacement")}
+    settings = {field.name: data.pop(field.name) for field in fields(WavSettings) if field.name in data}
+    data |= {"format": 2, "ear": ear, "settings": settings}
+    if isinstance(event := data.pop("struck", None), dict):
+        names = ("instrument", "instrument_sha256")
+        data |= {name: event[name] for name in names if name in event}
+        event = {name: value for name, value in event.items() if name not in names}
+    return {**data, "event": event}
 
 
 def read_origin(path: Path) -> SoundRecipe | InstrumentSound:
@@ -314,10 +296,9 @@ def changed_notices(recipe: SoundRecipe, exact: bool) -> list[str]:
     Raises:
         ValueError: the instrument is not here.
     """
-    struck = recipe.struck
-    others = {"the preset " + recipe.preset: exact}
-    if struck is not None:
-        others["the instrument " + struck.instrument] = struck.found()[1]
+    others = {f"the preset {recipe.preset}": exact}
+    if recipe.event is not None:
+        others[f"the instrument {recipe.instrument}"] = recipe.find_instrument()[1]
     return [
         f"{name} is not the one that made this file (another version of it): the sound differs"
         for name, same in others.items()

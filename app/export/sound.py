@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.export.recording import BLOCK_FRAMES, Recording, SoundSamples, blocks
-from app.export.wav import WavSettings
+from app.export.wav import LONGEST_S, WavSettings
 from app.player.effects import channels_of
 from app.player.events import TimedEvent
 from app.player.offline import render_events
@@ -31,7 +31,6 @@ from engine.voices import model_program, truth_program, voice_blocks
 Voice = Literal["model", "truth"]
 VOICES: tuple[Voice, ...] = get_args(Voice)
 SOURCES: tuple[Source, ...] = get_args(Source)
-LONGEST_S = 600.0
 DECAYED_FOR_SURE_DB = 30.0  # rendering continues until the whole string is so far below the wanted decay
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
 QUIET_FOR_S = 1.0  # for which a key is to be quiet until it has decayed: longer than strings beat

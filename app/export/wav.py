@@ -23,8 +23,14 @@ from engine import bounds
 
 T = TypeVar("T")
 RATE_RANGE_HZ = (1_000, 384_000)
+LONGEST_S = 600.0  # of a note, and of its fade-out
 DECAY_RANGE_DB = (10.0, 120.0)
-RANGES = {"rate_hz": RATE_RANGE_HZ, "decay_db": DECAY_RANGE_DB, "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB}
+RANGES = {
+    "rate_hz": RATE_RANGE_HZ,
+    "decay_db": DECAY_RANGE_DB,
+    "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB,
+    "fade_out_s": (0.0, LONGEST_S),
+}
 LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
 HIGHEST_ODD_RATE_HZ = 65_535  # FLAC states higher ones in tens of Hz
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
@@ -63,8 +69,6 @@ class WavSettings:
     def __post_init__(self) -> None:
         bounds.check_choice("bits", self.bits, BITS)
         bounds.check_all(self, RANGES)
-        if not self.fade_out_s >= 0:
-            raise ValueError(f"fade_out_s must not be negative, not {self.fade_out_s}")
 
 
 @dataclass(frozen=True)

@@ -99,9 +99,7 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
         played: dict[str, Any] = (
-            {"single": name_text(path.stem)}
-            if recipe.struck is None
-            else {"played": recipe.struck.found()[0].instrument}
+            {"single": name_text(path.stem)} if recipe.event is None else {"played": recipe.find_instrument()[0]}
         )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
@@ -127,14 +125,14 @@ def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
         "b": "truth",
         "heard": "b" if recipe.source == "truth" else "a",
     }
-    if recipe.struck is None:
+    if recipe.event is None:
         fields |= {
             **asdict(recipe.pluck),
             "string": None if recipe.string is None else asdict(recipe.string),
-            "string_pickup": Pickup(points=recipe.points, kind=recipe.pickup),
+            "string_pickup": Pickup(points=recipe.ear.points, kind=recipe.ear.pickup),
         }
-    if recipe.decay_db is None:
+    if recipe.settings.decay_db is None:
         fields["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     if recipe.source == "difference":
-        fields["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
+        fields["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.settings.difference_gain_db)
     return fields

@@ -33,6 +33,8 @@ class Ear:
     solo: int = 0
 
     def __post_init__(self) -> None:
+        if len(self.points) not in (1, 2):
+            raise ValueError(f"listening points must be one or two, not {len(self.points)}")
         for name, point in zip(("listening point", "right listening point"), self.points, strict=False):
             bounds.check(name, point, (0, 1))
         bounds.check_choice("pickup", self.pickup, PICKUPS)

@@ -11,7 +11,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
-from app.export.recipe import StruckKey
+from app.export.recipe import instrument_digest
 from app.rendering.note_sound import NoteSound
 from app.rendering.subject import path_of, string_of
 from app.shared.version import program_version
@@ -48,7 +48,7 @@ class AbxRecord(BaseModel):
 
     Attributes:
         words: what is compared, for people.
-        pluck: its fields and where it is heard, by name; of a key of an instrument those of `StruckKey`.
+        pluck: its fields and where it is heard, by name; of a key of an instrument those of `NoteOn`.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
         remark: why the test is not complete, if that is known.
@@ -109,7 +109,8 @@ def material_of(sound: NoteSound, words: str, volume_db: float) -> AbxRecord:
     a, b = (Candidate(label=label, preset=name, preset_sha256=digest) for label in ("Model", "Truth"))
     pluck: dict[str, object] = {"seconds": sound.seconds}
     if sound.struck is not None:
-        pluck |= StruckKey.of(sound.struck).model_dump(mode="json")
+        instrument, event = sound.struck.instrument, sound.struck.event
+        pluck |= {"instrument": instrument.name, "instrument_sha256": instrument_digest(instrument), **asdict(event)}
     else:
         pluck |= {"string": string and asdict(string), **asdict(sound.pluck), "pickup": sound.ear.pickup}
         pluck |= dict(zip(("listen", "listen_right"), points, strict=False))

@@ -21,8 +21,7 @@ from app.export.sampled.choices import SampledChoices
 from app.export.sampled.job import SampledExport, plain_stem, planned
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
-from app.export.sound import LONGEST_S
-from app.export.wav import DECAY_RANGE_DB
+from app.export.wav import DECAY_RANGE_DB, LONGEST_S
 from app.instruments.instrument import Instrument
 from app.player.effects import added_words, body_problem
 from app.player.events import NoteOn

@@ -214,7 +214,7 @@ class Made:
         for change in changes.split(","):
             field, _, value = change.partition("=")
             *place, field = field.split(".")
-            (recipe[place[0]] if place else recipe)[field] = json.loads(value)
+            (recipe[place[0]] if place else recipe)[field] = json.loads(value.replace(";", ","))
         return recipe
 
 

@@ -49,8 +49,10 @@ def test_a_file_has_what_was_asked_and_its_recipe_makes_the_same_bytes(run, fold
     facts, recipe = soundfile.info(first), recipe_of(first)
     assert (facts.subtype, facts.samplerate) == (subtype, rate_hz)
     assert frames in (None, facts.frames)
+    recipe |= recipe["pluck"] | recipe["ear"] | recipe["settings"]
+    recipe |= dict(zip(("listen", "listen_right"), recipe["points"], strict=False))
     for option, value in re.findall(r"--(\S+) ?([^-\s]\S*)?", more):
-        found = (recipe | recipe["pluck"])[option.replace("-", "_").replace("rate", "rate_hz")]
+        found = recipe[option.replace("-", "_").replace("rate", "rate_hz")]
         assert found == (type(found)(value) if value else True)
     assert list(folder.iterdir()) == [first]
     found = run(AGAIN)
@@ -148,7 +150,7 @@ def test_a_recipe_holds_the_string_that_a_model_of_many_played(run, folder, tmp_
     string.unlink()
     facts = json.loads(run("info --json", first).out)
     assert StringParameters(**facts["string"]) == read_string(STEEL_G3)
-    assert (facts["modes"], facts["preset_rate_hz"], facts["rate_hz"]) == (30, 44_100, 44_100)
+    assert (facts["modes"], facts["preset_rate_hz"], facts["settings"]["rate_hz"]) == (30, 44_100, 44_100)
     assert "string tension n" in run("info", first).out
     assert run(AGAIN).status == 0
     assert again.read_bytes() == first.read_bytes()

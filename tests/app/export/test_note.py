@@ -183,7 +183,7 @@ def test_where_an_export_fails_what_was_there_stays(plucked, tmp_path, monkeypat
         ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
         ({"bits": "8"}, "16, 24, 32f"),
         ({"rate_hz": 999}, "1000 … 384000"),
-        ({"fade_out_s": -1}, "negative"),
+        ({"fade_out_s": -1}, "fade_out_s must lie in 0 … 600"),
         ({"file": "b.flac", "bits": "32f"}, r"b\.flac: FLAC has no floating point"),
         ({"file": "b.flac", "rate_hz": 96_001}, r"b\.flac: FLAC has .*rate of 96001 Hz"),
     ],
@@ -322,7 +322,7 @@ def test_each_model_has_its_files_and_its_level_is_matched_where_it_is_chosen(jo
     for source in compared.SOURCES:
         first, again = job.file / table[0][f"{source}_file"], tmp_path / "again.wav"
         recipe = read_recipe(first)
-        assert recipe.level_match == match
+        assert recipe.settings.level_match == match
         sound = recipe.sound(job.models.lines[0][0].preset, first)  # type: ignore[arg-type]
         export_sound(sound, again, recipe.source, recipe.settings)
         assert first.read_bytes() == again.read_bytes()

@@ -128,7 +128,7 @@ def test_flac_is_chosen_in_the_list_or_by_the_ending_and_remembered(qtbot, made,
     assert (form.currentData(), edit.text()) == ("flac 24", str(folder / "mine.flac")), "it has no floating point"
     run(qtbot, dialog, "Saved")
     assert soundfile.info(folder / "mine.flac").subtype == "PCM_24"
-    assert read_recipe(folder / "mine.flac").bits == "24"
+    assert read_recipe(folder / "mine.flac").settings.bits == "24"
     assert made(dialog.choices()[0].model_dump()).note.file.edit.text().endswith("medium.flac")
     choose(form, "wav 16")
     assert edit.text() == str(folder / "mine.wav"), "a name that was given keeps its stem"
@@ -142,7 +142,7 @@ def test_both_become_two_files_which_are_named_before(qtbot, made, folder):
     assert names_in(folder) == names
     with soundfile.SoundFile(folder / names[0]) as file:
         recipe = json.loads(file.comment)
-        assert (file.channels, recipe["listen_right"], recipe["pickup"]) == (2, 0.7, "velocity")
+        assert (file.channels, recipe["ear"]["points"][1], recipe["ear"]["pickup"]) == (2, 0.7, "velocity")
     dialog.note.file.edit.clear()
     QTest.keyClicks(dialog.note.file.edit, "guitar v1.2")  # without its suffix
     assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2 model.wav", "guitar v1.2 truth.wav"]
@@ -205,15 +205,15 @@ def test_the_instrument_is_in_the_file_unless_the_string_alone_is(qtbot, made, f
     assert (page.through_words.text(), page.through_words.objectName()) == (words, "")
     run(qtbot, dialog, "Saved")
     path = folder / "Classical guitar B3 hard.wav"
-    struck, heard = read_recipe(path).struck, path.read_bytes()
-    assert struck is not None and (struck.instrument, struck.key) == (GUITAR.name, 59)
+    recipe, heard = read_recipe(path), path.read_bytes()
+    assert recipe.event is not None and (recipe.instrument, recipe.event.key) == (GUITAR.name, 59)
     assert soundfile.info(path).channels == 2
     page.through.setChecked(False)
     assert page.through_words.text() == "The string alone, without Classical guitar"
     run(qtbot, dialog, "Rendering")
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
-    assert read_recipe(path).struck is None
+    assert read_recipe(path).event is None
     again = made(dialog.choices()[0].model_dump(), played=GUITAR)
     assert again.note.through.isChecked(), "the audible sound is offered first"
 
