@@ -12,21 +12,18 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.rendering.note_sound import NoteSound
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.take import SOURCES, WINDOW_PERIODS, Listened, Sounding
 from engine.compare.relative import ErrorWindows
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
-
-if TYPE_CHECKING:
-    from app.rendering.note_sound import NoteSound
-    from engine.resonators.drum import DrumModes
-    from engine.resonators.surface import Surface
+from engine.resonators.drum import DrumModes
+from engine.resonators.surface import Surface
 
 MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points of its grid
 GRID = 57  # points of a picture along the longer side; odd: one is the centre

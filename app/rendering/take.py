@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,16 @@ from engine.presets import PresetInfo
 from engine.sources import StringSource
 from engine.values.ear import Ear
 
-if TYPE_CHECKING:
-    from app.rendering.blow import ModalMotion
-
 SOURCES = ("model", "truth")
 WINDOW_PERIODS = 2.0  # of the fundamental, in which errors are measured: shorter windows would show its phase
 _TINY = 1e-6  # of a frame: tolerance for rounding
+
+
+class Motion(Protocol):
+    """The motion of one source, growing at its end."""
+
+    @property
+    def ready_frames(self) -> int: ...
 
 
 class FrameSeries:
@@ -128,7 +132,7 @@ class Sounding(ABC):
     frames: int
     frames_hz: float
     error_course: ErrorWindows
-    motions: Mapping[str, Pictures | ModalMotion]
+    motions: Mapping[str, Motion]
     model_ends_s: float | None = None
 
     @abstractmethod
