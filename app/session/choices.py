@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
@@ -14,41 +14,23 @@ from app.instruments.instrument import Instrument, Pickup
 from app.session.monitor import Monitor
 from app.session.pickup import POINTS, TURNED, turned_pickup, with_pickup
 from app.shared.parameters import OF_CHOICES
-from app.shared.value import Value
 from app.shared.vocabulary import Face
-from engine.pluck import Pluck, Shape
+from engine.pluck import Pluck
 from engine.schema import explained
 from engine.values.ear import Ear
 
+PLUCK = tuple(field.name for field in fields(Pluck))
 HIGHEST_MODE = 9_999  # of any grid that a preset may have
 
 
-class ShownString(Value):
-    """The string that is shown and how it is plucked: of the latest note, or as drawn.
-
-    Attributes:
-        string: for a preset of many strings; None: the preset's own.
-        position, width: as fractions of the string's length.
-        amplitude_mm: in mm.
-    """
-
-    string: String | None = None
-    position: float = parameter("position")
-    amplitude_mm: float = parameter("amplitude_mm")
-    shape: Shape = "gaussian"
-    width: float = parameter("width")
-
-    @property
-    def pluck(self) -> Pluck:
-        return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
-
-
-class Choices(Monitor, ShownString):
+class Choices(Monitor):
     """The choices that are restored at the next start.
 
     Attributes:
         instrument: what is there to be played, even if it is not; None: there is none.
         single: the preset whose string is played instead, at places along it; None: the instrument is played.
+        string: that is shown, of the latest note, for a preset of many strings; None: the preset's own.
+        pluck: as it is shown, of the latest note or as drawn.
         string_pickup: where a single string is heard; an instrument has its own pick-up.
         right: the right listening point that stereo gives to a pick-up in mono.
         solo: above 0: this mode is heard alone.
@@ -59,6 +41,8 @@ class Choices(Monitor, ShownString):
 
     instrument: Instrument | None = None
     single: str | None = ""
+    string: String | None = None
+    pluck: Pluck = Pluck()
     string_pickup: Pickup = Pickup()
     right: float = parameter("listen_right")
     solo: int = Field(0, ge=0, le=HIGHEST_MODE)
@@ -123,6 +107,10 @@ class Choices(Monitor, ShownString):
         """The right listening point; in mono the one that stereo would have."""
         return self.pickup.points[1] if self.stereo else self.right
 
+    def value(self, name: str) -> Any:
+        """A value by a name of OBSERVED, or of a parameter of the choices."""
+        return getattr(self.pluck if name in PLUCK else self, name)
+
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """Copy these choices with other values: the one way to change them.
 
@@ -131,13 +119,13 @@ class Choices(Monitor, ShownString):
 
         Args:
             changes: fields. Also `preset`, the name of one whose single string is played from now on, and
-                `played`, an instrument that is. Also TURNED, of the pick-up of what is played then.
+                `played`, an instrument that is. Also PLUCK, and TURNED of the pick-up of what is played then.
 
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the instrument cannot be heard so.
         """
-        turns = {name: value for name, value in changes.items() if name in TURNED}
-        changes = {name: value for name, value in changes.items() if name not in TURNED}
+        plucked, turns = ({name: changes[name] for name in names if name in changes} for names in (PLUCK, TURNED))
+        changes = {name: value for name, value in changes.items() if name not in (*PLUCK, *TURNED)}
         if "played" in changes:
             changes |= {"instrument": changes.pop("played"), "single": None}
         if "preset" in changes:
@@ -153,6 +141,8 @@ class Choices(Monitor, ShownString):
             choices = choices.model_copy(update={"string": None})
         if self.plays_instrument and not choices.plays_instrument and "string_pickup" not in changes:
             choices = choices.model_copy(update={"string_pickup": self.pickup})
+        if plucked:
+            choices = choices.model_copy(update={"pluck": choices.pluck.moved(**plucked)})
         return choices._turned(turns) if turns else choices
 
     def _turned(self, turns: Mapping[str, Any]) -> Choices:
@@ -164,7 +154,7 @@ class Choices(Monitor, ShownString):
         return self.model_copy(update={"instrument": with_pickup(self.played, pickup), "right": right})
 
 
-OBSERVED = (*Choices.model_fields, "preset", "ear")  # names of what may change
+OBSERVED = (*Choices.model_fields, "preset", "ear", *PLUCK)  # names of what may change
 
 
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
@@ -172,10 +162,12 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
 
     Before there were slots, `heard` named the source itself. In the last version `instrument` had the name `patch`.
     Before there was `single`, `instrument` could be a preset alone: what is `instrument` today was then in `kept`.
-    Still earlier, `keys_play` said if `patch` was played or the string of `preset`. Listening points and pick-up
-    were fields of the choices, those of an instrument that was played too.
+    Still earlier, `keys_play` said if `patch` was played or the string of `preset`. What is the pluck and
+    the pick-up today were fields of the choices, those of an instrument that was played too.
     """
     data = dict(data)
+    if data.keys() & {*PLUCK}:
+        data["pluck"] = {name: data.pop(name) for name in PLUCK if name in data}
     if data.keys() & {*POINTS, "stereo", "pickup"}:
         points = [data.pop(name, OF_CHOICES[name].default) for name in POINTS]
         count, kind = 2 if data.pop("stereo", False) else 1, data.pop("pickup", Pickup().kind)

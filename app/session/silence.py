@@ -20,7 +20,7 @@ AT_ONCE_S = 0.01  # a model that runs away earlier is said to fail at once
 
 def why_silent(choices: Choices, library: Library) -> str:
     """A reason that is known before anything is rendered: from amplitude, volume, presets, points and modes."""
-    if choices.amplitude_mm == 0:
+    if choices.pluck.amplitude_mm == 0:
         return "silent: the amplitude is 0"
     if choices.volume_db <= OF_CHOICES["volume_db"].limits[0]:
         return "silent: the volume is at its minimum"
@@ -79,6 +79,6 @@ def _why_solo_silent(choices: Choices, library: Library) -> str:
     if choices.solo > info.modes:
         return f"silent: mode {choices.solo} is soloed, and this string has {info.modes}"
     amplitudes = np.abs(to_modes(choices.pluck.displacement(info.grid_points), choices.solo))
-    if float(amplitudes[-1]) < 1e-4 * choices.amplitude_mm / 1000:
+    if float(amplitudes[-1]) < 1e-4 * choices.pluck.amplitude_mm / 1000:
         return f"silent: this pluck does not excite mode {choices.solo}, which is soloed"
     return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 
 from app.player.effects import added_words
@@ -62,8 +63,7 @@ def request_of(choices: Choices, library: Library) -> NoteSound | None:
         return None
     others = [library.find(name) for name in dict.fromkeys(map(other_preset, (choices.a, choices.b)))]
     paths = tuple(other.path for other in others if other is not None)
-    subject = subject_of(choices, entry.path)
-    return NoteSound(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)
+    return replace(sound_of(choices, entry.path), speed=choices.speed, others=paths)
 
 
 def through_words(choices: Choices) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 from app.presets.library import Library
@@ -23,7 +22,7 @@ def brought_pluck(choices: Choices, library: Library, name: str) -> Mapping[str,
         return {}
     if before is not None and _training(before.info) == _training(entry.info):
         return {}
-    return asdict(pluck)
+    return {"pluck": pluck}
 
 
 def _training(info: PresetInfo) -> tuple[object, ...]:

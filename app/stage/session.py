@@ -15,20 +15,20 @@ from typing import Any
 
 from psygnal import Signal
 
-from app.session.choices import Choices, ShownString
+from app.session.choices import PLUCK, Choices
 from app.shared.parameters import OF_CHOICES
 from app.stage.stage import Chosen, Event, changed_names, first_stage, next_stage
 from app.stage.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-RECORDED = frozenset({"instrument", "single", "seconds", "string_pickup", "right", *ShownString.model_fields})
+RECORDED = frozenset({"instrument", "single", "seconds", "string_pickup", "right", "string", *PLUCK})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
 
 @dataclass(frozen=True)
 class Step:
-    """The changes of a gesture: fields of `Choices` with their values before and after it."""
+    """The changes of a gesture: names that `Choices.changed` takes, with their values before and after it."""
 
     before: Mapping[str, Any]
     after: Mapping[str, Any]
@@ -178,4 +178,4 @@ class Session:
 
 
 def _values(choices: Choices, fields: Iterable[str]) -> Mapping[str, Any]:
-    return {name: getattr(choices, name) for name in fields}
+    return {name: choices.value(name) for name in fields}

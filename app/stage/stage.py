@@ -238,7 +238,7 @@ def changed_names(before: Stage, after: Stage) -> frozenset[str]:
         return frozenset()
     differs = [name for name in NAMES[len(OBSERVED) :] if getattr(before, name) is not getattr(after, name)]
     if after.choices is not before.choices:
-        differs += [name for name in OBSERVED if getattr(before.choices, name) != getattr(after.choices, name)]
+        differs += [name for name in OBSERVED if before.choices.value(name) != after.choices.value(name)]
     return frozenset(differs)
 
 
@@ -264,8 +264,8 @@ def _begun(stage: Stage, note: Note) -> Stage:
             return _struck(stage, note)
     if note.request is None:
         return stage
-    values = {"string": string_of(note.request.preset)}
-    values |= {} if drawn else asdict(note.request.pluck)  # else the choices have this pluck already
+    values: dict[str, Any] = {"string": string_of(note.request.preset)}
+    values |= {} if drawn else {"pluck": note.request.pluck}  # else the choices have it already
     return replace(stage, choices=stage.choices.changed(values))
 
 
@@ -323,7 +323,7 @@ def _with_own_string(stage: Stage, before: Instrument | None, asked: Collection[
     with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
         if (string := stage.shown_string(instrument)) is not None:
             own = asdict(on_string(string, instrument.pluck.pluck(choices.velocity)))
-            values = {name: value for name, value in own.items() if name not in asked}
+            values = {name: value for name, value in own.items() if not {name, "pluck"} & {*asked}}
             values |= {"string": string.parameters} if takes_string else {}
             return replace(stage, choices=choices.changed(values))
     return stage

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -297,7 +297,7 @@ class Controller(QObject):
         """Choose the pluck in the middle of what the preset was trained on, and pluck."""
         entry = self.performance.entry
         if entry is not None and entry.info.middle_pluck is not None:
-            self.session.update(**asdict(entry.info.middle_pluck))
+            self.session.update(pluck=entry.info.middle_pluck)
             self.pluck()
 
     def _show_trained(self) -> None:

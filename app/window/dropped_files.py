@@ -5,7 +5,7 @@ Another sound is a string or a body.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -127,8 +127,8 @@ def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
     }
     if recipe.event is None:
         fields |= {
-            **asdict(recipe.pluck),
-            "string": None if recipe.string is None else asdict(recipe.string),
+            "pluck": recipe.pluck,
+            "string": recipe.string,
             "string_pickup": Pickup(points=recipe.ear.points, kind=recipe.ear.pickup),
         }
     if recipe.settings.decay_db is None:

@@ -26,7 +26,7 @@ from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerforma
 from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
-PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "instrument"}
+PLUCK_FIELDS = {"preset", "string", "pluck", "instrument"}
 ESCAPE = Qt.Key.Key_Escape
 HEARD_FIELDS = {"ear", *Monitor.model_fields} - {"level_match"}
 
@@ -169,4 +169,4 @@ def _pluck_name(choices: Choices, entry: PresetEntry) -> str:
     if isinstance(choices.played, Instrument):
         pluck = choices.played.pluck
         title, amplitudes_mm = choices.played.name, (pluck.softest_mm, pluck.hardest_mm)
-    return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)
+    return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.pluck.amplitude_mm)

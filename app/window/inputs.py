@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
@@ -91,7 +91,7 @@ class Inputs(QObject):
         pluck, reach = self._session.choices.pluck, self.reach
         if mode == "position":
             pluck = reach.pluck(event.key, event.velocity, pluck)
-            self._chosen.emit(asdict(pluck))
+            self._chosen.emit({"pluck": pluck})
         elif names := self._library.names:
             name = names[(event.key - LOWEST_PLACE) % len(names)]
             self._performance.play_preset(name)
@@ -110,7 +110,7 @@ class Inputs(QObject):
             return
         if (place := place_of(press)) is not None:
             self.play(PluckAt(replace(choices.pluck, position=self.reach.row[place])))
-        elif (amplitude_mm := self.reach.turned(press, choices.amplitude_mm)) is not None:
+        elif (amplitude_mm := self.reach.turned(press, choices.pluck.amplitude_mm)) is not None:
             self._session.update(amplitude_mm=amplitude_mm)
 
     def _press_piano(self, press: KeyPress) -> None:

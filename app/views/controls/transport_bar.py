@@ -99,9 +99,9 @@ class TransportBar(QFrame):
 
     def show_choices(self, choices: Choices) -> None:
         for field, knob in self.knobs.items():
-            knob.set_value(getattr(choices, field))
-        self.knobs["width"].set_barred(NO_WIDTH if choices.shape == "triangular" else "")
-        self._shape.setCurrentIndex(SHAPES.index(choices.shape))
+            knob.set_value(choices.value(field))
+        self.knobs["width"].set_barred(NO_WIDTH if choices.pluck.shape == "triangular" else "")
+        self._shape.setCurrentIndex(SHAPES.index(choices.pluck.shape))
         self._loop.setChecked(choices.loop)
         for field in ("listen", "listen_right"):
             self.knobs[field].set_barred(AT_BRIDGE if choices.pickup.kind == "bridge" else "")

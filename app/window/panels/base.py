@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from app.export.columns import Columns
 from app.presets.library import Library
 from app.rendering import BlowTake, Take
-from app.session.choices import Choices, ShownString
+from app.session.choices import Choices
 from app.session.monitor import Monitor
 from app.session.shown import ShownSource, shown_sources
 from app.session.silence import why_silent
@@ -43,7 +43,8 @@ STAGE_FIELDS = {  # of `Choices`: what a picture above the decks depends on
     "face",
     "preset",
     "volume_db",
-    *ShownString.model_fields,
+    "string",
+    "pluck",
     "ear",
     *Monitor.model_fields,
 }

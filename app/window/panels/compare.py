@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
@@ -142,7 +142,7 @@ class ComparePanel(ComputedPanel):
         """Play the model of a preset on the present pluck, which stays as it is."""
         choices = self.session.choices
         slot = "b" if choices.b == "model" else "a"
-        self.session.update(preset=name, **asdict(choices.pluck), **{slot: "model", "heard": slot})
+        self.session.update(preset=name, pluck=choices.pluck, **{slot: "model", "heard": slot})
         self.pluck_asked.emit()
 
     def _ask_export(self) -> None:
@@ -152,7 +152,9 @@ class ComparePanel(ComputedPanel):
             choices, sounds = self.session.choices, [row.sound for row in rows]
             lines = [(sound, row.figures) for sound, row in zip(sounds, rows, strict=True) if sound is not None]
             words = lines[0][0].words(models_word(len(lines)))
-            name = f"{models_word(len(lines))}, place {choices.position:.2f}, {choices.amplitude_mm:.1f} mm"
+            name = (
+                f"{models_word(len(lines))}, place {choices.pluck.position:.2f}, {choices.pluck.amplitude_mm:.1f} mm"
+            )
             self.export_asked.emit(ComparedModels(words, name, lines))
 
     def _row(self, entry: PresetEntry) -> tuple[ComparedRow, bool]:

@@ -79,7 +79,8 @@ class ErrorPlanePanel(ComputedPanel):
     def _draw_moment(self, moment: Moment) -> None:
         super()._draw_moment(moment)
         if self._moved:
-            self.map.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
+            pluck = self.session.choices.pluck
+            self.map.set_pluck(pluck.position, pluck.amplitude_mm)
             self._moved = False
 
     def _wanted(self) -> object:

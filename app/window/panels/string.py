@@ -15,7 +15,7 @@ from app.presets.library import Library, PresetEntry
 from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
-from app.session.choices import Choices, ShownString
+from app.session.choices import Choices
 from app.session.silence import why_difference_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
@@ -25,13 +25,13 @@ from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from app.window.panels.base import Moment, StagePanel
 from engine.bounds import WIDTH_RANGE
-from engine.pluck import SHAPES
+from engine.pluck import SHAPES, Pluck
 from engine.presets import outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
-PLUCK_FIELDS = {"preset", *ShownString.model_fields}
+PLUCK_FIELDS = {"preset", "string", "pluck"}
 
 
 class StringPanel(StagePanel):
@@ -96,14 +96,14 @@ class StringPanel(StagePanel):
             self.view.set_warning(*self._warning())
 
     def _show_pluck(self) -> None:
-        choices = self.session.choices
+        choices, pluck = self.session.choices, self.session.choices.pluck
         entry = self.library.find(choices.preset)
-        shape_mm = choices.pluck.displacement(SHAPE_POINTS) * MM
-        self.view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
+        shape_mm = pluck.displacement(SHAPE_POINTS) * MM
+        self.view.set_pluck(ShownPluck(pluck.position, pluck.amplitude_mm, shape_mm, _label(pluck)))
         trained = TrainedPlucks()
         if entry is not None:
             info = info_of(choices, entry)
-            trained = TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(choices.pluck))
+            trained = TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(pluck))
         self.view.set_trained(trained)
 
     def _warning(self) -> tuple[str, bool]:
@@ -125,18 +125,17 @@ class StringPanel(StagePanel):
     # Gestures
 
     def _reset_pluck(self) -> None:
-        default = Choices()
-        self.session.update(position=default.position, amplitude_mm=default.amplitude_mm, width=default.width)
+        self.session.update(pluck=Pluck(shape=self.session.choices.pluck.shape))
         self.pluck_asked.emit()
 
     def _step_width(self, notches: float) -> None:
-        choices = self.session.choices
-        if choices.shape != "triangular":  # it has no width
-            width = choices.width * WIDTH_STEP**notches
+        pluck = self.session.choices.pluck
+        if pluck.shape != "triangular":  # it has no width
+            width = pluck.width * WIDTH_STEP**notches
             self.session.update(width=min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]))
 
     def _step_shape(self, steps: int) -> None:
-        index = SHAPES.index(self.session.choices.shape)
+        index = SHAPES.index(self.session.choices.pluck.shape)
         self.session.update(shape=SHAPES[(index + steps) % len(SHAPES)])
 
 
@@ -150,6 +149,6 @@ def outside_of_shown(choices: Choices, entry: PresetEntry) -> str:
     return "; ".join(outside_of_string(entry.info, string, choices.pluck))
 
 
-def _label(choices: Choices) -> str:
-    words = shape_word(choices.shape)
-    return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
+def _label(pluck: Pluck) -> str:
+    words = shape_word(pluck.shape)
+    return words if pluck.shape == "triangular" else f"{words} {pluck.width:.3f}"

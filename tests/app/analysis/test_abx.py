@@ -14,6 +14,7 @@ from app.presets.library import list_presets
 from app.session.choices import Choices
 from app.session.slots import sound_of
 from engine.kernels.limiter import CEILING
+from engine.pluck import Pluck
 from engine.values.string import StringParameters
 
 RATE_HZ = 8000
@@ -81,7 +82,7 @@ def test_results_come_back_the_same_and_none_is_overwritten(tmp_path):
 def test_the_chosen_pluck_and_string_are_kept(preset_folder):
     entry = list_presets(preset_folder)[0][0]
     for stereo, chosen in ((False, None), (True, StringParameters())):
-        choices = Choices(single=entry.name, position=0.3, string=chosen, stereo=stereo)
+        choices = Choices(single=entry.name, pluck=Pluck(0.3), string=chosen).changed({"stereo": stereo})
         pluck = material_of(sound_of(choices, entry.path), "", 0.0).pluck
         assert (pluck["position"], pluck["string"]) == (0.3, chosen and asdict(chosen))
         assert ("listen_right" in pluck) == stereo

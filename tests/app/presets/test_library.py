@@ -93,7 +93,7 @@ def test_an_export_restores_its_choices(library, preset_folder, tmp_path, ending
     (tmp_path / f"A.{ending}").rename(tmp_path / f"b.{ending}")
     dropped = receive(tmp_path / f"b.{ending}", library)
     assert dropped.notice == ""
-    pluck = {"position": 0.61, "amplitude_mm": 2.5, "shape": "raised_cosine", "width": 0.2, "string": None}
+    pluck = {"pluck": sound.pluck, "string": None}
     ear = {"string_pickup": Pickup(points=(0.22,)), "solo": 0}
     slots = {"single": "second", "seconds": 0.7, "a": "model", "b": "truth", "heard": "b"}
     assert dropped.choices == {**pluck, **ear, **slots}

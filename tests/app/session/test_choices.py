@@ -54,7 +54,7 @@ def test_gestures_are_clamped_and_slots_are_switched_there_and_back():
     session.move_pluck(-3, 400)
     session.move_listening_point(7)
     choices = session.choices
-    assert (choices.position, choices.amplitude_mm, choices.listen) == (0.02, 20.0, 1)
+    assert (choices.pluck.position, choices.pluck.amplitude_mm, choices.listen) == (0.02, 20.0, 1)
     for heard, source in (("a", "preset:other one"), ("b", "difference"), ("a", "preset:other one")):
         assert (session.choices.heard, session.choices.source_heard) == (heard, source)
         session.switch_source()
@@ -90,7 +90,7 @@ def test_choices_from_before_the_instrument_are_understood(plays, preset):
     instrument = played_instrument(0.2)
     old = {"preset": preset, "patch": instrument.model_dump(), "string": asdict(STRING), "position": 0.4}
     choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
-    assert (choices.instrument, choices.position) == (instrument, 0.4)
+    assert (choices.instrument, choices.pluck) == (instrument, Pluck(0.4))
     assert choices.single == (preset if plays == "place" else None)
     assert (choices.string is None) == (preset == "one" and plays != "place"), "it is no string of that preset"
     assert Choices.model_validate({"preset": preset}).single == preset
@@ -189,6 +189,6 @@ def test_every_middle_lies_within_its_training_and_the_others_say_why_there_is_n
     ],
 )
 def test_a_preset_brings_its_pluck_where_the_present_one_is_outside(before, shape, chosen, brings):
-    found = brought_pluck(Choices(single=before, shape=shape), LIBRARY, chosen)
+    found = brought_pluck(Choices(single=before, pluck=Pluck(shape=shape)), LIBRARY, chosen)
     entry = LIBRARY.find(chosen)
-    assert found == (asdict(entry.info.middle_pluck) if brings and entry and entry.info.middle_pluck else {})
+    assert found == ({"pluck": entry.info.middle_pluck} if brings and entry and entry.info.middle_pluck else {})

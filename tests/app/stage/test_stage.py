@@ -11,7 +11,7 @@ from app.instruments.library import SHIPPED, read_instrument
 from app.player.strings import Strings
 from app.playing.note import PluckVoices
 from app.rendering import NoteSound
-from app.session.choices import Choices
+from app.session.choices import OBSERVED, Choices
 from app.shared.parameters import OF_INSTRUMENTS
 from app.stage.session import GATHER_S, RECORDED, Session
 from app.stage.stage import Asked, Begun, Chosen, Parked, Rendered, Turned, first_stage, next_stage
@@ -36,7 +36,7 @@ class Hand:
         values = []
         while self.session.undo_words:
             self.session.undo()
-            values.append(getattr(self.session.choices, field))
+            values.append(self.session.choices.value(field))
         return values
 
 
@@ -107,15 +107,15 @@ def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(hand):
     hand.change(volume_db=-9)
     hand.session.undo()
     assert hand.session.choices == Choices(volume_db=-9, **seen)  # type: ignore[arg-type]
-    assert set(Choices.model_fields) > RECORDED
+    assert set(OBSERVED) > RECORDED
 
 
 def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(hand):
     session = hand.session
 
     def state() -> tuple[float, float, float]:
-        choices = session.choices
-        return choices.width, choices.position, choices.amplitude_mm
+        pluck = session.choices.pluck
+        return pluck.width, pluck.position, pluck.amplitude_mm
 
     session.play(position=0.2, amplitude_mm=6)
     assert not session.undo_words
@@ -194,7 +194,7 @@ def test_an_instrument_has_its_own_string_until_another_is_chosen_with_it():
     low = Strings(HARP).of_key(43)
     assert low is not None
     stage = next_stage(stage, Chosen({"played": HARP, "string": low.parameters, "position": 0.2}))
-    assert (stage.choices.string, stage.choices.position, stage.key) == (low.parameters, 0.2, (43, None))
+    assert (stage.choices.string, stage.choices.pluck.position, stage.key) == (low.parameters, 0.2, (43, None))
 
 
 def test_the_playhead_follows_the_note_of_the_motion_until_it_is_parked():
@@ -202,7 +202,7 @@ def test_the_playhead_follows_the_note_of_the_motion_until_it_is_parked():
     first, second = note(), note(from_s=0.4)
     stage = next_stage(first_stage(Choices(single="one")), Begun(first))
     stage = next_stage(next_stage(stage, Asked(REQUEST)), Rendered(take))
-    assert stage.lead is first and stage.moving and stage.choices.position == 0.3
+    assert stage.lead is first and stage.moving and stage.choices.pluck.position == 0.3
     parked = next_stage(stage, Parked(0.7))
     assert next_stage(parked, Asked(REQUEST)).position_s(0.1) == 0.7 and not parked.audible
     turned = next_stage(parked, Turned(second))

@@ -230,7 +230,7 @@ def test_pick_ups_late_keys_chords_and_single_strings_are_heard_as_they_are_rend
     take(held, 0.1)
     held.wait(lambda: isinstance(late, KeyNote) and late.known)
     held.qtbot.wait(3 * LOOK_MS)
-    assert held.choices.string is None and held.choices.position == 0.3, "a late key is not what is plucked"
+    assert held.choices.string is None and held.choices.pluck.position == 0.3, "a late key is not what is plucked"
     assert_heard_as_rendered(held, "right after a chord")
     play_instrument(held, PLAYED["tanpura_drone"])
     held.wait(lambda: held.choices.string is not None)

@@ -72,7 +72,7 @@ def test_keys_play_pitches_or_places_and_the_window_shows_the_string(guitar):
 def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_preset(guitar):
     guitar.play(52)
     guitar.wait_for_string()
-    shown, other = guitar.choices.string, next(each for each in SHAPES if each != guitar.choices.shape)
+    shown, other = guitar.choices.string, next(each for each in SHAPES if each != guitar.choices.pluck.shape)
     guitar.change(position=0.31, amplitude_mm=1.2, shape=other)
     guitar.keys.begin_recording()
     guitar.pluck()
@@ -254,7 +254,7 @@ def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restore
     guitar.play(52)
     guitar.wait_for_string()
     guitar.change(played=HARP, string=low.parameters, position=0.2, shape=HARP.pluck.shape)
-    assert (guitar.choices.string, guitar.choices.position) == (low.parameters, 0.2)
+    assert (guitar.choices.string, guitar.choices.pluck.position) == (low.parameters, 0.2)
     guitar.wait(lambda: guitar.performance.playable)
     assert guitar.pluck().event.key == 43, "the string that was restored"
 
@@ -268,8 +268,8 @@ def test_notes_of_midi_choose_places_and_presets(backend, guitar, tmp_path):
     backend.play(guitar, "position", NoteOn(HIGHEST_PLACE, 127))
     note = guitar.struck[-1]
     assert (note.event.pluck.position, note.event.pluck.amplitude_mm) == (reach.position[1], reach.amplitude_mm[1])
-    assert guitar.choices.position == before.position, "the window has had no time yet"
-    guitar.wait(lambda: guitar.choices.position == reach.position[1])
+    assert guitar.choices.pluck.position == before.pluck.position, "the window has had no time yet"
+    guitar.wait(lambda: guitar.choices.pluck.position == reach.position[1])
     assert (guitar.choices.string, guitar.choices.plays_instrument) == (before.string, True)
     assert guitar.session.undo_words == undo
     backend.play(guitar, "preset", NoteOn(LOWEST_PLACE + second, 100))
@@ -279,8 +279,8 @@ def test_notes_of_midi_choose_places_and_presets(backend, guitar, tmp_path):
     guitar.change(volume_db=-3.0)  # another choice takes nothing back
     instruments.play(PluckAt(Pluck(0.6, 2.5)))
     assert path_of(guitar.struck[-1].request.preset).stem == "second"
-    guitar.wait(lambda: (guitar.choices.preset, guitar.choices.position) == ("second", 0.6))
-    assert guitar.choices.single == "second" and guitar.choices.amplitude_mm == 2.5
+    guitar.wait(lambda: (guitar.choices.preset, guitar.choices.pluck.position) == ("second", 0.6))
+    assert guitar.choices.single == "second" and guitar.choices.pluck.amplitude_mm == 2.5
     guitar.wait(lambda: all(each.seconds > 0 or each.cut for each in guitar.struck[-2:]))
     assert not guitar.struck[-1].cut and "cannot" not in guitar.window.notices.text
     assert guitar.controller.settings().midi == MidiChoices(port=PADS, notes="preset")

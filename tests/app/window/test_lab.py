@@ -48,7 +48,7 @@ def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one
     lab.wait(lambda: lab.performance.position_s > 0.05)
     knob, at, foot = knobs["width"], QPoint(30, 40), 1 - 30 / view.height()
     lab.drag(knob, at, at - QPoint(0, 5), at - QPoint(0, 10), at - QPoint(0, 15))
-    assert lab.choices.width > plucked.width
+    assert lab.choices.pluck.width > plucked.width
     lab.drag(view, place(view, lab.choices.listen, foot), place(view, 0.7, foot), place(view, 0.8, foot))
     assert lab.choices.listen == pytest.approx(0.8, abs=0.01) == knobs["listen"].value
     undone = [lab.key(KEY.Key_Z, CONTROL) or lab.choices for _ in range(3)]
@@ -84,7 +84,7 @@ def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(
         assert lab.choices.preset == lab.performance.entry.name == preset  # type: ignore[union-attr]
     lab.wait_for_take()
     plucks, words = list[float](), lab.session.undo_words
-    lab.session.changed.connect(lambda names: names & {"note"} and plucks.append(lab.choices.position))
+    lab.session.changed.connect(lambda names: names & {"note"} and plucks.append(lab.choices.pluck.position))
     for count, key in enumerate((KEY.Key_A, KEY.Key_Semicolon, KEY.Key_A, KEY.Key_L), 1):
         before = len(lab.struck)
         lab.key(key)

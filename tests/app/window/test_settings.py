@@ -22,6 +22,7 @@ from app.views.file_places import FileChoices
 from app.views.look import Look
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
+from engine.pluck import Pluck
 from tests.app.gestures import reported
 
 
@@ -35,7 +36,7 @@ def test_settings_survive_a_round_trip(tmp_path, monkeypatch):
     monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(path))
     assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
     settings = Settings(
-        choices=Choices(position=0.7, heard="b", b="difference", loop=True),
+        choices=Choices(pluck=Pluck(0.7), heard="b", b="difference", loop=True),
         export=ExportChoices(format="flac 16", rate_hz=0),
         sampled=SampledChoices(form="sf2", keys=(40, 76), layers=8, dry=True),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
@@ -53,7 +54,7 @@ def test_settings_survive_a_round_trip(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ('{"version": 1, "choices": {"position": 0.6}}', Settings(choices=Choices(position=0.6))),  # without MIDI
+        ('{"version": 1, "choices": {"position": 0.6}}', Settings(choices=Choices(pluck=Pluck(0.6)))),  # without MIDI
         ('{"choices": {"heard": "truth"}}', Settings(choices=Choices(heard="b"))),  # from before the slots
         ('{"sampled": {"folder": "/music"}, "abx": {"folder": ""}}', Settings()),  # from before `files`
         ('{"look": {"face": "light"}}', Settings(look=Look(theme="light"))),  # of version 0.1
@@ -68,7 +69,7 @@ def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path, text, exp
     [
         ("", "the file"),
         ("{", "the file"),
-        ('{"choices": {"position": 9}}', "choices.position"),
+        ('{"choices": {"position": 9}}', "choices.pluck: position"),
         ('{"colour": 1}', "colour"),
         ('{"sampled": {"layers": 1e30}}', "sampled.layers"),
         ('{"version": 2}', "version"),
@@ -104,7 +105,7 @@ def test_a_wrong_field_loses_no_more_than_itself(tmp_path):
     )
     sound, export = SoundChoice(rate_hz=96_000), ExportChoices(format="wav 32f")
     assert settings == Settings(choices=Choices(listen=0.2), sound=sound, export=export)
-    assert "choices.position" in notice and "settings.broken.json" in notice
+    assert "choices.pluck: position" in notice and "settings.broken.json" in notice
     instrument = json.loads((INSTRUMENTS / "classical_guitar.json").read_text())
     kept = {"volume_db": -12.0, "instrument": instrument, "string": {"length_m": 0.65}}
     for extra, is_there in (({}, True), ({"kind": "set", "extra": 1}, False)):
@@ -128,7 +129,7 @@ def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(qtbot, tmp_p
         qtbot.waitUntil(lambda: not background.busy)
 
     def place(position: float) -> Settings:
-        return Settings(choices=Choices(position=position))
+        return Settings(choices=Choices(pluck=Pluck(position)))
 
     path, folder = tmp_path / "settings.json", tmp_path / "folder"
     keeper, now = saver(path), place(0.41)
@@ -150,7 +151,7 @@ def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(qtbot, tmp_p
     qtbot.waitUntil(lambda: len(failed) == 1 and "cannot be written" in failed[0])  # once
     folder.unlink()
     keeper.close()
-    assert load_settings(folder / "settings.json")[0].choices.position == 0.43
+    assert load_settings(folder / "settings.json")[0].choices.pluck.position == 0.43
 
 
 KILLED = """
@@ -160,10 +161,11 @@ from PySide6.QtCore import QCoreApplication, QTimer
 from app.session.choices import Choices
 from app.window.remembering import SettingsSaver
 from app.window.settings import Settings
+from engine.pluck import Pluck
 application = QCoreApplication([])
 box = [Settings()]
 keeper = SettingsSaver(Path(sys.argv[1]), box[0], lambda: box[0], application)
-QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(position=0.41))))
+QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(pluck=Pluck(0.41)))))
 looks = QTimer(interval=100)
 looks.timeout.connect(keeper.look)
 looks.start()
@@ -179,4 +181,4 @@ def test_a_kill_loses_nothing_that_rested(tmp_path):
         while not path.exists() and time.monotonic() < end_s:
             time.sleep(0.05)
         os.kill(process.pid, signal.SIGKILL)
-    assert load_settings(path)[0].choices.position == 0.41
+    assert load_settings(path)[0].choices.pluck.position == 0.41

@@ -27,6 +27,7 @@ from app.session.choices import Choices
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
 from app.window.exports import heard_note
+from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from tests.app.places import places_in
 from tests.app.questions import answered
@@ -89,7 +90,7 @@ def note(library: Library) -> Callable[..., HeardNote | None]:
     """A note of `small`, as it is heard with these choices."""
 
     def made(**heard: Any) -> HeardNote | None:
-        choices = Choices(single="small", position=0.4).changed(heard)
+        choices = Choices(single="small", pluck=Pluck(0.4)).changed(heard)
         struck = Struck(choices.played, NoteOn(59, 100)) if choices.played else None  # type: ignore[arg-type]
         return heard_note(choices, library, struck)
 

@@ -129,18 +129,18 @@ def test_the_map_of_errors_is_computed_once_and_plucked_in(asked, lab):
     plane.hovered.emit(math.nan, math.nan)  # the pointer has left
     assert plane.cursor is None
     lab.qtbot.mouseClick(plane.viewport(), LEFT, pos=point(0.6, 8.0))
-    assert lab.choices.position == pytest.approx(0.6, abs=0.01) == round(lab.choices.position, 3)
-    assert lab.choices.amplitude_mm == pytest.approx(8, rel=0.05)
+    assert lab.choices.pluck.position == pytest.approx(0.6, abs=0.01) == round(lab.choices.pluck.position, 3)
+    assert lab.choices.pluck.amplitude_mm == pytest.approx(8, rel=0.05)
     lab.wait(lambda: lab.performance.playing)
-    here = [lab.choices.position, math.log10(lab.choices.amplitude_mm)]
+    here = [lab.choices.pluck.position, math.log10(lab.choices.pluck.amplitude_mm)]
     lab.wait(lambda: points(plane, PLUCK)[0].tolist() == pytest.approx(here))
     lab.key(KEY.Key_Escape, on=plane)
-    before, (x, y) = lab.choices, error_plane.nearest_cell(lab.choices.position, lab.choices.amplitude_mm)
+    before, (x, y) = lab.choices, error_plane.nearest_cell(lab.choices.pluck.position, lab.choices.pluck.amplitude_mm)
     for key in (KEY.Key_Left, KEY.Key_Down, KEY.Key_Down):
         lab.key(key, on=plane)
     assert plane.cursor == (POSITIONS[x - 1], AMPLITUDES_MM[y - 2]) and lab.choices == before
     lab.key(KEY.Key_Return, on=plane)
-    assert lab.choices.position == pytest.approx(POSITIONS[x - 1], abs=5e-4)
+    assert lab.choices.pluck.position == pytest.approx(POSITIONS[x - 1], abs=5e-4)
     lab.change(shape="triangular")
     assert "a click plucks there" not in panel.words
     computed(2)
