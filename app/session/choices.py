@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
@@ -15,6 +15,7 @@ from app.session.monitor import Monitor
 from app.session.pickup import POINTS, TURNED, turned_pickup, with_pickup
 from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import Face
+from engine import bounds
 from engine.pluck import Pluck
 from engine.schema import explained
 from engine.values.ear import Ear
@@ -132,6 +133,10 @@ class Choices(Monitor):
             changes["single"] = changes.pop("preset")
         if {"a", "b", "heard"} & changes.keys():
             changes.setdefault("difference", False)
+        if plucked:
+            changes["pluck"] = asdict(changes.get("pluck", self.pluck)) | plucked
+        if unknown := changes.keys() - Choices.model_fields.keys():
+            raise ValueError(f"unknown field {bounds.brief(unknown.pop())}")
         try:  # `a`, `b` and `single` tell them from old choices
             checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:
@@ -141,17 +146,16 @@ class Choices(Monitor):
             choices = choices.model_copy(update={"string": None})
         if self.plays_instrument and not choices.plays_instrument and "string_pickup" not in changes:
             choices = choices.model_copy(update={"string_pickup": self.pickup})
-        if plucked:
-            choices = choices.model_copy(update={"pluck": choices.pluck.moved(**plucked)})
         return choices._turned(turns) if turns else choices
 
     def _turned(self, turns: Mapping[str, Any]) -> Choices:
         """The choices with TURNED of the pick-up of what is played. Raise ValueError as `changed`."""
         right = turns.get("listen_right", self.listen_right)
         pickup = turned_pickup(self.pickup, {"listen_right": right, **turns})
+        values: dict[str, Any] = {"right": right} if {"listen_right", "stereo"} & turns.keys() else {}
         if self.played is None:
-            return self.model_copy(update={"string_pickup": pickup, "right": right})
-        return self.model_copy(update={"instrument": with_pickup(self.played, pickup), "right": right})
+            return self.model_copy(update={"string_pickup": pickup, **values})
+        return self.model_copy(update={"instrument": with_pickup(self.played, pickup), **values})
 
 
 OBSERVED = (*Choices.model_fields, "preset", "ear", *PLUCK)  # names of what may change

@@ -15,7 +15,6 @@ SEVERAL = "several settings"
 CHOICES = {  # fields of `Choices`
     **{name: OF_CHOICES[name].name for name in ("position", "amplitude_mm", "width", "seconds")},
     "shape": "pluck shape",
-    "right": OF_CHOICES["listen_right"].name,
     "string": "string",
 }
 INSTRUMENT = {  # fields that are no parameters, by their path; the rest are named by the last part of theirs
@@ -47,6 +46,8 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         return _instrument_words(before["instrument"], after["instrument"])
     pickups = [values["string_pickup"] for values in (before, after) if "string_pickup" in changed]
     heard = [field_words(f"pickup.{path}") for path in _changed(*pickups)] if pickups else []
+    if changed == ["right"]:  # which is not heard yet
+        heard = [OF_CHOICES["listen_right"].name]
     return _join_words([*(words for name, words in CHOICES.items() if name in changed), *heard])
 
 

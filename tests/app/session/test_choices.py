@@ -37,6 +37,7 @@ BAD = {
     "shape": "saw",
     "heard": "both",
     "colour": "red",
+    "pickup": "velocity",  # of earlier versions
 }
 
 

@@ -150,6 +150,8 @@ def test_what_is_played_and_where_it_is_heard_are_steps(hand, guitar):
         hand.change(1, **change)
         states.append(pickup_of(session))
         words.append(session.undo_words)
+    hand.change(listen=0.12)  # at once: the same step
+    states[-1] = pickup_of(session)
     assert words == ["pick-up", "stereo", "listening point"]
     for there, act in ((states[-2::-1], session.undo), (states[1:], session.redo), (states[-2::-1], session.undo)):
         for state in there:
