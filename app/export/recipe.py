@@ -107,7 +107,16 @@ def source_words(source: str, difference_gain_db: float) -> str:
     return f"the difference of model and truth at {difference_gain_db:+g} dB"
 
 
-def instrument_digest(instrument: Instrument) -> str:
+def fields_of(sound: NoteSound) -> dict[str, Any]:
+    """The fields of `SoundRecipe` that say what sounds, without preset and string; with all modes."""
+    fields = {"pluck": sound.pluck, "ear": replace(sound.ear, solo=0), "seconds": sound.seconds}
+    if (struck := sound.struck) is None:
+        return fields
+    digest = _digest(struck.instrument)
+    return {**fields, "instrument": struck.instrument.name, "instrument_sha256": digest, "event": struck.event}
+
+
+def _digest(instrument: Instrument) -> str:
     """The SHA-256 of an instrument's content and of the file of its body."""
     content = instrument.model_dump_json() + body_digest(instrument.body.name)
     return hashlib.sha256(content.encode()).hexdigest()
@@ -146,19 +155,13 @@ class SoundRecipe(Origin):
         Raises:
             PresetError: the preset's file cannot be read any more.
         """
-        info, struck = preset.info, sound.struck
-        gain_db = settings.difference_gain_db if source == DIFFERENCE else 0.0
-        made = cls.of_preset(preset)
-        if struck is not None:
-            digest = instrument_digest(struck.instrument)
-            made |= {"instrument": struck.instrument.name, "instrument_sha256": digest, "event": struck.event}
-        elif info.family is not None:
-            made |= {"string": info.string, "modes": info.modes}
+        info, gain_db = preset.info, settings.difference_gain_db if source == DIFFERENCE else 0.0
+        many = info.family is not None and sound.struck is None
         return cls(
-            **made,
-            pluck=sound.pluck,
-            ear=replace(sound.ear, solo=0),
-            seconds=sound.seconds,
+            **cls.of_preset(preset),
+            **fields_of(sound),
+            string=info.string if many else None,
+            modes=info.modes if many else None,
             source=source,
             settings=replace(settings, rate_hz=settings.rate_hz or info.rate_hz, difference_gain_db=gain_db),
             preset_rate_hz=info.rate_hz,
@@ -179,7 +182,7 @@ class SoundRecipe(Origin):
         """
         for entry in list_instruments()[0]:
             if entry.instrument.name == self.instrument:
-                return entry.instrument, instrument_digest(entry.instrument) == self.instrument_sha256
+                return entry.instrument, _digest(entry.instrument) == self.instrument_sha256
         raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
 
     def sound(self, preset: Path, file: Path) -> NoteSound:

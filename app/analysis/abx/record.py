@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,7 +10,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
-from app.export.recipe import instrument_digest
+from app.export.recipe import fields_of
 from app.rendering.note_sound import NoteSound
 from app.rendering.subject import path_of, string_of
 from app.shared.version import program_version
@@ -48,7 +47,7 @@ class AbxRecord(BaseModel):
 
     Attributes:
         words: what is compared, for people.
-        pluck: its fields and where it is heard, by name; of a key of an instrument those of `NoteOn`.
+        pluck: fields of `SoundRecipe`.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
         remark: why the test is not complete, if that is known.
@@ -104,16 +103,10 @@ def material_of(sound: NoteSound, words: str, volume_db: float) -> AbxRecord:
     Raises:
         PresetError: its preset's file cannot be read.
     """
-    path, string, points = path_of(sound.preset), string_of(sound.preset), sound.ear.points
+    path = path_of(sound.preset)
     name, digest = name_text(path.stem), preset_digest(path)
     a, b = (Candidate(label=label, preset=name, preset_sha256=digest) for label in ("Model", "Truth"))
-    pluck: dict[str, object] = {"seconds": sound.seconds}
-    if sound.struck is not None:
-        instrument, event = sound.struck.instrument, sound.struck.event
-        pluck |= {"instrument": instrument.name, "instrument_sha256": instrument_digest(instrument), **asdict(event)}
-    else:
-        pluck |= {"string": string and asdict(string), **asdict(sound.pluck), "pickup": sound.ear.pickup}
-        pluck |= dict(zip(("listen", "listen_right"), points, strict=False))
+    pluck = {"string": None if sound.struck else string_of(sound.preset), **fields_of(sound)}
     return AbxRecord(a=a, b=b, words=words, pluck=pluck, through={"volume_db": volume_db}, planned_trials=1, seed=0)
 
 
