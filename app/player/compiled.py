@@ -27,7 +27,8 @@ from app.player.events import (
     parameter_set,
 )
 from app.player.strings import StringKeys
-from app.player.table import programs_of, strings_of, table_of, wheeled
+from app.player.table import programs_of, strings_of, table_of, wheel_goal, wheeled
+from app.shared.value import Value
 from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
@@ -37,6 +38,8 @@ from engine.voices import CompiledPlayer
 from engine.voices.player import Ringing, Table
 
 STOP_S = 0.03
+FOLLOWED = of.PLAYED[: of.POINT]  # values of an instrument that strings follow by an event each
+BESIDE_STRINGS = ("macros", "amp", "room")  # of which the player's table has nothing
 
 
 class InstrumentPlayer:
@@ -208,6 +211,22 @@ class InstrumentPlayer:
             self.keys, self.table = keys, table
             self.compiled.take(table, frame)
 
+    def turn(self, keys: StringKeys | DrumKeys, frame: int = 0) -> bool:
+        """Play keys of the same instrument with turned knobs by an event each, as a plug-in does, if possible.
+
+        False: they need another table, see `take`.
+        """
+        with self._lock:
+            values = (
+                None if self.of_drums or keys.ear != self.ear else turned_values(keys.instrument, self.instrument)
+            )
+            if values is None:
+                return False
+            self.keys = keys
+            for id, value in values.items():
+                self.compiled.give(of.PARAMETER, key=FOLLOWED.index(id), value=value, frame=frame)
+            return True
+
     # Events
 
     def silent(self, key: int) -> bool:
@@ -227,7 +246,9 @@ class InstrumentPlayer:
             ValueError: a key has no possible string.
         """
         if isinstance(event, InstrumentTurned):
-            self.take(self.keys_of(event.instrument), frame=frame)
+            keys = self.keys_of(event.instrument)
+            if not self.turn(keys, frame):
+                self.take(keys, frame=frame)
             return 0
         if isinstance(event, PluckAt):
             return 0
@@ -299,6 +320,26 @@ class InstrumentPlayer:
             key_string = keys.of_key(note.key, note.string if note.string >= 0 else None)
             return 0.0 if key_string is None else 12 * math.log2(key_string.parameters.length_m / note.length_m)
         return 0.0
+
+
+def turned_values(instrument: Instrument, than: Instrument) -> dict[str, float] | None:
+    """The values, by their ids, in which an instrument's strings differ from another's, as the player follows them.
+
+    None: they differ in more, or in how far the modulation wheel turns one.
+    """
+    values: dict[str, float] = {}
+    for name in Instrument.model_fields:
+        part, other = getattr(instrument, name), getattr(than, name)
+        if part == other or name in BESIDE_STRINGS:
+            continue
+        fields = vars(part) if isinstance(part, Value) and type(part) is type(other) else {}
+        ids = [f"{name}.{field}" for field, value in fields.items() if value != getattr(other, field)] or [name]
+        if not set(ids) <= set(FOLLOWED):
+            return None
+        if instrument.mod_wheel.partition(".")[0] == name and wheel_goal(instrument) != wheel_goal(than):
+            return None
+        values |= {id: instrument.value(id) for id in ids}
+    return values
 
 
 def is_another(instrument: Instrument, than: Instrument) -> bool:

@@ -18,6 +18,7 @@ from app.player.compiled import InstrumentPlayer, is_another
 from app.player.drum_keys import DrumKeys
 from app.player.effects import body_problem, effects_of
 from app.player.events import SWITCHES, ControlChange, Event, InstrumentTurned, NoteOff, NoteOn, moves_effects
+from app.player.strings import StringKeys
 from app.playing.key_note import AS_THEY_ARE, KeyNote, drop
 from app.playing.playback import Due
 from app.playing.recorder import EventRecorder
@@ -317,6 +318,8 @@ class Keys:
             keys = player.keys_of(wanted.instrument, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
+            if nearly and self._turn(player, wanted, keys):
+                return
             table = player.table_of(keys)
         except ValueError as error:
             with self._lock:
@@ -330,6 +333,20 @@ class Keys:
                 player.take(keys, table)
                 if is_outdated:
                     self.recorder.take(_turned_event(player))
+
+    def _turn(self, player: InstrumentPlayer, wanted: _Wanted, keys: StringKeys | DrumKeys) -> bool:
+        """Turn the knobs of what is played. False: keys of what is wanted need another table."""
+        with self._lock:
+            if wanted is not self._wanted or player is not self.player:
+                return True
+            played, completed = _Wanted(player.instrument, player.ear), self._completed
+            if not player.turn(keys):
+                return False
+            if completed is not None and (completed.instrument, completed.ear) == (played.instrument, played.ear):
+                self._completed = wanted  # nothing is left for the background
+            if wanted.instrument != played.instrument:
+                self.recorder.take(_turned_event(player))
+            return True
 
     def _compute_drums(self, keys: DrumKeys) -> bool:
         """Compute an instrument's drums, which takes up to seconds; False: another instrument is wanted by now."""

@@ -211,18 +211,24 @@ def test_the_wheel_turns_whatever_it_may(instrument):
         assert field == "damping.mute" or "technique" in field or heard(field, 0) != heard(field, 127), field
 
 
-def test_a_parameter_changes_as_by_a_turned_instrument():
+def test_a_turned_knob_is_the_event_of_a_plug_in_and_sounds_as_another_table():
     slow = {"release_ms": 4.0, "release_hard_ms": 2.0, "variation": 0.0}
     instrument = shipped("koto", noise=Noise(onset_db=-20, release_db=-20), pluck=slow)
     later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
     for id in (id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE):
         value = OF_INSTRUMENTS[id].value(0.9 * OF_INSTRUMENTS[id].share(instrument.value(id)) + 0.03)
-        one, other = Stage(instrument), Stage(instrument)
-        for stage in (one, other):
+        turned, stages = instrument.with_value(id, value), [Stage(instrument) for _ in range(3)]
+        one, other, plugged = (stage.player for stage in stages)
+        for stage in stages:
             stage.run([(1, NoteOn(60, 90))], 640)
-        one.player.handle(InstrumentTurned(instrument.with_value(id, value)), 0)
-        other.player.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
-        np.testing.assert_array_equal(*(stage.run(later, 100 * QUANTUM) for stage in (one, other)), err_msg=id)
+        table = one.table
+        one.handle(InstrumentTurned(turned))
+        other.take(other.keys_of(turned))
+        plugged.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
+        assert (one.table, one.instrument) == (table, turned), f"{id} needs no table"
+        first, *rest = (stage.run(later, 100 * QUANTUM) for stage in stages)
+        for sound in rest:
+            np.testing.assert_array_equal(sound, first, err_msg=id)
 
 
 TURNS = {f"knobs.{name}": value for name, value in (("stiffness", 4.0), ("decay", 8.0), ("brightness_decay", 6.0))}

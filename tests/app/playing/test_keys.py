@@ -138,7 +138,7 @@ def test_a_key_waits_for_no_knob(played, monkeypatch):
         return body_curves(*args)
 
     monkeypatch.setattr("app.player.strings.body_curves", slow)
-    knob = Thread(target=played.notes.set_instrument, args=(INSTRUMENT.with_value("knobs.stiffness", 3.0), EAR))
+    knob = Thread(target=played.notes.set_instrument, args=(INSTRUMENT.with_value("body.size", 1.3), EAR))
     key = Thread(target=lambda: struck.append(played.handle(NoteOn(52, 60))))
     knob.start()
     played.wait(begun.is_set)
