@@ -158,7 +158,7 @@ def _pitch(
     found_peaks, true_peaks = (_peaks(power[band]) for power in (ours, theirs))
     if not true_peaks or not found_peaks or found_peaks[0][1] < true_peaks[0][1] * 10 ** (-WEAK_DB / 10):
         return None, None
-    true_pitch, *pitches = (band.start + place for place, _ in (true_peaks[0], *found_peaks[:2]))
+    true_pitch, *pitches = (band.start + place for place, _ in (true_peaks[0], *found_peaks))
     cents = 1200 * math.log2(pitches[0] / true_pitch)
     split = len(true_peaks) == 1 and len(pitches) > 1
     return cents, abs(1200 * math.log2(pitches[1] / pitches[0])) if split else None
@@ -173,7 +173,7 @@ def _bands(partials_hz: Sequence[float], rate_hz: int) -> list[tuple[float, floa
 
 
 def _peaks(power: Array) -> list[tuple[float, float]]:
-    """(place, power) of the highest, and of those nearly as high that a dip parts from all higher; highest first."""
+    """(place, power) of the highest, and of the next that is nearly as high and that a dip parts from it."""
     if len(power) < 3 or power.max() <= 0:
         return []
     inner = power[1:-1]
@@ -184,6 +184,8 @@ def _peaks(power: Array) -> list[tuple[float, float]]:
         dips = (power[min(place, other) : max(place, other)].min() for other in kept)
         if all(dip < power[place] * 10 ** (-DIP_DB / 10) for dip in dips):
             kept.append(place)
+        if len(kept) == 2:
+            break
     return [_refined(power, place) for place in kept]
 
 

@@ -199,13 +199,18 @@ def _print_errors(what: str, mse: float | None, mae: float | None, note: str = "
 
 
 def _tell_heard(file: Path) -> None:
-    """Compare the sound of the preset with the truth, and add the result to the table beside it."""
+    """Tell the audible errors of a preset, from the table beside it, or measured and added to it."""
+    from engine.presets import preset_digest
     from training.heard import measure
+    from training.heard_file import read_heard
     from training.heard_words import heard_sentence
 
     try:
-        with progress("listen") as report:
-            print(f"heard       {heard_sentence(measure(file, True, report), file.stem)}")
+        heard = read_heard(file.parent)[0].get(preset_digest(file))
+        if heard is None:
+            with progress("listen") as report:
+                heard = measure(file, True, report)
+        print(f"heard       {heard_sentence(heard, file.stem)}")
     except ValueError as error:  # the model cannot start from a displaced string at rest alone
         say(f"not listened to: {error}")
 
