@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
 
 from app.analysis.abx.record import AbxRecord, Candidate, material_of, p_text, save_record
 from app.analysis.abx.sound import END_S, make_stimuli
@@ -23,6 +22,8 @@ TIME_S = np.arange(RATE_HZ)[:, None] / RATE_HZ
 
 @pytest.mark.parametrize("trials", [1, 2, 4, 5, 10, 16, 25, 200])
 def test_p_values_and_the_right_answers_that_are_needed_are_those_of_scipy(trials):
+    from scipy.stats import binomtest  # which takes seconds to load, and not every worker needs
+
     expected = [binomtest(correct, trials, 0.5, alternative="greater").pvalue for correct in range(trials + 1)]
     assert [p_value(correct, trials) for correct in range(trials + 1)] == pytest.approx(expected, rel=1e-9)
     assert needed_correct(trials) == next((correct for correct, p in enumerate(expected) if p < 0.05), None)

@@ -54,6 +54,7 @@ KINDS = {
     "fgru": "nylon_nonlinear_gaussian_16k_fgru_400",
     "frnn": "nylon_nonlinear_gaussian_16k_frnn_400",
 }
+SLOWEST = ("fgru", "frnn")
 SOURCES: dict[str, Source] = {"a": "model", "b": "truth"}
 EFFECTIVE = "electric_guitar_bridge_pick_up"  # an amplifier, a cabinet and a room
 PLAYED = {entry.path.stem: entry.instrument for entry in list_instruments()[0]}
@@ -192,7 +193,7 @@ def exported(w: Window) -> Samples:
 def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_played_before(held):
     """A model of each kind and its truth, in A, in B and blind, after all instruments with sympathy or an amplifier.
 
-    By default files have that too; of the slowest kinds, which are rendered as others are, none is written here.
+    By default files have that too. The slowest kinds, which are rendered as others are, are heard and compared alone.
     """
     for name, (kind, preset) in zip([EFFECTIVE, *SYMPATHETIC], KINDS.items(), strict=False):
         play_instrument(held, PLAYED[name])
@@ -200,13 +201,14 @@ def test_what_is_heard_drawn_and_exported_is_what_is_rendered_whatever_was_playe
         expected = {slot: rendered(held, source) for slot, source in SOURCES.items()}
         for slot, source in SOURCES.items():
             assert_same(heard(held, slot), expected[slot], f"{preset}, {slot}, after {name}")
+            if kind in SLOWEST:
+                continue
             signal, own_hz = drawn(held, source)
             attack = round(ATTACK_S * own_hz)  # a file fades in
             same = rendered(held, source, own_hz)
             assert_same(signal[attack:], same[attack:], f"{preset}, {slot}, drawn", rate_hz=own_hz)
-            if kind not in ("fgru", "frnn"):
-                assert_same(exported(held), expected[slot], f"{preset}, {slot}, exported after {name}")
-        for slot, sound in blind(held).items():
+            assert_same(exported(held), expected[slot], f"{preset}, {slot}, exported after {name}")
+        for slot, sound in blind(held).items() if kind != SLOWEST[1] else ():
             assert_same(sound, expected[slot], f"{preset}, {slot} of the blind test, after {name}", False)
     for name in SYMPATHETIC[len(KINDS) - 1 :][:2]:
         play_instrument(held, PLAYED[name])

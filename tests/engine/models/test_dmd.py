@@ -4,7 +4,6 @@ from functools import cache
 from typing import ClassVar
 
 import numpy as np
-import pydmd
 import pytest
 import torch
 
@@ -59,6 +58,8 @@ def assert_same_eigenvalues(model: DMD, expected: np.ndarray, tolerance: float) 
 )
 def test_it_is_pydmds(lags, rank, tension_modulated):
     """PyDMD takes one sequence, or pairs of snapshots: ours of many trajectories are the pairs within each."""
+    import pydmd  # which loads pandas and more, as not every worker needs
+
     data = trajectories(tension_modulated=tension_modulated)
     theirs = pydmd.HankelDMD(svd_rank=rank, d=lags, exact=True).fit(data[0].numpy().T)
     assert_same_eigenvalues(fitted(tension_modulated, lags=lags, rank=rank), theirs.eigs, 1e-8)
