@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instruments.drums import Drums
-from app.instruments.instrument import Instrument
+from app.instruments.instrument import Instrument, StringSet
 from app.player import events
 from app.player.drum_keys import DrumKeys
 from app.player.events import (
@@ -27,7 +27,7 @@ from app.player.events import (
     parameter_set,
 )
 from app.player.strings import StringKeys
-from app.player.table import programs_of, strings_of, table_of, wheel_goal, wheeled
+from app.player.table import programs_of, table_of, wheel_goal, wheeled
 from app.shared.value import Value
 from engine.kernels import constants as of
 from engine.kernels import midi
@@ -277,7 +277,7 @@ class InstrumentPlayer:
     def _check(self, event: NoteOn) -> None:
         """Raise ValueError: no string on which an event may play its key is possible."""
         string = event.channel if event.string is None else event.string  # its own, or that of its channel, if any
-        if event.string is not None or string < strings_of(self.instrument):
+        if event.string is not None or string < _strings_by_channel(self.instrument):
             with contextlib.suppress(ValueError):
                 self.keys.of_key(event.key, string)
                 return
@@ -345,3 +345,9 @@ def turned_values(instrument: Instrument, than: Instrument) -> dict[str, float] 
 def is_another(instrument: Instrument, than: Instrument) -> bool:
     """Return True if an instrument is another one. The same with a knob turned, or under a new name, is not."""
     return instrument.name != than.name and instrument.model_copy(update={"name": than.name}) != than
+
+
+def _strings_by_channel(instrument: Instrument) -> int:
+    """The number of strings of a set that channels of a guitar may choose."""
+    by_channel = instrument.mode == "guitar" and isinstance(instrument.strings, StringSet)
+    return min(of.GUITAR_STRINGS, len(instrument.strings.strings)) if by_channel else 0  # type: ignore[union-attr]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instruments.drums import Drums
-from app.instruments.instrument import Fretted, Instrument, StringSet
+from app.instruments.instrument import Fretted, Instrument
 from app.player.drum_keys import DrumKeys, block_of
 from app.player.strings import StringKeys
 from app.shared.parameters import OF_INSTRUMENTS
@@ -210,9 +210,3 @@ def _put_drums(tail: Tail, loud: DrumKeys) -> int:
                 places[key] = free
                 free += len(blocks[-1])
     return tail.put(places.view(np.float64), *blocks)
-
-
-def strings_of(instrument: Instrument) -> int:
-    """The number of strings of a set that channels of a guitar may choose."""
-    by_channel = instrument.mode == "guitar" and isinstance(instrument.strings, StringSet)
-    return min(of.GUITAR_STRINGS, len(instrument.strings.strings)) if by_channel else 0  # type: ignore[union-attr]
