@@ -10,7 +10,7 @@ import ctypes
 import sys
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -32,6 +32,7 @@ class AudioDevice:
     default_rate_hz: int
     channels: int = 2
     is_default: bool = False
+    index: int = field(default=-1, compare=False)  # PortAudio's, of now
 
     @property
     def choice(self) -> DeviceChoice:
@@ -48,7 +49,30 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     Raises:
         AudioProblem: PortAudio is missing or does not start. Where it finds no output, the list is empty.
     """
-    return [device for _, device in _list(rescan)]
+    sounddevice = _sounddevice()
+    with _lock:
+        try:
+            if rescan and not _streams:
+                sounddevice._terminate()
+                sounddevice._initialize()
+            apis: list[Mapping[str, Any]] = list(sounddevice.query_hostapis())
+            entries: list[Mapping[str, Any]] = list(sounddevice.query_devices())
+            default = sounddevice.default.device["output"]  # -1 if there is none
+        except sounddevice.PortAudioError as error:
+            raise problem(ProblemKind.NO_DEVICE, detail=str(error)) from error
+    listed = [
+        AudioDevice(
+            name=entry["name"],
+            host_api=apis[entry["hostapi"]]["name"],
+            default_rate_hz=round(entry["default_samplerate"]),
+            channels=entry["max_output_channels"],
+            is_default=index == default,
+            index=index,
+        )
+        for index, entry in enumerate(entries)
+        if entry["max_output_channels"] > 0
+    ]
+    return sorted(listed, key=lambda device: not device.is_default)
 
 
 def find(device: DeviceChoice | None, rescan: bool = False) -> AudioDevice:
@@ -57,7 +81,12 @@ def find(device: DeviceChoice | None, rescan: bool = False) -> AudioDevice:
     Raises:
         AudioProblem: it is not connected (any more), there is none, or PortAudio is missing.
     """
-    return _find(device, rescan)[1]
+    for listed in output_devices(rescan):
+        if device in (None, listed.choice):
+            return listed
+    if device is None:
+        raise problem(ProblemKind.NO_DEVICE)
+    raise problem(ProblemKind.VANISHED, device.name, f"{device.host_api} lists no output of this name.")
 
 
 def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> Any:
@@ -73,7 +102,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> Any:
 
     sounddevice = _sounddevice()
     with _lock:
-        index, _ = _find(device.choice)
+        index = find(device.choice).index
         ffi, channels = sounddevice._ffi, min(device.channels, 2)
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
@@ -107,45 +136,6 @@ def close_device(stream: Any) -> None:
 
 _lock = threading.RLock()  # PortAudio does not allow listing and opening from two threads
 _streams: set[Any] = set()  # open ones: while there are any, PortAudio must not be started again
-
-
-def _find(device: DeviceChoice | None, rescan: bool = False) -> tuple[int, AudioDevice]:
-    for index, found in _list(rescan):
-        if device in (None, found.choice):
-            return index, found
-    if device is None:
-        raise problem(ProblemKind.NO_DEVICE)
-    raise problem(ProblemKind.VANISHED, device.name, f"{device.host_api} lists no output of this name.")
-
-
-def _list(rescan: bool) -> list[tuple[int, AudioDevice]]:
-    """All outputs with PortAudio's indices, the system's default first."""
-    sounddevice = _sounddevice()
-    with _lock:
-        try:
-            if rescan and not _streams:
-                sounddevice._terminate()
-                sounddevice._initialize()
-            apis: list[Mapping[str, Any]] = list(sounddevice.query_hostapis())
-            entries: list[Mapping[str, Any]] = list(sounddevice.query_devices())
-            default = sounddevice.default.device["output"]  # -1 if there is none
-        except sounddevice.PortAudioError as error:
-            raise problem(ProblemKind.NO_DEVICE, detail=str(error)) from error
-    listed = [
-        (
-            index,
-            AudioDevice(
-                name=entry["name"],
-                host_api=apis[entry["hostapi"]]["name"],
-                default_rate_hz=round(entry["default_samplerate"]),
-                channels=entry["max_output_channels"],
-                is_default=index == default,
-            ),
-        )
-        for index, entry in enumerate(entries)
-        if entry["max_output_channels"] > 0
-    ]
-    return sorted(listed, key=lambda numbered: not numbered[1].is_default)
 
 
 def _sounddevice() -> ModuleType:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from engine.plain_text import one_line
-from training.cli.console import Failure, say
+from training.cli.console import Failure, ProgressReport, progress, say
 
 ALL = "all"
 BANK = "Learned Strings"
@@ -83,7 +84,9 @@ def plugin(
                 check_kept(path, ids)
         for kind, system, path in outputs:
             began_s, replaces = time.monotonic(), path.exists()
-            build_plugin(images, kind, system, path, cache_folder, _Steps(), replace=replace)
+            with progress(path.name) as report:
+                advanced = partial(_advance, report)
+                build_plugin(images, kind, system, path, cache_folder, advanced, replace=replace)
             done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
             print(f"{one_line(str(path))}: {done}{', replaces the one before' if replaces else ''}")
     except (ValueError, OSError) as error:
@@ -96,17 +99,8 @@ def _bank_name(names: Sequence[str]) -> str:
     return whole if len(names) == 1 or len(whole) <= LONGEST_BANK_NAME else f"{names[0]} + {len(names) - 1} others"
 
 
-class _Steps:
-    """A printer of progress: each step once, and each tenth of the build."""
-
-    def __init__(self) -> None:
-        self._latest = ("", 0)
-
-    def __call__(self, step: str, share: float) -> None:
-        reached = (step, int(10 * share))
-        if reached != self._latest:
-            say(f"{step}: {10 * reached[1]} %")
-        self._latest = reached
+def _advance(report: ProgressReport, step: str, share: float) -> None:
+    report(share, step)
 
 
 def _size(path: Path) -> int:
