@@ -241,7 +241,7 @@ class Controller(QObject):
             "next": lambda: self.presets.step(1),
             "switch": session.switch_source,
             "difference": self._hear_difference,
-            "all_modes": lambda: session.update(solo=0),
+            "all_modes": self._play_all_modes,
             "abx": self.listening_test,
             "audio": self.audio.show_dialog,
             "midi": lambda: self.inputs.midi.show_dialog(window),
@@ -271,6 +271,11 @@ class Controller(QObject):
 
     def _toggle(self, field: str) -> None:
         self.session.update(**{field: not getattr(self.session.choices, field)})
+
+    def _play_all_modes(self) -> None:
+        """Play all modes; while the dialog of exports shows a result, close it."""
+        if not self.exports.dismiss():
+            self.session.update(solo=0)
 
     def _hear_difference(self) -> None:
         """Hear the difference, or again what was before it. Keys struck in Play have no voice of the truth."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QObject, Signal
 
 from app.export.compared import ComparedModels
 from app.export.job import ExportJob
@@ -27,7 +26,6 @@ from app.window.main_window import MainWindow
 from app.window.recordings import Recordings, played_source
 
 PLUCK_FIELDS = {"preset", "string", "pluck", "instrument"}
-ESCAPE = Qt.Key.Key_Escape
 HEARD_FIELDS = {"ear", *Monitor.model_fields} - {"level_match"}
 
 
@@ -54,7 +52,6 @@ class Exports(QObject):
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
-        window.installEventFilter(self)
 
     @property
     def choices(self) -> Remembered:
@@ -94,18 +91,12 @@ class Exports(QObject):
         if self.dialog is not None:
             self.dialog.accept()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Escape in the window, which has the keyboard since the export began, closes the dialog with its result."""
-        dialog = self.dialog
-        if dialog is None or dialog.job is not None or not isinstance(event, QKeyEvent) or event.key() != ESCAPE:
+    def dismiss(self) -> bool:
+        """Close the dialog with its result: Escape in the window, which has the keyboard since an export began."""
+        if self.dialog is None or self.busy:
             return False
-        if event.type() == QEvent.Type.ShortcutOverride:
-            event.accept()  # or it would play all modes
-            return True
-        if event.type() == QEvent.Type.KeyPress:
-            dialog.accept()
-            return True
-        return False
+        self.dialog.accept()
+        return True
 
     @property
     def subjects(self) -> dict[Kind, Any]:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 from PySide6.QtCore import QSignalBlocker
 
 from app.export.choices import Chosen, ExportChoices
-from app.export.compared import TABLE, ComparedExport, ComparedModels, check_new
+from app.export.compared import TABLE, ComparedExport, check_new
 from app.export.job import ExportJob
 from app.export.note import HeardNote, NoteExport, paths_of
 from app.export.played import Played, PlayedExport, recorded_files
@@ -31,7 +31,7 @@ from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, FORMATS, WRITTEN_END
 from app.views.controls.form import FilePicker, Form, check_box
 from app.views.controls.number_box import NoteBox
 from app.views.controls.parts import faint, label
-from app.views.file_places import FilePlaces
+from app.views.file_places import FileKind, FilePlaces
 from engine.whole_file import WriteError, explain
 
 Kind = Literal["note", "performance", "models", "sampler", "plugin"]
@@ -129,16 +129,35 @@ class ExportPage(Form):
         title, window_title: of its tab, and of the dialog while it is shown.
         missing: why there is nothing to export.
         writes_wav: whether the form for sound files belongs to it.
-        file: where it is written.
+        subject: what the window plays of this kind; None: nothing.
+        what, file: its words, and where it is written.
     """
 
     title = missing = ""
     window_title = "Export"
     writes_wav = True
-    file: FilePicker
+    TIPS: ClassVar[dict[str, str]]
+
+    def __init__(self, choices: object, places: FilePlaces, kind: FileKind) -> None:
+        super().__init__(choices, self.TIPS)
+        self.subject: Any = None
+        self.what, self.file = label("faint"), self.file_picker(places, kind)
+        self.row("Sound", self.what)
 
     def show_subject(self, subject: Any) -> None:
         """Follow what the window plays; None: there is nothing of this kind."""
+        self.subject = subject
+        self._show()
+
+    @property
+    def offered(self) -> Any:
+        """The subject. Raises ValueError: there is none."""
+        if self.subject is None:
+            raise ValueError(self.missing)
+        return self.subject
+
+    def _show(self) -> None:
+        """Show the subject, if there is one, and what the choices make of it."""
         raise NotImplementedError
 
     def job(self) -> ExportJob:
@@ -165,16 +184,13 @@ class NotePage(ExportPage):
     }
 
     def __init__(self, export: ExportChoices, wav: WavForm, places: FilePlaces) -> None:
-        super().__init__(export, self.TIPS)
+        super().__init__(export, places, "note")
         self._wav = wav
-        self._subject: HeardNote | None = None
-        self.what, self.through_words, self.names = label("faint"), label(), faint()
+        self.through_words, self.names = label(), faint()
         self.through = check_box("On", True, "Off: the string alone, without the instrument")
         self.through.setAccessibleName("Instrument")
         self.through.toggled.connect(self.changed)
-        self.file = self.file_picker(places, "note")
         gain, limits = "Gain of the difference", (0.1, LONGEST_S)
-        self.row("Sound", self.what)
         self.row(
             "Source",
             self.combo("source", "Source", SOURCE_NAMES),
@@ -194,13 +210,13 @@ class NotePage(ExportPage):
         wav.changed.connect(self._show)
 
     def show_subject(self, subject: HeardNote | None) -> None:
-        before, self._subject = self._subject, subject
+        before = self.subject
         if subject is not None and (before is None or before.source != subject.source):
             box = self["source"]
             box.setCurrentIndex(box.findData(subject.chosen(box.currentData())))
             if subject.source == "difference":
                 self["difference_gain_db"].setValue(subject.difference_gain_db)
-        self._show()
+        super().show_subject(subject)
 
     def choices(self) -> ExportChoices:
         values = {**self.values(), "alone": not self.through.isChecked()}
@@ -211,9 +227,7 @@ class NotePage(ExportPage):
         return paths_of(self.file.path, self["source"].currentData())
 
     def job(self) -> NoteExport:
-        if self._subject is None:
-            raise ValueError(self.missing)
-        return NoteExport(self._subject.sound, self.paths(), self.choices())
+        return NoteExport(self.offered.sound, self.paths(), self.choices())
 
     def offer(self) -> tuple[str, str]:
         there = any(path.is_file() for path in self.job().paths.values())
@@ -223,9 +237,9 @@ class NotePage(ExportPage):
         decays = self["until_decayed"].currentData()
         for field, visible in (("decay_db", decays), ("longest_s", decays), ("seconds", not decays)):
             self[field].setVisible(visible)
-        if self._subject is None:
+        if (subject := self.subject) is None:
             return
-        subject, sound = self._subject, self._subject.sound
+        sound = subject.sound
         source, rate_hz = self["source"].currentData(), self._wav["rate_hz"].currentData()
         self["difference_gain_db"].setVisible(source == "difference")
         can_be_alone = sound.alone != sound
@@ -250,20 +264,17 @@ class PerformancePage(ExportPage):
 
     title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
     window_title = "Save the recording"
+    TIPS: ClassVar = {"file": "The MIDI file has the same name"}
 
     def __init__(self, wav: WavForm, places: FilePlaces) -> None:
-        super().__init__(None, {"file": "The MIDI file has the same name"})
+        super().__init__(None, places, "recording")
         self._wav = wav
-        self._subject: HeardPerformance | None = None
-        self.what, self.file = label("faint"), self.file_picker(places, "recording")
-        self.row("Sound", self.what)
         self.row("File", self.file)
         for changed in (self.changed, wav.changed):
-            changed.connect(lambda: self.show_subject(self._subject))
+            changed.connect(self._show)
 
-    def show_subject(self, subject: HeardPerformance | None) -> None:
-        self._subject = subject
-        if subject is not None:
+    def _show(self) -> None:
+        if (subject := self.subject) is not None:
             played = subject.played
             notes = number_of(sum(isinstance(timed_event.event, NoteOn) for timed_event in played.events), "note")
             source_title = source_words(played.source, played.difference_gain_db)
@@ -273,10 +284,8 @@ class PerformancePage(ExportPage):
             self.file.suggest(subject.name + self.file.suffix)
 
     def job(self) -> PlayedExport:
-        if self._subject is None:
-            raise ValueError(self.missing)
-        path = self.file.path
-        return self._subject.export(ExportChoices.model_validate(self._wav.values()), path.parent, path.name)
+        subject, path = self.offered, self.file.path
+        return subject.export(ExportChoices.model_validate(self._wav.values()), path.parent, path.name)
 
     def offer(self) -> tuple[str, str]:
         there = [path.name for path in recorded_files(self.job().path) if path.exists()]
@@ -295,18 +304,14 @@ class ModelsPage(ExportPage):
     }
 
     def __init__(self, export: ExportChoices, wav: WavForm, places: FilePlaces) -> None:
-        super().__init__(export, self.TIPS)
+        super().__init__(export, places, "note")
         self._wav = wav
-        self._subject: ComparedModels | None = None
-        self.what, self.file = label("faint"), self.file_picker(places, "note")
         self.file.suffix = ""
-        self.row("Sound", self.what)
         self.row("Models", self.check("level_match", "As loud as their truth"))
         self.row("Folder", self.file)
 
-    def show_subject(self, subject: ComparedModels | None) -> None:
-        self._subject = subject
-        if subject is not None:
+    def _show(self) -> None:
+        if (subject := self.subject) is not None:
             self.what.setText(subject.words)
             self.file.suggest(subject.name)
             for number in range(2, MOST_OF_A_NAME):
@@ -314,10 +319,8 @@ class ModelsPage(ExportPage):
                     self.file.suggest(f"{subject.name} ({number})")
 
     def job(self) -> ComparedExport:
-        if self._subject is None:
-            raise ValueError(self.missing)
         choices = ExportChoices.model_validate({**self.values(), **self._wav.values()})
-        return ComparedExport.chosen(self._subject, self.file.path, choices)
+        return ComparedExport.chosen(self.offered, self.file.path, choices)
 
     def offer(self) -> tuple[str, str]:
         check_new(self.job().file)
@@ -343,16 +346,13 @@ class SamplerPage(ExportPage):
     }
 
     def __init__(self, choices: SampledChoices, places: FilePlaces) -> None:
-        super().__init__(choices, self.TIPS)
-        self._subject: HeardInstrument | None = None
+        super().__init__(choices, places, "sampler")
         self._chosen_keys = choices.keys
-        self.what, self.size_text = label(), label(selectable=True)
-        self.file = self.file_picker(places, "sampler")
+        self.size_text = label(selectable=True)
         self.size_text.setMinimumHeight(36)  # of two lines
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
         self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
         every = faint("a sample for every"), self.count("every", "Keys a sample", WIDEST_STEP), faint("keys")
-        self.row("Sound", self.what)
         self.row(
             "Format",
             self.combo("form", "Format", FORM_NAMES),
@@ -366,13 +366,14 @@ class SamplerPage(ExportPage):
         self.row("Source", self.combo("source", "Source", SOURCE_NAMES[:2]), dry)
         self.row("File", self.file)
         self.row("", self.size_text)
-        self["form"].currentIndexChanged.connect(self._suggest_name)
+        self["form"].currentIndexChanged.connect(self._show)
         for box in (self.lowest, self.highest):
             box.valueChanged.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
         """Show another instrument, or the same that was turned: chosen keys stay as far as it has them."""
-        keys, self._subject = self.keys(), subject
+        keys = self.keys()
+        super().show_subject(subject)
         if subject is None:
             return
         instrument, preset = subject.instrument, subject.preset
@@ -385,24 +386,21 @@ class SamplerPage(ExportPage):
         self["dry"].setEnabled(instrument.room.mix > 0)
         problem = body_problem(instrument)
         self.what.setText(f"{instrument.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
-        self._suggest_name()
 
     def keys(self) -> tuple[int, int] | None:
         """The chosen keys; None for all of the instrument."""
-        if self._subject is None:
+        if self.subject is None:
             return self._chosen_keys
         keys = self.lowest.value(), self.highest.value()
-        return None if keys == self._subject.instrument.range else keys
+        return None if keys == self.subject.instrument.range else keys
 
     def choices(self) -> SampledChoices:
         return SampledChoices(keys=self.keys(), **self.values())
 
     def job(self) -> SampledExport:
-        if self._subject is None:
-            raise ValueError(self.missing)
+        instrument, choices = self.offered.instrument, self.choices()
         if self.lowest.value() > self.highest.value():
             raise ValueError("keys: the lowest is above the highest; exchange them")
-        instrument, choices = self._subject.instrument, self.choices()
         plan = SampledPlan(
             instrument.with_value("room.mix", 0.0) if choices.dry else instrument,
             choices.keys,
@@ -414,7 +412,7 @@ class SamplerPage(ExportPage):
         )
         if choices.form != "sf2":
             plan = replace(plan, format=choices.form, bits=choices.bits)
-        return SampledExport(plan, self.file.path, self._subject.preset.path)
+        return SampledExport(plan, self.file.path, self.offered.preset.path)
 
     def offer(self) -> tuple[str, str]:
         self.size_text.setText("")
@@ -432,12 +430,12 @@ class SamplerPage(ExportPage):
         self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")
         return "Replace" if out.is_file() else "Export", ""
 
-    def _suggest_name(self) -> None:
+    def _show(self) -> None:
         soundfont = self["form"].currentData() == "sf2"
         self["bits"].setVisible(not soundfont)
         self.file.suffix = ".sf2" if soundfont else ".sfz"
-        if self._subject is not None:
-            self.file.suggest(plain_stem(self._subject.instrument.name) + self.file.suffix)
+        if self.subject is not None:
+            self.file.suggest(plain_stem(self.subject.instrument.name) + self.file.suffix)
 
 
 class PluginPage(ExportPage):
@@ -454,29 +452,18 @@ class PluginPage(ExportPage):
     }
 
     def __init__(self, places: FilePlaces) -> None:
-        super().__init__(None, self.TIPS)
-        self._subject: HeardInstrument | None = None
-        self.what, self.file = label(), self.file_picker(places, "plugin")
+        super().__init__(None, places, "plugin")
         formats = self.combo("form", "Format", [(name, form) for form, name in PLUGIN_NAMES.items()])
         systems = self.combo("system", "System", [(name, target) for target, name in SYSTEM_NAMES.items()])
         systems.setCurrentIndex(systems.findData(_this_system()))
-        self.row("Sound", self.what)
         self.row("Format", formats, systems)
         self.row("File", self.file)
         for box in (formats, systems):
-            box.currentIndexChanged.connect(self._suggest_name)
-
-    def show_subject(self, subject: HeardInstrument | None) -> None:
-        self._subject = subject
-        if subject is not None:
-            self.what.setText(f"{subject.instrument.name}, played by {subject.preset.title}")
-            self._suggest_name()
+            box.currentIndexChanged.connect(self._show)
 
     def job(self) -> PluginExport:
-        if self._subject is None:
-            raise ValueError(self.missing)
+        instrument, preset = self.offered.instrument, self.offered.preset.path
         check_compiler()
-        instrument, preset = self._subject.instrument, self._subject.preset.path
         form, system = self["form"].currentData(), self["system"].currentData()
         return PluginExport(instrument, preset, form, system, self.file.path)
 
@@ -484,11 +471,12 @@ class PluginPage(ExportPage):
         replaces = self.job().replaces()
         return ("Replace", f"{replaces} {PLUGIN_NOTE}") if replaces else ("Export", PLUGIN_NOTE)
 
-    def _suggest_name(self) -> None:
+    def _show(self) -> None:
         form, system = self["form"].currentData(), self["system"].currentData()
         self.file.suffix = f".{form}"
-        if self._subject is not None:
-            name = self._subject.instrument.name + self.file.suffix
+        if (subject := self.subject) is not None:
+            self.what.setText(f"{subject.instrument.name}, played by {subject.preset.title}")
+            name = subject.instrument.name + self.file.suffix
             own = system == _this_system()
             self.file.suggest(str(install_folder(form, system) / name) if own else name)
 
