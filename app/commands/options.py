@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
-from functools import wraps
-from inspect import Parameter, Signature, signature
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -66,29 +62,3 @@ def check_shortest(seconds: float, rate_hz: int) -> None:
     """Raise typer.BadParameter: `seconds` are less than one sample."""
     if round(seconds * rate_hz) < 1:
         raise typer.BadParameter(f"must hold a sample of {rate_hz} Hz, not {seconds:g} s", param_hint="--seconds")
-
-
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command an option for each field of those of its parameters that are dataclasses."""
-    parameters: list[Parameter] = []
-    groups: dict[str, Any] = {}
-    for parameter in signature(command, eval_str=True).parameters.values():
-        group: Any = parameter.annotation
-        if not is_dataclass(group):
-            parameters.append(parameter.replace(kind=Parameter.KEYWORD_ONLY))
-            continue
-        groups[parameter.name] = group
-        hints = get_type_hints(group, include_extras=True)
-        for field in fields(group):
-            default = Parameter.empty if field.default is MISSING else field.default
-            annotation = hints[field.name]
-            parameters.append(Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation))
-
-    @wraps(command)
-    def call(**values: Any) -> None:
-        for name, group in groups.items():
-            values[name] = group(**{field.name: values.pop(field.name) for field in fields(group)})
-        command(**values)
-
-    call.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    return call

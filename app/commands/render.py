@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -28,58 +27,27 @@ BitsOption = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class NoteOptions:
-    """A string's pluck, and where and how long it is heard."""
-
-    position: Annotated[float | None, options.POSITION] = None
-    amplitude_mm: Annotated[float | None, options.AMPLITUDE_MM] = None
-    shape: options.Shape = options.DEFAULT_SHAPE
-    width: options.Width = options.DEFAULT_WIDTH
-    seconds: Annotated[float | None, options.SECONDS] = None
-    string: arguments.StringName = None
-    modes: arguments.StringModes = None
-    listen: options.Listen = options.DEFAULT_LISTEN
-    listen_right: options.ListenRight = None
-    pickup: Annotated[
-        Pickup,
-        typer.Option(
-            help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s; bridge is "
-            "the force on the end at 0, its full scale is 20 N."
-        ),
-    ] = "displacement"
-
-    def sound(self, preset: str, rate_hz: int | None) -> tuple[NoteSound, Preset]:
-        """The sound, and the preset that plays it at this rate if it is of many strings.
-
-        Raises:
-            typer.BadParameter: an option is missing or out of its range.
-            PresetError, SchemaError: there is no such preset or string.
-        """
-        position, amplitude_mm = _require("--position", self.position), _require("--amplitude-mm", self.amplitude_mm)
-        seconds = _require("--seconds", self.seconds)
-        pluck = options.check_pluck(position, amplitude_mm, self.shape, self.width)
-        options.check(listen=self.listen, listen_right=self.listen_right)
-        from app.export.wav import LONGEST_S
-        from app.rendering.note_sound import NoteSound
-        from app.rendering.subject import StringOf, Subject
-        from engine.values.ear import Ear
-
-        arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-        loaded = arguments.open_preset_of_string(preset, self.string, rate_hz, self.modes, to_render=True)
-        info = loaded.info
-        options.check_shortest(seconds, info.rate_hz)
-        points = (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
-        subject: Subject = loaded.path
-        if info.family is not None:
-            subject = StringOf(loaded.path, info.string, info.rate_hz, info.modes)
-        return NoteSound(subject, pluck, seconds, Ear(points, self.pickup)), loaded
+PickupOption = Annotated[
+    Pickup,
+    typer.Option(
+        help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s; bridge is "
+        "the force on the end at 0, its full scale is 20 N."
+    ),
+]
 
 
-@dataclass(frozen=True)
-class FileOptions:
-    """The part of a sound that is written, and the form of its file."""
-
+def render(
+    context: typer.Context,
+    position: Annotated[float | None, options.POSITION] = None,
+    amplitude_mm: Annotated[float | None, options.AMPLITUDE_MM] = None,
+    shape: options.Shape = options.DEFAULT_SHAPE,
+    width: options.Width = options.DEFAULT_WIDTH,
+    seconds: Annotated[float | None, options.SECONDS] = None,
+    string: arguments.StringName = None,
+    modes: arguments.StringModes = None,
+    listen: options.Listen = options.DEFAULT_LISTEN,
+    listen_right: options.ListenRight = None,
+    pickup: PickupOption = "displacement",
     rate: Annotated[
         int | None,
         typer.Option(
@@ -87,44 +55,20 @@ class FileOptions:
             help="Sample rate; default the preset's own. Only a preset of many strings gains bandwidth by a higher "
             "one.",
         ),
-    ] = None
-    bits: BitsOption = "24"
+    ] = None,
+    bits: BitsOption = "24",
     source: Annotated[
         Source,
         typer.Option(help="truth: the solved physics; difference: model minus truth; both: model left, truth right."),
-    ] = "model"
-    difference_gain_db: options.GainDb = 0.0
+    ] = "model",
+    difference_gain_db: options.GainDb = 0.0,
     decay_db: Annotated[
         float | None,
         typer.Option(metavar="DB", help="End when the sound has decayed by so much, after --seconds at the latest."),
-    ] = None
+    ] = None,
     normalise: Annotated[
         bool, typer.Option("--normalise", help="Normalise to -1 dBFS, with one gain for model and truth.")
-    ] = False
-
-    def settings(self) -> WavSettings:
-        """The settings of the file. Raises typer.BadParameter: one is out of its range."""
-        from app.export.wav import DECAY_RANGE_DB, RATE_RANGE_HZ, WavSettings
-
-        options.check(difference_gain_db=self.difference_gain_db)
-        if self.decay_db is not None:
-            arguments.check_range("--decay-db", self.decay_db, *DECAY_RANGE_DB, "dB")
-        if self.rate is not None:
-            arguments.check_range("--rate", self.rate, *RATE_RANGE_HZ, "Hz")
-        return WavSettings(
-            self.bits,
-            self.rate,
-            self.normalise,
-            decay_db=self.decay_db,
-            difference_gain_db=self.difference_gain_db,
-        )
-
-
-@options.grouped
-def render(
-    context: typer.Context,
-    note: NoteOptions,
-    file: FileOptions,
+    ] = False,
     preset: Annotated[
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
@@ -150,6 +94,12 @@ def render(
 
     PRESET, OUT.wav, --position, --amplitude-mm and --seconds are needed, except with --recipe.
     """
+    from app.export.sound import IN_ONE_FILE
+    from app.export.wav import DECAY_RANGE_DB, LONGEST_S, RATE_RANGE_HZ, WavSettings
+    from app.rendering.note_sound import NoteSound
+    from app.rendering.subject import StringOf, Subject
+    from engine.values.ear import Ear
+
     if recipe is not None:
         _check_alone(context)
         _render_again(recipe, Path(preset) if preset else None)
@@ -158,15 +108,31 @@ def render(
         arguments.check_suffix("OUT.wav", out, *WRITTEN_ENDINGS)
     preset, out = _require("PRESET", preset), _require("OUT.wav", out)
     if as_recorded:
-        _render_as_recorded(preset, out, file.bits)
+        _render_as_recorded(preset, out, bits)
         return
-    settings = file.settings()
-    sound, loaded = note.sound(preset, file.rate)
-    if file.source == "both" and note.listen_right is not None:
-        from app.export.sound import IN_ONE_FILE
 
+    options.check(difference_gain_db=difference_gain_db)
+    if decay_db is not None:
+        arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
+    if rate is not None:
+        arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
+    position, amplitude_mm = _require("--position", position), _require("--amplitude-mm", amplitude_mm)
+    seconds = _require("--seconds", seconds)
+    pluck = options.check_pluck(position, amplitude_mm, shape, width)
+    options.check(listen=listen, listen_right=listen_right)
+    arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
+    loaded = arguments.open_preset_of_string(preset, string, rate, modes, to_render=True)
+    info = loaded.info
+    options.check_shortest(seconds, info.rate_hz)
+    if source == "both" and listen_right is not None:
         raise typer.BadParameter(IN_ONE_FILE, param_hint="--source")
-    _write(sound, loaded, file.source, out, settings)
+    points = (listen,) if listen_right is None else (listen, listen_right)
+    subject: Subject = loaded.path
+    if info.family is not None:
+        subject = StringOf(loaded.path, info.string, info.rate_hz, info.modes)
+    sound = NoteSound(subject, pluck, seconds, Ear(points, pickup))
+    settings = WavSettings(bits, rate, normalise, decay_db=decay_db, difference_gain_db=difference_gain_db)
+    _write(sound, loaded, source, out, settings)
 
 
 def _check_alone(context: typer.Context) -> None:
@@ -212,11 +178,8 @@ def _render_again(file: Path, out: Path | None) -> None:
     path, exact = preset_of(recipe, usable_files())
     if out is None:
         ending = ending if (ending := file.suffix.lower()) in WRITTEN_ENDINGS else ".wav"
-        out = Path(
-            default_file_name(
-                path.stem, recipe.pluck, recipe.settings.rate_hz or recipe.preset_rate_hz, recipe.source, ending
-            )
-        )
+        rate_hz = recipe.settings.rate_hz or recipe.preset_rate_hz
+        out = Path(default_file_name(path.stem, recipe.pluck, rate_hz, recipe.source, ending))
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
     sound = recipe.sound(path, file)
