@@ -179,7 +179,7 @@ def api() -> str:
 
 def fields() -> str:
     """The table of parameters of an instrument."""
-    from app.shared.parameters import OF_INSTRUMENTS
+    from engine.parameters import OF_INSTRUMENTS
 
     rows = [
         f"| `{each.id}` | {each.limits[0]:g} … {each.limits[1]:g} | {each.default:g} | {each.tip} |"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 from engine import bounds
+from engine.parameters import OF_INSTRUMENTS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)  # numbers of the kernels
-DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
+DEFAULT_LISTEN = OF_INSTRUMENTS["pickup.points.0"].default  # the listening point beside a pluck
 
 
 @dataclass(frozen=True)

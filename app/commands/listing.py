@@ -85,7 +85,7 @@ def instruments(
 
 def _parameters(instrument: Instrument) -> Iterator[dict[str, Any]]:
     """The table's rows: the parameters that an instrument has, with its own values."""
-    from app.shared.parameters import OF_INSTRUMENTS
+    from engine.parameters import OF_INSTRUMENTS
 
     for id, parameter in OF_INSTRUMENTS.items():
         if instrument.has(id):

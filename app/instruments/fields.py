@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
-from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
+from app.shared.parameters import OF_CHOICES
 from app.shared.value import Value
+from engine.parameters import OF_INSTRUMENTS
 from engine.values.drum import DrumParameters
 from engine.values.string import StringParameters
 

@@ -29,11 +29,12 @@ from app.instruments.fields import (
     ranged,
 )
 from app.instruments.tuning import TuningChoice
-from app.shared.parameters import MOST_MACROS, OF_INSTRUMENTS, modulated_by
+from app.shared.parameters import MOST_MACROS, modulated_by
 from app.shared.value import Value
 from engine import bounds
 from engine.contact import Exciter
 from engine.kernels import velocities
+from engine.parameters import OF_INSTRUMENTS
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 from engine.schema import explained
 from engine.values.ear import Ear

@@ -32,13 +32,14 @@ from app.shared.value import Value
 from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.midi import COARSE_TUNING, FINE_TUNING
+from engine.parameters import PLAYED
 from engine.presets import Preset
 from engine.values.ear import Ear
 from engine.voices import CompiledPlayer
 from engine.voices.player import Ringing, Table
 
 STOP_S = 0.03
-FOLLOWED = of.PLAYED[: of.POINT]  # values of an instrument that strings follow by an event each
+FOLLOWED = PLAYED[: of.VALUE.pickup_points_0]  # values of an instrument that strings follow by an event each
 BESIDE_STRINGS = ("macros", "amp", "room")  # of which the player's table has nothing
 
 

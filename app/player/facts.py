@@ -15,7 +15,7 @@ from app.instruments.instrument import Instrument
 from app.player.events import NoteOn
 from app.player.strings import KeyString, Strings, decay_rates, on_string
 from app.shared.key_names import note_name
-from app.shared.parameters import OF_INSTRUMENTS
+from engine.parameters import OF_INSTRUMENTS
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, outside_training
 from engine.presets.of_string import info_of_string

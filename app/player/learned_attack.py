@@ -18,11 +18,11 @@ from app.instruments.instrument import Instrument, Noise
 from app.player.effects import effects_of
 from app.player.events import NoteOn, TimedEvent
 from app.player.offline import render_events
-from app.shared.parameters import NOISE_DB
 from engine.effects.responses import resampled
 from engine.kernels.constants import CURVES_HZ as RESPONSE_HZ
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.kernels.loudness import k_weight
+from engine.parameters import NOISE_DB
 from engine.presets import Preset
 from engine.resonators.recorded import RecordedAttack, RecordedNote
 from training.recording.attack import attack_force, first_distance_db

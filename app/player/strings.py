@@ -16,6 +16,7 @@ from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import strings as law
 from engine.kernels.constants import HIGHEST_HZ, LENGTH, MOST_MODES
+from engine.parameters import PLAYED
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
@@ -24,7 +25,7 @@ from engine.resonators.string import decay_rates as law_rates
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
 
-KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
+KNOBS = tuple(id.removeprefix("knobs.") for id in PLAYED[: of.KNOBS])
 
 
 @dataclass(frozen=True)

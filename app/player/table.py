@@ -13,13 +13,13 @@ from app.instruments.drums import Drums
 from app.instruments.instrument import Fretted, Instrument
 from app.player.drum_keys import DrumKeys, block_of
 from app.player.strings import StringKeys
-from app.shared.parameters import OF_INSTRUMENTS
 from engine.contact import CONTACTS
 from engine.kernels import constants as of
 from engine.kernels.fields import slots
 from engine.kernels.records import ATTACK, RECORDED, TABLE
 from engine.kernels.voice_records import TENSION, TRUTH
 from engine.levels import FULL_SCALE_M
+from engine.parameters import OF_INSTRUMENTS, PLAYED
 from engine.pluck import SHAPES
 from engine.presets import Preset
 from engine.resonators.recorded import RecordedString
@@ -33,7 +33,7 @@ from engine.voices.programs import (
     tension_memory,
 )
 
-WHEELED = of.PLAYED[: of.BODY_MIX]  # what the player turns with the modulation wheel
+WHEELED = PLAYED[: of.VALUE.body_mix]  # what the player turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
@@ -134,7 +134,7 @@ def table_of(
         table["programs"][place] = program.ctypes.data
     table["sources"] = len(programs)
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
-    values = [*(instrument.value(id) for id in of.PLAYED[: of.POINT]), *points]
+    values = [*(instrument.value(id) for id in PLAYED[: of.VALUE.pickup_points_0]), *points]
     table["values"][: len(values)] = values
     tail = Tail()
     if loud.body is not None:

@@ -10,6 +10,8 @@ import math
 import re
 import unicodedata
 
+from engine.parameters import Parameter
+
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-") | {"\u2019": "'"})
 _PLAIN = r"[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+"
 _GROUPED = r"[1-9][0-9]{0,2}(?:(?P<group>[ '.,])[0-9]{3})(?:(?P=group)[0-9]{3})*"
@@ -44,6 +46,16 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
         digits = match["grouped"].replace(match["group"], "") + (match["rest"] or "").replace(",", ".")
     number = float(match["sign"] + digits + (match["exponent"] or "").replace(" ", ""))
     return number if math.isfinite(number) else None
+
+
+def typed_value(parameter: Parameter, text: str) -> float | None:
+    """The value of a parameter that a text means, in or out of its range; None: it means none."""
+    if text.strip().casefold() in parameter.words:
+        return parameter.limits[0] + parameter.words.index(text.strip().casefold())
+    number = typed_number(text, parameter.typed_unit, parameter.prefix)
+    if number is None or (parameter.whole and not number.is_integer()):
+        return None
+    return number / 100 if parameter.typed_unit == "%" else number
 
 
 def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:

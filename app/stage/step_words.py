@@ -7,8 +7,9 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from app.instruments.instrument import Instrument
-from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
+from app.shared.parameters import OF_CHOICES
 from app.shared.value import Value
+from engine.parameters import OF_INSTRUMENTS
 
 MOST_NAMED = 2  # fields in one step's name
 SEVERAL = "several settings"

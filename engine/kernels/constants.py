@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+from typing import Any
+
+from engine.parameters import PLAYED
+
 QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
 AHEAD = 32  # frames that the limiter looks ahead, its delay; even, and a quantum at most
 
@@ -16,51 +21,14 @@ HIGHEST_SIGMA = 0.5  # of ω: the most damping that bridge and losses by mode gi
 # A string: the fields of `StringParameters`, in their order
 LENGTH, AREA, MOMENT, DENSITY, MODULUS, D1, D3, TENSION = range(8)
 STRING = 8
-_played: list[str] = []
-
-
-def _value(id: str) -> int:
-    """The place among an instrument's values of the parameter of this id, which the app's table of parameters has."""
-    _played.append(id)
-    return len(_played) - 1
-
-
-# An instrument's values, which events and the modulation wheel may change. First the multipliers of a string
-STIFFNESS = _value("knobs.stiffness")
-DECAY = _value("knobs.decay")
-BRIGHTNESS_DECAY = _value("knobs.brightness_decay")
-MODULUS_FACTOR = _value("knobs.modulus")
-DENSITY_FACTOR = _value("knobs.density")
-GAUGE = _value("knobs.gauge")
-TENSION_FACTOR = _value("knobs.tension")
-LENGTH_FACTOR = _value("knobs.length")
-KNOBS = len(_played)
-POSITION = _value("pluck.position")
-WIDTH = _value("pluck.width")
-WIDTH_HARD = _value("pluck.width_hard")
-SOFTEST_MM = _value("pluck.softest_mm")
-HARDEST_MM = _value("pluck.hardest_mm")
-CONTACT_MS = _value("pluck.release_ms")
-CONTACT_HARD_MS = _value("pluck.release_hard_ms")
-CURVE = _value("pluck.curve")  # keys are made as loud again when one of the values so far is turned
-RELEASE_S = _value("damping.release_t60_s")
-BEND_SEMITONES = _value("bend_semitones")
-ONSET_DB = _value("noise.onset_db")
-DAMPER_DB = _value("noise.release_db")
-MUTE = _value("damping.mute")
-HARMONIC = _value("technique.harmonic")  # which partial is the lowest that a touch leaves; 1: there is no touch
-STRUM_MS = _value("technique.strum_ms")
-STROKES = _value("technique.strokes")  # one of the three below
-TREMOLO_HZ = _value("technique.tremolo_hz")
-VIBRATO_CENTS = _value("technique.vibrato_cents")
-VIBRATO_HZ = _value("technique.vibrato_hz")
-JAVARI_UM = _value("javari.gap_um")
-BODY_MIX = _value("body.mix")  # as far as keys are as loud through it; the player's wheel turns those before
-POINT = _value("pickup.points.0")
-_value("pickup.points.1")
-PLAYED = tuple(_played)
+# An instrument's values, which events and the modulation wheel may change: `VALUE.part_field` is the place of one
+VALUE: Any = namedtuple("VALUE", (id.replace(".", "_") for id in PLAYED))(*range(len(PLAYED)))
 VALUES = len(PLAYED)
-DOWN, UP, ALTERNATE = range(3)
+_parts = [id.partition(".")[0] for id in PLAYED]
+KNOBS = _parts.count("knobs")  # the multipliers of a string, which are the first
+# Keys are made as loud again when a value before this one is turned, or one of body or pick-up
+LOUD = KNOBS + _parts.count("pluck")
+DOWN, UP, ALTERNATE = range(3)  # strokes
 REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
 # The level of such a note over its first part. Six of the classical guitar, strummed, peak at -9 dBFS
 WANTED_DB, PART_S = -29.0, 0.4  # a loudness meter's block

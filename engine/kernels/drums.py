@@ -61,7 +61,7 @@ def _speed(drum: Drum, share: float) -> float:
 @kernel
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
-    return _speed(drum, velocities.share(velocity, player.values[of.CURVE]))
+    return _speed(drum, velocities.share(velocity, player.values[of.VALUE.pluck_curve]))
 
 
 @kernel

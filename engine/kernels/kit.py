@@ -22,7 +22,13 @@ from engine.kernels.records import DRUM_ROWS, Event
 Kit: TypeAlias = Any
 KitKey: TypeAlias = Any
 
-FOLLOWED = (of.MODULUS_FACTOR, of.DECAY, of.BRIGHTNESS_DECAY, of.POINT, of.POINT + 1)  # values that move drums
+FOLLOWED = (  # values that move drums
+    of.VALUE.knobs_modulus,
+    of.VALUE.knobs_decay,
+    of.VALUE.knobs_brightness_decay,
+    of.VALUE.pickup_points_0,
+    of.VALUE.pickup_points_0 + 1,
+)
 
 KIT_DRUM = np.dtype(
     [

@@ -111,16 +111,16 @@ def turned(string: Row, knobs: Row, out: Out) -> None:
 
     Each number stays within its bounds: a knob turns no string into an impossible one.
     """
-    area = knobs[of.GAUGE] ** 2
-    heavier = area * knobs[of.DENSITY_FACTOR]
-    out[of.LENGTH] = string[of.LENGTH] * knobs[of.LENGTH_FACTOR] * math.sqrt(knobs[of.TENSION_FACTOR])
+    area = knobs[of.VALUE.knobs_gauge] ** 2
+    heavier = area * knobs[of.VALUE.knobs_density]
+    out[of.LENGTH] = string[of.LENGTH] * knobs[of.VALUE.knobs_length] * math.sqrt(knobs[of.VALUE.knobs_tension])
     out[of.AREA] = string[of.AREA] * area
-    out[of.MOMENT] = string[of.MOMENT] * knobs[of.STIFFNESS] * knobs[of.GAUGE] ** 4
-    out[of.DENSITY] = string[of.DENSITY] * knobs[of.DENSITY_FACTOR]
-    out[of.MODULUS] = string[of.MODULUS] * knobs[of.MODULUS_FACTOR]
-    out[of.D1] = string[of.D1] * knobs[of.DECAY] * heavier
-    out[of.D3] = string[of.D3] * knobs[of.BRIGHTNESS_DECAY] * heavier
-    out[of.TENSION] = string[of.TENSION] * heavier * knobs[of.TENSION_FACTOR] * knobs[of.LENGTH_FACTOR] ** 2
+    out[of.MOMENT] = string[of.MOMENT] * knobs[of.VALUE.knobs_stiffness] * knobs[of.VALUE.knobs_gauge] ** 4
+    out[of.DENSITY] = string[of.DENSITY] * knobs[of.VALUE.knobs_density]
+    out[of.MODULUS] = string[of.MODULUS] * knobs[of.VALUE.knobs_modulus]
+    out[of.D1] = string[of.D1] * knobs[of.VALUE.knobs_decay] * heavier
+    out[of.D3] = string[of.D3] * knobs[of.VALUE.knobs_brightness_decay] * heavier
+    out[of.TENSION] = string[of.TENSION] * heavier * knobs[of.VALUE.knobs_tension] * knobs[of.VALUE.knobs_length] ** 2
     for place in range(of.STRING):
         low, high = _BOUNDS[place]
         out[place] = min(max(out[place], low), high)

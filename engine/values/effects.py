@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from engine import bounds
+from engine.parameters import OF_INSTRUMENTS
 from engine.values.number import Number
 
 
@@ -21,8 +22,8 @@ class Amp:
         ValueError: a value is out of its range; the message names it.
     """
 
-    drive_db: Number = 0.0
-    tone_db: Number = 0.0
+    drive_db: Number = OF_INSTRUMENTS["amp.drive_db"].default
+    tone_db: Number = OF_INSTRUMENTS["amp.tone_db"].default
 
     def __post_init__(self) -> None:
         bounds.check("drive_db", self.drive_db, bounds.AMP_DRIVE_DB, "dB")
@@ -41,8 +42,8 @@ class Room:
         ValueError: a value is out of its range; the message names it.
     """
 
-    mix: Number = 0.0
-    t60_s: Number = 1.2
+    mix: Number = OF_INSTRUMENTS["room.mix"].default
+    t60_s: Number = OF_INSTRUMENTS["room.t60_s"].default
 
     def __post_init__(self) -> None:
         bounds.check("mix", self.mix, (0.0, 1.0))

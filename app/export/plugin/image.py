@@ -24,12 +24,13 @@ from app.player.compiled import InstrumentPlayer
 from app.player.drum_keys import DrumKeys
 from app.player.strings import StringKeys
 from app.player.table import WHEELED, wheel_goal
-from app.shared.parameters import MACROS, OF_CHOICES, OF_INSTRUMENTS, PLACE, Parameter
+from app.shared.parameters import MACROS, OF_CHOICES
 from engine.effects.room import NOISE_FRAMES
 from engine.kernels import constants as of
 from engine.kernels.fields import record_of
 from engine.kernels.records import TABLE
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.parameters import OF_INSTRUMENTS, PLACE, PLAYED, Parameter
 from engine.presets import Preset
 from engine.voices.ear import differentiator_taps
 
@@ -39,16 +40,6 @@ MOST_NOTES = 40
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 NOISE_BYTES = 8  # of a frame
 SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, words=SOURCES)
-DRUM_PARAMETERS = (
-    "knobs.decay",
-    "knobs.brightness_decay",
-    "knobs.modulus",
-    "pluck.curve",
-    "damping.release_t60_s",
-    "noise.onset_db",
-    "pickup.points.0",
-    "pickup.points.1",
-)  # that drums follow
 
 
 @dataclass(frozen=True)
@@ -190,11 +181,11 @@ def _parameters(instrument: Instrument) -> Iterable[tuple[str, np.void]]:
     yield _record("volume", 0, 0.0, OF_CHOICES["volume_db"])
     drums = isinstance(instrument.strings, Drums)
     fixed = not drums and instrument.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else of.PLAYED[of.POINT :][: len(instrument.pickup.points)]
-    followed = [id for id in (*WHEELED, *points) if id in (DRUM_PARAMETERS if drums else ASSIGNABLE)]
+    points = () if fixed else PLAYED[of.VALUE.pickup_points_0 :][: len(instrument.pickup.points)]
+    followed = [id for id in (*WHEELED, *points) if (OF_INSTRUMENTS[id].drums if drums else id in ASSIGNABLE)]
     heard = [id for id in EFFECTS if instrument.body.name or not id.startswith("body.")]
     for kind, ids, order in (
-        ("value", followed, of.PLAYED),
+        ("value", followed, PLAYED),
         ("effect", heard, EFFECTS),
         ("amp", AMP, AMP),
     ):

@@ -88,7 +88,7 @@ _NUMBERS = {"f8": "double", "i8": "int64_t", "i4": "int32_t", "u4": "uint32_t", 
 _ARGUMENTS = {types.int64: "int64_t", types.float64: "double"}
 _COUNTS = (
     "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
-    "MOST_SOURCES KEYS CHANNELS BEGAN BODY_MIX BODY_SLOTS"
+    "MOST_SOURCES KEYS CHANNELS BEGAN BODY_SLOTS"
 )
 
 
@@ -97,6 +97,7 @@ def layout_header(version: str) -> str:
     none = voice_bytes(0) // 8
     constants: dict[str, float] = {
         **{name: getattr(of, name) for name in _COUNTS.split()},
+        "BODY_MIX": of.VALUE.body_mix,
         "EARLY": mixed.EARLY,
         "REACH": mixed.REACH,
         "MOST_IMAGES": MOST_IMAGES,

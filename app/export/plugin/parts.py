@@ -12,13 +12,13 @@ import numpy as np
 from app.instruments.instrument import Instrument
 from app.player.drum_keys import DrumKeys, struck_drum
 from app.player.effects import effects_of
-from app.shared.parameters import OF_INSTRUMENTS
 from engine.effects.body import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels.fields import record_of, slots
 from engine.kernels.kit import KIT, KIT_DRUM
 from engine.kernels.records import DRUM, DRUM_ROWS
+from engine.parameters import OF_INSTRUMENTS
 from engine.resonators.base import Array
 from engine.resonators.drum import around as around_of
 

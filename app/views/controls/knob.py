@@ -18,13 +18,13 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
-from app.shared.parameters import Parameter
-from app.shared.typed_number import SIGNS, begins_number, typed_number
+from app.shared.typed_number import SIGNS, begins_number, typed_number, typed_value
 from app.views import theme
 from app.views.controls.number_box import refusal, say_above
 from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.controls.plain import plain_tip
 from app.views.painting import set_ink, write
+from engine.parameters import Parameter
 
 SWEEP_DEGREES = 270
 WIDTH, NARROW_WIDTH = 62, 52
@@ -249,7 +249,8 @@ class Knob(QWidget):
             return
         text = self._editor.text()
         self._close_editor()
-        value = typed_number(text, self.parameter.figure_unit or "") if self._figure else self.parameter.typed(text)
+        unit = self.parameter.figure_unit or ""
+        value = typed_number(text, unit) if self._figure else typed_value(self.parameter, text)
         if value is None:
             say_above(self, refusal(text, self._figure or self.text))
         elif self._figure:

@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QComboBox, QDialog, QGridLayout, QHBoxLayout, QLab
 
 from app.instruments.instrument import Instrument
 from app.playing.midi import MidiChoices
-from app.shared.parameters import LEARNABLE, OF_INSTRUMENTS, modulated_by
+from app.shared.parameters import LEARNABLE, modulated_by
 from app.views.controls.form import Form
 from app.views.controls.parts import combo_box, faint, filled, label, push_button, refill, scrolled, show_kind
 from app.views.controls.plain import Label
+from engine.parameters import OF_INSTRUMENTS
 
 NOTE_MODES = (
     ("Notes of the instrument", "pitch"),

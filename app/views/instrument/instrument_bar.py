@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from app.instruments.instrument import Instrument, Macro
 from app.instruments.scales import SCALES
 from app.instruments.tuning import TuningChoice
-from app.shared.parameters import MACROS, OF_INSTRUMENTS
+from app.shared.parameters import MACROS
 from app.views.controls.choosers import ChoiceBar
 from app.views.controls.knob import NARROW_WIDTH, Knob
 from app.views.controls.number_box import say_above
@@ -42,6 +42,7 @@ from app.views.controls.parts import (
 )
 from app.views.controls.plain import Label, SteadyLabel, plain_tip
 from app.views.instrument.takes_menu import TakesMenu
+from engine.parameters import OF_INSTRUMENTS
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X

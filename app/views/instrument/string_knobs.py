@@ -10,13 +10,14 @@ from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.instruments.instrument import Instrument
-from app.shared.parameters import DECAY, PITCH, PLUCK, STRING, TECHNIQUE, in_group
+from app.shared.parameters import in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import NO_MARGINS, filled, vertical_rule
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, SHAPE_TIP, shape_box
 from app.views.painting import write
+from engine.parameters import DECAY, OF_INSTRUMENTS, PITCH, PLUCK, STRING, TECHNIQUE
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT = 13
@@ -36,7 +37,6 @@ NO_A4 = (
     "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
 )
 NO_STRING = "This instrument has drums, and no string that this could change"
-DRUM_KNOBS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
 LETS_RING = "Release off (let ring)"
 
 
@@ -152,8 +152,9 @@ class StringKnobs(QWidget):
 
 def _why_barred(instrument: Instrument, field: str) -> str:
     """The reason why a field means nothing in this instrument; "" where it means something."""
-    of_strings = field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
-    if instrument.strings.kind == "drums" and of_strings and field not in DRUM_KNOBS:
+    parameter = OF_INSTRUMENTS.get(field)  # the shape has none
+    of_strings = parameter is None or (parameter.played is not None and not parameter.drums)
+    if instrument.strings.kind == "drums" and of_strings:
         return NO_STRING
     if field in SHAPED and instrument.pluck.shape == "triangular":
         return NO_WIDTH

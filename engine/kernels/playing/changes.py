@@ -76,12 +76,12 @@ def damp(player: Player, table: Table, note: Note, frame: int, now: int) -> None
         retune(player, table, note, DAMPER_S, frame, now)
         if note.member != 0:
             return
-        level_db = level_of(player, table, note, of.DAMPER_DB)
+        level_db = level_of(player, table, note, of.VALUE.noise_release_db)
         stroke, strength = note.age if table.variation > 0.0 else 0, landing(table, note)
         by = contact.Touch(of.RELEASE, level_db, strength, 1.0, stroke, note.key, frame, 0.0, 0.0)
         contact.touch(player, table, by)
         return
-    t60_s = keys.value_of(player, table, of.RELEASE_S)
+    t60_s = keys.value_of(player, table, of.VALUE.damping_release_t60_s)
     for source in range(of.MOST_SOURCES):
         if slots.voice_over(note.voices[source]):
             continue

@@ -108,7 +108,7 @@ def _bend_range(player: Player, mode: int, number: int) -> float:
     wide = player.channels[number].range_semitones
     if wide >= 0.0:
         return wide
-    return MPE_BEND_SEMITONES if _is_member(mode, number) else player.values[of.BEND_SEMITONES]
+    return MPE_BEND_SEMITONES if _is_member(mode, number) else player.values[of.VALUE.bend_semitones]
 
 
 @kernel

@@ -31,7 +31,9 @@ def _strums_in(player: Player, table: Table, event: Event) -> int:
     strikes = event.kind == of.NOTE_ON and event.value > 0.0 and event.position <= 0.0
     if not strikes or not 0 <= event.channel < of.CHANNELS or table.drums != 0:
         return 0
-    milliseconds = keys.technique_of(player, table, event.channel, of.STRUM_MS, of.STRUMS, USUAL_STRUM_MS)
+    milliseconds = keys.technique_of(
+        player, table, event.channel, of.VALUE.technique_strum_ms, of.STRUMS, USUAL_STRUM_MS
+    )
     return slots.frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
 
 
@@ -45,7 +47,7 @@ def _continues(player: Player, frame: int) -> bool:
 @kernel
 def _goes_up(player: Player, table: Table) -> bool:
     """Return True if the next strum goes from the highest note to the lowest."""
-    strokes = round(keys.value_of(player, table, of.STROKES))
+    strokes = round(keys.value_of(player, table, of.VALUE.technique_strokes))
     return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 
 

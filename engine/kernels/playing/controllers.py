@@ -35,7 +35,7 @@ SWITCHED_BY = (midi.SUSTAIN, midi.LEGATO, midi.PORTAMENTO, midi.HARMONICS, midi.
 @kernel
 def controller(player: Player, table: Table, channel: int, number: int, value: int, frame: int, now: int) -> None:
     mode, state = table.mode, player.channels[channel]
-    turns = 0 <= table.wheel < of.KNOBS or table.wheel == of.MUTE
+    turns = 0 <= table.wheel < of.KNOBS or table.wheel == of.VALUE.damping_mute
     value = min(max(value, 0), 127)
     for switch in range(of.SWITCHES):
         if number == SWITCHED_BY[switch]:

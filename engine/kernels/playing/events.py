@@ -112,7 +112,7 @@ def _handle_on_channel(player: Player, table: Table, mixer: Mixer, event: Event)
         controllers.controller(player, table, channel, key, int(value), frame, now)
     elif kind == of.PARAMETER and key < of.VALUES:
         player.values[key] = value
-        if key <= of.CURVE or key >= of.BODY_MIX:
+        if key < of.LOUD or key >= of.VALUE.body_mix:
             gains.forget_gains(player)
         changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
 

@@ -35,14 +35,17 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
     if partials < 1 or strings.overdamped(string_row, partials):
         return 0
     share = plucks.reference_share(player)
-    amplitude_mm = velocities.between(player.values[of.SOFTEST_MM], player.values[of.HARDEST_MM], share) * shortened
+    values = player.values
+    softest_mm, hardest_mm = values[of.VALUE.pluck_softest_mm], values[of.VALUE.pluck_hardest_mm]
+    amplitude_mm = velocities.between(softest_mm, hardest_mm, share) * shortened
     for mode in range(partials):
         pulled_m = min(amplitude_mm, LARGEST_AMPLITUDE_MM) / 1000
         player.amplitudes[mode] = pulled_m * player.reference[mode]
-    release_s = velocities.contact_s(player.values[of.CONTACT_MS], player.values[of.CONTACT_HARD_MS], share)
+    softest_ms, hardest_ms = values[of.VALUE.pluck_release_ms], values[of.VALUE.pluck_release_hard_ms]
+    release_s = velocities.contact_s(softest_ms, hardest_ms, share)
     plucks.release_pluck(player, table, string_row, partials, release_s)
     modes, pairs = plucks.split(player, table, string_row, partials, 0.0)
-    decay, inside = player.values[of.DECAY], player.values[of.BRIGHTNESS_DECAY]
+    decay, inside = values[of.VALUE.knobs_decay], values[of.VALUE.knobs_brightness_decay]
     together = decay
     if table.course > 1 and not keys.has_octave(table, key, string):  # at first they are in phase
         together *= 1 + (table.course - 1) * table.bridge
@@ -63,7 +66,8 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         rows[of.SOUND_OMEGA * modes + mode] = omega
         rows[of.SOUND_RIGHT * modes + mode] = 0.0
         for point in range(table.points):
-            weight = voices.weight_of(string_row, partial, player.values[of.POINT + point], table.aperture_m)
+            place = values[of.VALUE.pickup_points_0 + point]
+            weight = voices.weight_of(string_row, partial, place, table.aperture_m)
             rows[(of.SOUND_LEFT + point) * modes + mode] = amplitude * weight
     return modes
 
@@ -72,9 +76,9 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
 def _look_at_peaks(player: Player, table: Table) -> None:
     """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
     share = plucks.reference_share(player)
-    width = velocities.between(player.values[of.WIDTH], player.values[of.WIDTH_HARD], share)
+    width = velocities.between(player.values[of.VALUE.pluck_width], player.values[of.VALUE.pluck_width_hard], share)
     partials = min(player.modes - of.MOST_PAIRS, of.MOST_MODES)
-    plucks.pull(player, table, table.shape, partials, player.values[of.POSITION], 1.0, width)
+    plucks.pull(player, table, table.shape, partials, player.values[of.VALUE.pluck_position], 1.0, width)
     for mode in range(partials):
         player.reference[mode] = player.amplitudes[mode]
     (body, mix), highest = keys.body_of(player, table), 0.0

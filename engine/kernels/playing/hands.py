@@ -48,7 +48,7 @@ def _move(player: Player, table: Table, note: Note, key: int, frame: int, now: i
     note.string, note.key = string, key
     seconds = channels.moves_in_s(player, table.mode, note.channel)
     if note.member == 0:
-        level_db = changes.level_of(player, table, note, of.DAMPER_DB)
+        level_db = changes.level_of(player, table, note, of.VALUE.noise_release_db)
         if not strings.is_wound(note.own):
             level_db -= PLAIN_DB
         slid_m = abs(player.own[of.LENGTH] - note.string_now[of.LENGTH])
@@ -172,11 +172,11 @@ def choke(player: Player, event: Event, frame: int) -> None:
 @kernel
 def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
     """Let a note glide to where its vibrato is some quanta later; all strings of a course alike."""
-    depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
+    depth = keys.value_of(player, table, of.VALUE.technique_vibrato_cents) / 100
     if depth == 0.0 and note.vibrato == 0.0:
         return
     ahead = now + VIBRATO_QUANTA * of.QUANTUM - note.began
-    hz = keys.value_of(player, table, of.VIBRATO_HZ)
+    hz = keys.value_of(player, table, of.VALUE.technique_vibrato_hz)
     note.vibrato = depth * math.sin(2 * math.pi * hz * max(ahead, 0) / player.rate_hz)
     seconds = VIBRATO_QUANTA * of.QUANTUM / player.rate_hz
     changes.retune(player, table, note, seconds, 0, now)
@@ -198,7 +198,9 @@ def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
         again = note.held != 0 and note.released == 0 and note.member == 0 and note.by_hand == 0
         if not again or not slots.sounds(note):
             continue
-        hz = keys.technique_of(player, table, note.channel, of.TREMOLO_HZ, of.TREMOLO, USUAL_TREMOLO_HZ)
+        hz = keys.technique_of(
+            player, table, note.channel, of.VALUE.technique_tremolo_hz, of.TREMOLO, USUAL_TREMOLO_HZ
+        )
         due = note.began + slots.frames(player, 1 / hz) if hz > 0.0 else end
         if due < end:
             _pluck_again(player, table, mixer, note, max(due, now))

@@ -27,7 +27,7 @@ def value_of(player: Player, table: Table, which: int) -> float:
 @kernel
 def mute_of(player: Player, table: Table, channel: int) -> float:
     """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
-    share = value_of(player, table, of.MUTE)
+    share = value_of(player, table, of.VALUE.damping_mute)
     for number in range(of.CHANNELS):
         if channels.acts_on(table.mode, number, channel):
             share = max(share, player.channels[number].mute)
@@ -37,13 +37,13 @@ def mute_of(player: Player, table: Table, channel: int) -> float:
 @kernel
 def body_of(player: Player, table: Table) -> tuple[np.ndarray, float]:
     """The curves of the body, and how much of it is heard."""
-    return behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
+    return behind(table, table.body, of.BODY_SLOTS), player.values[of.VALUE.body_mix] if table.body != 0 else 0.0
 
 
 @kernel
 def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
     """The value of a technique for a channel: the usual one where its footswitch is down and the value is off."""
-    value, off = value_of(player, table, which), 1.0 if which == of.HARMONIC else 0.0
+    value, off = value_of(player, table, which), 1.0 if which == of.VALUE.technique_harmonic else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual
     return value
@@ -52,7 +52,7 @@ def technique_of(player: Player, table: Table, channel: int, which: int, switch:
 @kernel
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
     """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
-    node = round(technique_of(player, table, channel, of.HARMONIC, of.HARMONICS, USUAL_HARMONIC))
+    node = round(technique_of(player, table, channel, of.VALUE.technique_harmonic, of.HARMONICS, USUAL_HARMONIC))
     return node if 1 < node <= partials else 0
 
 
@@ -137,7 +137,7 @@ def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> Non
             out[of.TENSION] = strings.bent(out, ratio)
         fits = strings.possible(out)
     if fits and note.damped != 0:
-        out[of.D1] = strings.damped(out, value_of(player, table, of.RELEASE_S))
+        out[of.D1] = strings.damped(out, value_of(player, table, of.VALUE.damping_release_t60_s))
         fits = strings.possible(out)
     if not fits:
         out[:] = note.string_now

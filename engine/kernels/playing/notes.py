@@ -183,7 +183,7 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
     _begin_voices(player, mixer, event, note)
     changes.retune(player, table, note, 0.0, 0, mixer.frames)
     if member == 0:
-        level_db, begins = changes.level_of(player, table, note, of.ONSET_DB), event.frame
+        level_db, begins = changes.level_of(player, table, note, of.VALUE.noise_onset_db), event.frame
         by = contact.Touch(of.STROKE, level_db, note.strength, note.hardness, note.stroke, note.key, begins, 0.0, 0.0)
         contact.touch(player, table, by)
     _make_room(player)
@@ -232,9 +232,10 @@ def _take_string(player: Player, table: Table, note: Note) -> bool:
 @kernel
 def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
-    curve, soft = keys.value_of(player, table, of.CURVE), keys.value_of(player, table, of.SOFTEST_MM)
+    curve = keys.value_of(player, table, of.VALUE.pluck_curve)
+    soft = keys.value_of(player, table, of.VALUE.pluck_softest_mm)
     share = velocities.share(note.velocity, curve)
-    harder = keys.value_of(player, table, of.HARDEST_MM) / soft
+    harder = keys.value_of(player, table, of.VALUE.pluck_hardest_mm) / soft
     amplitude_mm = min(soft * harder**share * note.shortened, LARGEST_AMPLITUDE_MM)
     if note.by_hand != 0:
         amplitude_mm = min(event.amplitude_mm, LARGEST_AMPLITUDE_MM)
@@ -242,16 +243,16 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
             share = min(max(math.log(amplitude_mm / soft / note.shortened) / math.log(harder), 0.0), 1.0)
     note.strength = harder ** (share - velocities.share(of.REFERENCE_VELOCITY, curve))
     note.hardness = 1.0
-    widths = keys.value_of(player, table, of.WIDTH), keys.value_of(player, table, of.WIDTH_HARD)
-    width = velocities.between(widths[0], widths[1], share)
-    position, slide = keys.value_of(player, table, of.POSITION), player.channels[note.channel].slide
+    narrowest = keys.value_of(player, table, of.VALUE.pluck_width_hard)
+    width = velocities.between(keys.value_of(player, table, of.VALUE.pluck_width), narrowest, share)
+    position, slide = keys.value_of(player, table, of.VALUE.pluck_position), player.channels[note.channel].slide
     if note.by_hand != 0:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
         position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * slide / 127
     turned, varies = 0.0, table.variation
-    softest_ms = keys.value_of(player, table, of.CONTACT_MS)
-    release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
+    softest_ms = keys.value_of(player, table, of.VALUE.pluck_release_ms)
+    release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.VALUE.pluck_release_hard_ms), share)
     if varies > 0.0:
         note.stroke = player.age
         if note.by_hand == 0:
@@ -281,7 +282,7 @@ def _keep_of_table(player: Player, table: Table, note: Note) -> None:
     polarised = note.pairs > 0 and table.recorded == 0
     for slot in range(2):
         note.heard[slot] = table.heard[slot] if polarised else 1.0
-        note.point[slot] = player.values[of.POINT + slot]
+        note.point[slot] = player.values[of.VALUE.pickup_points_0 + slot]
     octaves = keys.has_octave(table, key, note.string)
     if note.drum == 0 and not octaves and table.course > 1 and table.conductance[0] > 0.0 and note.pairs > 0:
         note.bridge = table.bridge

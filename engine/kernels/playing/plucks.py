@@ -167,4 +167,4 @@ def _polarise(player: Player, table: Table, partials: int, turned: float) -> int
 @kernel
 def reference_share(player: Player) -> float:
     """The share of the velocities at which keys are equally loud."""
-    return velocities.share(of.REFERENCE_VELOCITY, player.values[of.CURVE])
+    return velocities.share(of.REFERENCE_VELOCITY, player.values[of.VALUE.pluck_curve])

@@ -52,8 +52,8 @@ def _weigh(player: Player, voice: at.Voice, which: int, note: Note) -> None:
 @kernel
 def fill(player: Player, table: Table, note: Note, string: np.ndarray, out: np.ndarray) -> None:
     """ω², σ, k, η² and the bridge's part of a note's modes, of its string as it is now."""
-    losses = keys.value_of(player, table, of.DECAY)
-    inside = keys.value_of(player, table, of.BRIGHTNESS_DECAY)
+    losses = keys.value_of(player, table, of.VALUE.knobs_decay)
+    inside = keys.value_of(player, table, of.VALUE.knobs_brightness_decay)
     conductance = losses * note.conductance[0], losses * note.conductance[1]
     by_mode = losses * note.losses[0], inside * note.losses[1], inside * note.losses[2]
     strings.rows(string, note.modes, note.pairs, note.detuning, conductance, by_mode, out)
@@ -227,7 +227,7 @@ def hear(player: Player) -> None:
                 voice = voice_at(note.voices[source])
                 voice.wanted_gain = gain * player.source_gains[source]
                 if voice.javari.steps != 0:
-                    voice.javari.gap_m = keys.value_of(player, table, of.JAVARI_UM) * 1e-6
+                    voice.javari.gap_m = keys.value_of(player, table, of.VALUE.javari_gap_um) * 1e-6
         _listen(player, table, note)
 
 
@@ -236,7 +236,7 @@ def _listen(player: Player, table: Table, note: Note) -> None:
     """Let a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
     moved = note.solo != table.solo
     for point in range(2):
-        moved = moved or note.point[point] != player.values[of.POINT + point]
+        moved = moved or note.point[point] != player.values[of.VALUE.pickup_points_0 + point]
     if not moved or note.points != table.points:
         return
     for address in note.voices:
@@ -244,7 +244,7 @@ def _listen(player: Player, table: Table, note: Note) -> None:
             return
     note.solo = table.solo
     for point in range(2):
-        note.point[point] = player.values[of.POINT + point]
+        note.point[point] = player.values[of.VALUE.pickup_points_0 + point]
     for address in note.voices:
         if address != 0:
             voice = voice_at(address)

@@ -14,7 +14,7 @@ from app.export.plugin.image import Image
 from app.export.sampled.plan import SampledPlan
 from app.instruments.library import SHIPPED, find_instrument, list_instruments
 from app.player import offline
-from app.shared.parameters import OF_INSTRUMENTS
+from engine.parameters import OF_INSTRUMENTS
 
 
 def test_a_preset_is_found_by_its_name_the_shipped_one_first(run, installed, small_preset, folder, monkeypatch):

@@ -15,7 +15,7 @@ import soundfile
 from app.instruments.library import find_instrument
 from app.player import learned
 from app.player.offline import render_note
-from app.shared.parameters import NOISE_DB
+from engine.parameters import NOISE_DB
 from engine.presets import load_preset
 from engine.whole_file import WriteError
 from tests.training.recording.sounds import membrane

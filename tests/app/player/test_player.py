@@ -16,11 +16,11 @@ from app.player.compiled import InstrumentPlayer
 from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, TimedEvent
 from app.player.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, render_events, render_note
 from app.player.strings import StringKeys, on_string
-from app.shared.parameters import OF_INSTRUMENTS
 from engine import bounds
 from engine.kernels import constants as of
 from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
+from engine.parameters import OF_INSTRUMENTS, PLAYED
 from engine.pluck import SHAPES, Pluck
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
@@ -215,7 +215,7 @@ def test_a_turned_knob_is_the_event_of_a_plug_in_and_sounds_as_another_table():
     slow = {"release_ms": 4.0, "release_hard_ms": 2.0, "variation": 0.0}
     instrument = shipped("koto", noise=Noise(onset_db=-20, release_db=-20), pluck=slow)
     later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
-    for id in (id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE):
+    for id in (id for id in PLAYED[: of.VALUE.pickup_points_0] if id in ASSIGNABLE):
         value = OF_INSTRUMENTS[id].value(0.9 * OF_INSTRUMENTS[id].share(instrument.value(id)) + 0.03)
         turned, stages = instrument.with_value(id, value), [Stage(instrument) for _ in range(3)]
         one, other, plugged = (stage.player for stage in stages)
@@ -224,7 +224,7 @@ def test_a_turned_knob_is_the_event_of_a_plug_in_and_sounds_as_another_table():
         table = one.table
         one.handle(InstrumentTurned(turned))
         other.take(other.keys_of(turned))
-        plugged.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
+        plugged.compiled.give(of.PARAMETER, key=PLAYED.index(id), value=value)
         assert (one.table, one.instrument) == (table, turned), f"{id} needs no table"
         first, *rest = (stage.run(later, 100 * QUANTUM) for stage in stages)
         for sound in rest:

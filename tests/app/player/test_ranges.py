@@ -14,12 +14,12 @@ from app.player.drum_keys import DrumKeys
 from app.player.events import ControlChange, NoteOn
 from app.player.strings import KNOBS
 from app.player.table import wheeled
-from app.shared.parameters import OF_INSTRUMENTS
 from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE
 from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.kernels.midi import HARMONICS, MOD_WHEEL, SLIDE
 from engine.kernels.playing.plucks import vary
+from engine.parameters import OF_INSTRUMENTS
 from engine.pluck import Pluck
 from engine.strike import Strike
 from engine.values.ear import Ear

@@ -13,9 +13,9 @@ from app.player.events import NoteOn
 from app.player.facts import FIGURES, bright_mode, knob_for, outside_of_key, t60_s
 from app.player.glide import START_S, glides_cents
 from app.player.strings import KNOBS, Strings
-from app.shared.parameters import OF_INSTRUMENTS
 from engine.kernels import strings as law
 from engine.kernels.constants import D1, LENGTH, TENSION
+from engine.parameters import OF_INSTRUMENTS
 from engine.resonators import string as of_law
 from engine.resonators.family import inharmonicity
 from engine.values.effects import Amp, Room

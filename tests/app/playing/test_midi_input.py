@@ -24,7 +24,8 @@ from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidiInput, load_backend
 from app.playing.midi_port import MidiInput
 from app.session.choices import Choices
-from app.shared.parameters import LEARNABLE, OF_CHOICES, OF_INSTRUMENTS
+from app.shared.parameters import LEARNABLE, OF_CHOICES
+from engine.parameters import OF_INSTRUMENTS
 
 ROOT = Path(__file__).parents[3]
 GUITAR = read_instrument(INSTRUMENTS / "classical_guitar.json")

@@ -5,8 +5,9 @@ import random
 import pytest
 
 from app.shared.key_names import key_named, note_name
-from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
-from app.shared.typed_number import begins_number, typed_number
+from app.shared.parameters import OF_CHOICES
+from app.shared.typed_number import begins_number, typed_number, typed_value
+from engine.parameters import OF_INSTRUMENTS
 
 ALL = {**OF_INSTRUMENTS, **OF_CHOICES}.values()
 UNDERSTOOD = {  # by value and unit
@@ -68,17 +69,21 @@ def test_a_knob_goes_through_its_whole_range_and_back_and_reads_what_it_shows(pa
         value = parameter.value(draw.random())
         shown = parameter.shown(round(value) if parameter.whole else value)
         for text in (shown, shown.replace(".", ","), shown.replace("-", "\u2212"), shown.replace(" ", "\u00a0")):
-            typed = parameter.typed(text)
+            typed = typed_value(parameter, text)
             assert typed is not None and parameter.shown(typed) == shown, text
         number = shown.removeprefix("× ").partition(" ")[0].removesuffix("%")
-        assert parameter.words or parameter.typed(number) == parameter.typed(shown), number
+        assert parameter.words or typed_value(parameter, number) == typed_value(parameter, shown), number
 
 
 def test_shares_are_typed_in_per_cent_and_words_by_word_or_number():
     mix = OF_INSTRUMENTS["room.mix"]
-    assert [mix.typed(text) for text in ("20", "20%", "20 %", "100", "0.5")] == [0.2, 0.2, 0.2, 1.0, 0.005]
-    assert OF_INSTRUMENTS["tuning.transpose"].typed("2.5") is None
-    assert OF_INSTRUMENTS["technique.strokes"].typed("both") == OF_INSTRUMENTS["technique.strokes"].typed("2") == 2
+    assert [typed_value(mix, text) for text in ("20", "20%", "20 %", "100", "0.5")] == [0.2, 0.2, 0.2, 1.0, 0.005]
+    assert typed_value(OF_INSTRUMENTS["tuning.transpose"], "2.5") is None
+    assert (
+        typed_value(OF_INSTRUMENTS["technique.strokes"], "both")
+        == typed_value(OF_INSTRUMENTS["technique.strokes"], "2")
+        == 2
+    )
 
 
 def test_names_of_keys_are_read_as_they_are_written_and_in_other_spellings():

@@ -12,10 +12,10 @@ from app.player.strings import Strings
 from app.playing.note import PluckVoices
 from app.rendering import NoteSound
 from app.session.choices import OBSERVED, Choices
-from app.shared.parameters import OF_INSTRUMENTS
 from app.stage.session import GATHER_S, RECORDED, Session
 from app.stage.stage import Asked, Begun, Chosen, Parked, Rendered, Turned, first_stage, next_stage
 from app.stage.step_words import step_words
+from engine.parameters import OF_INSTRUMENTS
 from engine.pluck import Pluck
 from engine.values.ear import Ear
 

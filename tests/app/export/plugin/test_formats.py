@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from app.export.plugin.image import Image
-from app.shared.parameters import OF_CHOICES, OF_INSTRUMENTS
+from app.shared.parameters import OF_CHOICES
+from engine.parameters import OF_INSTRUMENTS
 from tests.app.export.plugin import host, lv2_host, vst3_host
 from tests.app.export.plugin.abi import Sound
 from tests.app.export.plugin.pieces import RATE_HZ, active, difference_db, instrument_of, piece, played

@@ -15,8 +15,8 @@ from app.export.plugin import build
 from app.instruments.instrument import Instrument
 from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOn
 from app.player.strings import Strings
-from app.shared.parameters import OF_INSTRUMENTS
 from engine.kernels.midi import HARMONICS, STRUM, TREMOLO
+from engine.parameters import OF_INSTRUMENTS
 from tests.app.export.plugin import host, pieces
 from tests.app.export.plugin.abi import Sound
 from tests.app.export.plugin.host import Event, Library, choke, midi, note_off, note_on, param

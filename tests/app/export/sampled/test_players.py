@@ -12,7 +12,7 @@ from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND, release_timecents
 from app.export.sampled.sfz import release_s
 from app.instruments.library import find_instrument
-from app.shared.parameters import OF_INSTRUMENTS
+from engine.parameters import OF_INSTRUMENTS
 from engine.presets import find_preset, load_preset
 from tests.app.export.sampled import conftest as players
 from tests.app.export.sampled.conftest import PLAYERS, RATE_HZ, STEREO, cents, instrument_of, level_db, render, small

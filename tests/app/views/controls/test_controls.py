@@ -19,12 +19,12 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from app.shared.parameters import Parameter, Taper
 from app.views.controls.knob import DRAG_PIXELS, Knob
 from app.views.controls.meter import LIMIT_HOLD_TICKS, Meter
 from app.views.controls.notice_bar import MOST_KEPT, NoticeBar
 from app.views.controls.number_box import NumberBox
 from app.views.controls.playing_keys import X11, PlayingKeys
+from engine.parameters import Parameter, Taper
 from tests.app.gestures import (
     CONTROL,
     LEFT,
