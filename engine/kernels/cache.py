@@ -12,13 +12,18 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from engine.parameters import PLAYED
 from engine.whole_file import lasting_folder
 
 
 def _sources() -> list[Path]:
-    """The source files of all functions that make sound and pictures, and call one another across files."""
+    """The source files of all functions that make sound and pictures, and call one another across files.
+
+    The numbers of `bounds` and `levels` are in their code, too.
+    """
     engine = Path(__file__).parents[1]
-    return sorted([*(engine / "kernels").rglob("*.py"), *engine.glob("*/_*kernel.py")])
+    numbers = engine / "bounds.py", engine / "levels.py"
+    return sorted([*(engine / "kernels").rglob("*.py"), *engine.glob("*/_*kernel.py"), *numbers])
 
 
 @cache
@@ -26,6 +31,7 @@ def _version() -> str:
     digest = hashlib.sha256()
     for source in _sources():
         digest.update(source.read_bytes())
+    digest.update(" ".join(PLAYED).encode())  # the numbers of values are in code as well
     return digest.hexdigest()[:16]
 
 
@@ -52,9 +58,9 @@ def folder() -> Path | None:
 
 def _places() -> Iterator[Path]:
     """The folders for compiled kernels, in the order of preference."""
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(chosen)
     name = f"kernels-{_version()}"
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(chosen) / name
     yield Path(__file__).parent / "__pycache__" / name
     with suppress(RuntimeError):  # no home
         yield Path("~/.cache/learned-strings").expanduser() / name

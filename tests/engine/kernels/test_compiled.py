@@ -16,7 +16,7 @@ from numba.core.types.misc import unliteral
 
 from engine import warm
 from engine.effects import Effects
-from engine.kernels import numba_internals
+from engine.kernels import cache, numba_internals
 from engine.kernels.compiled import COMPILED
 from engine.kernels.fields import slot
 from engine.kernels.memory import publish
@@ -81,6 +81,14 @@ def test_a_function_is_loaded_where_the_program_was_moved_and_compiled_where_its
     assert printed(LOADS, str(places[1]), **kept) == ["0", "11"]
 
 
+def test_what_is_compiled_is_kept_by_the_order_of_values(monkeypatch):
+    places = {*cache._places()}
+    monkeypatch.setattr(cache, "PLAYED", cache.PLAYED[::-1])
+    cache._version.cache_clear()
+    assert places.isdisjoint(cache._places())
+    cache._version.cache_clear()
+
+
 # no folder but the temporary one can be written, as of a program in a read-only image without a home
 READ_ONLY = (
     "import tempfile; from pathlib import Path; temporary = tempfile.TemporaryFile\n"
@@ -100,7 +108,8 @@ REPORT = (
 def test_the_users_own_folder_is_used_and_without_any_it_is_compiled_and_not_kept(tmp_path):
     code = "from engine.kernels import cache; from engine.kernels.compiled import tanh\n" + REPORT
     found = printed(code, NUMBA_CACHE_DIR=str(tmp_path))
-    assert found == [str(tmp_path), "True", "False", "None", "True", "1", "1"]
+    (kept,) = tmp_path.iterdir()
+    assert found == [str(kept), "True", "False", "None", "True", "1", "1"]
     code = READ_ONLY.replace("temporary = ", "tempfile.tempdir = '/dev/null/nowhere'; temporary = ")
     assert printed(code + REPORT) == ["None", "None", "False", "None", "False", "1", "None"]
 
