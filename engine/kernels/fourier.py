@@ -9,6 +9,7 @@ a power of two with a chirp (L. Bluestein, IEEE Trans. Audio Electroacoust. 18 (
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,6 +23,7 @@ SPARE = 2
 ONE = 4
 TWO = 6
 ROWS = 8
+Complex: TypeAlias = tuple[np.ndarray, np.ndarray]  # real and imaginary parts
 RUN = 16  # numbers of a chirp that are computed one from the other
 
 
@@ -44,7 +46,7 @@ def transform(
     exchanged = False
     while left > 1:
         if left % 4 == 0:
-            _fours(re, im, re2, im2, cosines, sines, left // 4, stride, unit * stride)
+            _fours((re, im), (re2, im2), (cosines, sines), left // 4, stride, unit * stride)
             left, stride = left // 4, stride * 4
         else:
             for q in range(stride):
@@ -59,21 +61,12 @@ def transform(
 
 
 @kernel
-def _fours(
-    re: np.ndarray,
-    im: np.ndarray,
-    re2: np.ndarray,
-    im2: np.ndarray,
-    cosines: np.ndarray,
-    sines: np.ndarray,
-    count: int,
-    stride: int,
-    unit: int,
-) -> None:
+def _fours(source: Complex, target: Complex, circle: Complex, count: int, stride: int, unit: int) -> None:
     """Compute one pass of butterflies of four: x[q + stride (p + count j)] to y[q + stride (4p + j)].
 
     Real and imaginary parts are arrays by themselves, so that a processor takes several numbers at once.
     """
+    (re, im), (re2, im2), (cosines, sines) = source, target, circle
     apart = stride * count
     for p in range(count):
         c1, s1 = cosines[p * unit], -sines[p * unit]

@@ -142,12 +142,13 @@ def _sweep(turns: bool):
 
     Returns a function of `near` blocks, which 0, 1, 2 or 4 ears hear, and the `far` ones behind them; of S (1 - 2R)
     and S². It gives Σ η² A x² and Σ η² κ r x² at the node where they are then. It writes two sums for each ear to
-    `heard`: that of the weights, and that of the weights times κ p. Each number is taken by itself, so that all stay
-    in registers.
+    `heard`: that of the weights, and that of the weights times κ p.
     """
 
     @intrinsic
     def sweep(typing_context, memory, first, near, far, ears, linear, squared, at_points):
+        """The code of a sweep, which takes each number by itself, so that all stay in registers."""
+
         def generate(context, builder, signature, arguments):
             first, near, far, ears = arguments[1:5]
             behind = builder.add(first, builder.mul(near, _WHOLE(BLOCK)))

@@ -84,6 +84,8 @@ def node(
 ) -> tuple[float, float]:
     """The kick of the common tension and the turn to the next node, in place.
 
+    It takes each number by itself, as `lanes.turn`: all stay in registers.
+
     Args:
         sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks there.
     """
