@@ -60,6 +60,7 @@ PERCENT = Taper(0.02, "{:.0%}")
 COUNT = Taper(1, "{:.0f}")
 CONCERT_PITCH = Taper(2 ** (1 / 1200), "{:.1f} Hz", True)
 CENTS = Taper(1, "{:.0f} cents")
+CURVE = Taper(0.05, "{:+.2f}")
 HERTZ = Taper(1.05, "{:.1f} Hz", True)
 
 
@@ -74,7 +75,8 @@ class Parameter:
         label: on a knob.
         limits: the lowest and the highest value.
         group: title of the knobs that it stands with; "": none.
-        modulation: what may change it besides its knob: a learned controller, also macros, also the modulation wheel.
+        modulation: what may change it besides its knob: a learned controller, also macros, also the modulation wheel,
+            which may where it has an end.
         name: in a sentence or a list; empty: the label.
         wheel: its value at the modulation wheel's end; None: `wheel_factor` times its own value.
         figure_unit: unit of the physical figure that its knob shows, see `app.player.facts`; None: none.
@@ -112,6 +114,8 @@ class Parameter:
                 raise ValueError(f"{self.id}: {what} {value:g} is not within {self.limits[0]:g} … {self.limits[1]:g}")
         object.__setattr__(self, "name", self.name or self.label)
         object.__setattr__(self, "whole", self.whole or bool(self.words))
+        if self.wheel is not None or self.wheel_factor != 1.0:
+            object.__setattr__(self, "modulation", "wheel")
 
     @property
     def curve(self) -> float:
@@ -177,12 +181,12 @@ def _knob(part: str, label: str, limits: tuple[float, float], unit: str, name: s
     """A multiplier of the string, which the wheel multiplies at its end; `unit`: of its figure."""
     group, id = DECAY if part in ("decay", "brightness_decay") else STRING, f"knobs.{part}"
     others.setdefault("wheel_factor", 4.0)
-    return Parameter(id, label, limits, 1.0, TIMES, group, "wheel", name, figure_unit=unit, **others)
+    return Parameter(id, label, limits, 1.0, TIMES, group, name=name, figure_unit=unit, **others)
 
 
 def _width(part: str, label: str, default: float, velocity: str, played: int) -> Parameter:
     id, name = f"pluck.{part}", f"width ({velocity} velocity)"
-    return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, "wheel", name, wheel=0.02, played=played)
+    return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, name=name, wheel=0.02, played=played)
 
 
 def by_id(rows: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
@@ -191,9 +195,10 @@ def by_id(rows: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
 
 
 MULTIPLIER = (0.05, 20.0)
-AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+PULL_MM = (0.001, LARGEST_AMPLITUDE_MM)
 STROKES = "down", "up", "both"
-NOISE_DB = (-60.0, 6.0)  # the lowest is off
+OFF_DB = -60.0  # no noise at all
+NOISE_DB = (OFF_DB, 6.0)
 LISTEN = 0.37  # no low mode is still there
 _OF_INSTRUMENTS = {  # by their tips
     "Pitch of A4": Parameter("tuning.a4_hz", "A4", (220, 880), 440, CONCERT_PITCH, PITCH, name="pitch of A4"),
@@ -226,32 +231,14 @@ _OF_INSTRUMENTS = {  # by their tips
         "brightness_decay", "HF loss", MULTIPLIER, "s", played=2, drums=True
     ),
     "Time in which a released key falls by 60 dB": Parameter(
-        "damping.release_t60_s",
-        "release",
-        (0.01, 60),
-        0.3,
-        SECONDS,
-        DECAY,
-        "wheel",
-        wheel_factor=10,
-        played=16,
-        drums=True,
+        "damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, wheel_factor=10, played=16, drums=True
     ),
     (
         "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. The larger of knob "
         "and MIDI's soft pedal (controller 67) counts"
-    ): Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", wheel=1.0, played=20),
+    ): Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, name="palm mute", wheel=1.0, played=20),
     f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}": Parameter(
-        "pluck.position",
-        "position",
-        POSITION_RANGE,
-        0.2,
-        PLACE,
-        PLUCK,
-        "wheel",
-        "pluck position",
-        wheel=0.5,
-        played=8,
+        "pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, name="pluck position", wheel=0.5, played=8
     ),
     "Width of the softest pluck, in lengths of the string: wide is mellow": _width(
         "width", "soft width", 0.12, "low", played=9
@@ -260,32 +247,13 @@ _OF_INSTRUMENTS = {  # by their tips
         "width_hard", "hard width", 0.06, "high", played=10
     ),
     "How far the softest key pulls the string": Parameter(
-        "pluck.softest_mm", "softest", AMPLITUDE_MM, 0.1, MM, PLUCK, "macro", "softest amplitude", played=11
+        "pluck.softest_mm", "softest", PULL_MM, 0.1, MM, PLUCK, "macro", "softest amplitude", played=11
     ),
     "How far the hardest key pulls the string": Parameter(
-        "pluck.hardest_mm",
-        "hardest",
-        AMPLITUDE_MM,
-        3.0,
-        MM,
-        PLUCK,
-        "wheel",
-        "hardest amplitude",
-        wheel_factor=2,
-        played=12,
+        "pluck.hardest_mm", "hardest", PULL_MM, 3.0, MM, PLUCK, name="hardest amplitude", wheel_factor=2, played=12
     ),
     "Velocity curve: above 0 middle velocities are louder, below 0 softer": Parameter(
-        "pluck.curve",
-        "curve",
-        (-1, 1),
-        0,
-        Taper(0.05, "{:+.2f}"),
-        PLUCK,
-        "wheel",
-        "velocity curve",
-        wheel=1.0,
-        played=15,
-        drums=True,
+        "pluck.curve", "curve", (-1, 1), 0, CURVE, PLUCK, name="velocity curve", wheel=1.0, played=15, drums=True
     ),
     (
         "Time in which the softest pluck releases the string, or the softest hammer touches it: longer is "
@@ -311,28 +279,17 @@ _OF_INSTRUMENTS = {  # by their tips
         "javari.gap_um", "javari", (0, 200), 5, Taper(0.02, "{:.1f} µm", curve=100.0), "", "macro", played=27
     ),
     "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off": Parameter(
-        "noise.onset_db",
-        "stroke",
-        NOISE_DB,
-        NOISE_DB[0],
-        DECIBELS,
-        NOISE,
-        "macro",
-        "stroke noise",
-        played=18,
-        drums=True,
+        "noise.onset_db", "stroke", NOISE_DB, OFF_DB, DECIBELS, NOISE, "macro", "stroke noise", played=18, drums=True
     ),
     "Noise of the damper or finger that ends a note. The lowest is off": Parameter(
-        "noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise", played=19
+        "noise.release_db", "release", NOISE_DB, OFF_DB, DECIBELS, NOISE, "macro", "release noise", played=19
     ),
     (
         "Harmonics: a finger touches the string at 1/n of its length as it is plucked, so that partial n is "
         "the lowest. 1: it does not"
-    ): Parameter(
-        "technique.harmonic", "harmonic", (1, 5), 1, COUNT, TECHNIQUE, "wheel", wheel=2, whole=True, played=21
-    ),
+    ): Parameter("technique.harmonic", "harmonic", (1, 5), 1, COUNT, TECHNIQUE, wheel=2, whole=True, played=21),
     "Strum: time from one string of a chord to the next. 0: all at once": Parameter(
-        "technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, "wheel", wheel=40, played=22
+        "technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, wheel=40, played=22
     ),
     "Strokes of strums: from low to high (down), from high to low (up), or by turns (both)": Parameter(
         "technique.strokes",
@@ -347,30 +304,13 @@ _OF_INSTRUMENTS = {  # by their tips
         played=23,
     ),
     "Tremolo: how often a key that is held plucks its string. 0: once": Parameter(
-        "technique.tremolo_hz",
-        "tremolo",
-        (0, 16),
-        0,
-        Taper(0.5, "{:.1f} Hz"),
-        TECHNIQUE,
-        "wheel",
-        wheel=12,
-        played=24,
+        "technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, wheel=12, played=24
     ),
     "Vibrato: how far the pitch goes up and down. 0: none": Parameter(
-        "technique.vibrato_cents",
-        "vibrato",
-        (0, 100),
-        0,
-        CENTS,
-        TECHNIQUE,
-        "wheel",
-        "vibrato depth",
-        wheel=35,
-        played=25,
+        "technique.vibrato_cents", "vibrato", (0, 100), 0, CENTS, TECHNIQUE, name="vibrato depth", wheel=35, played=25
     ),
     "How often a vibrato goes up and down in a second": Parameter(
-        "technique.vibrato_hz", "rate", (0.5, 12), 5.5, HERTZ, TECHNIQUE, "wheel", "vibrato rate", wheel=7, played=26
+        "technique.vibrato_hz", "rate", (0.5, 12), 5.5, HERTZ, TECHNIQUE, name="vibrato rate", wheel=7, played=26
     ),
     f"Where the string is heard; {_PLACE_TIP}": Parameter(
         "pickup.points.0", "place", (0, 1), LISTEN, PLACE, PICKUP, "macro", "listening point", played=29, drums=True
@@ -394,16 +334,16 @@ _OF_INSTRUMENTS = {  # by their tips
         "amp.tone_db", "amp tone", AMP_TONE_DB, 0.0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"
     ),
     "Mix of the body: 0 % the strings alone, 100 % the body alone": Parameter(
-        "body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", wheel=1.0, played=28
+        "body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, name="body mix", wheel=1.0, played=28
     ),
     "Size of the body: a larger one resonates lower": Parameter(
-        "body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2
+        "body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, name="body size", wheel_factor=2
     ),
     "Mix of the room: 0 % without it, 100 % its reverberation alone": Parameter(
-        "room.mix", "room", (0, 1), 0.0, PERCENT, BODY, "wheel", wheel=1.0
+        "room.mix", "room", (0, 1), 0.0, PERCENT, BODY, wheel=1.0
     ),
     "Time in which the room's reverberation falls by 60 dB": Parameter(
-        "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3
+        "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, name="reverberation time", wheel_factor=3
     ),
     "How far the pitch wheel bends when it is turned all the way": Parameter(
         "bend_semitones", "bend range", (0, 48), 2, Taper(1, "{:g} semitones"), played=17
