@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 from engine.bounds import (
@@ -184,14 +184,14 @@ def _knob(part: str, label: str, limits: tuple[float, float], unit: str, name: s
     return Parameter(id, label, limits, 1.0, TIMES, group, name=name, figure_unit=unit, **others)
 
 
-def _width(part: str, label: str, default: float, velocity: str, played: int) -> Parameter:
+def _width(part: str, label: str, default: float, velocity: str, **others: Any) -> Parameter:
     id, name = f"pluck.{part}", f"width ({velocity} velocity)"
-    return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, name=name, wheel=0.02, played=played)
+    return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, name=name, wheel=0.02, **others)
 
 
-def by_id(rows: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
-    """The table of these rows, which are given by their tips."""
-    return {row.id: replace(row, tip=tip) for tip, row in rows.items()}
+def by_id(rows: Iterable[Parameter]) -> Mapping[str, Parameter]:
+    """The table of these rows, by their ids."""
+    return {row.id: row for row in rows}
 
 
 MULTIPLIER = (0.05, 20.0)
@@ -200,68 +200,199 @@ STROKES = "down", "up", "both"
 OFF_DB = -60.0  # no noise at all
 NOISE_DB = (OFF_DB, 6.0)
 LISTEN = 0.37  # no low mode is still there
-_OF_INSTRUMENTS = {  # by their tips
-    "Pitch of A4": Parameter("tuning.a4_hz", "A4", (220, 880), 440, CONCERT_PITCH, PITCH, name="pitch of A4"),
-    "Transposition, in keys": Parameter(
-        "tuning.transpose", "transpose", (-48, 48), 0, Taper(1, "{:+.0f}"), PITCH, name="transposition", whole=True
+_OF_INSTRUMENTS = (
+    Parameter("tuning.a4_hz", "A4", (220, 880), 440, CONCERT_PITCH, PITCH, name="pitch of A4", tip="Pitch of A4"),
+    Parameter(
+        "tuning.transpose",
+        "transpose",
+        (-48, 48),
+        0,
+        Taper(1, "{:+.0f}"),
+        PITCH,
+        name="transposition",
+        whole=True,
+        tip="Transposition, in keys",
     ),
-    "Tension; the pitch stays, so that the length follows. Tight strings glide less at hard plucks": _knob(
-        "tension", "tension", (0.0625, 16.0), "N", played=6
+    _knob(
+        "tension",
+        "tension",
+        (0.0625, 16.0),
+        "N",
+        played=6,
+        tip="Tension; the pitch stays, so that the length follows. Tight strings glide less at hard plucks",
     ),
-    "Length of the string; the pitch stays, so that the tension follows: longer is tighter": _knob(
-        "length", "length", (0.25, 4.0), "mm", "string length", wheel_factor=2.0, played=7
+    _knob(
+        "length",
+        "length",
+        (0.25, 4.0),
+        "mm",
+        "string length",
+        wheel_factor=2.0,
+        played=7,
+        tip="Length of the string; the pitch stays, so that the tension follows: longer is tighter",
     ),
-    "Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer": _knob(
-        "gauge", "gauge", (0.25, 4.0), "mm", played=5
+    _knob(
+        "gauge",
+        "gauge",
+        (0.25, 4.0),
+        "mm",
+        played=5,
+        tip="Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer",
     ),
-    "Mass of the material at the same length: gut is light and slack, steel heavy and tight": _knob(
-        "density", "density", MULTIPLIER, "kg/m³", played=4
+    _knob(
+        "density",
+        "density",
+        MULTIPLIER,
+        "kg/m³",
+        played=4,
+        tip="Mass of the material at the same length: gut is light and slack, steel heavy and tight",
     ),
-    "Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch": _knob(
-        "modulus", "modulus", MULTIPLIER, "GPa", played=3, drums=True
+    _knob(
+        "modulus",
+        "modulus",
+        MULTIPLIER,
+        "GPa",
+        played=3,
+        drums=True,
+        tip="Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch",
     ),
-    (
-        "Bending stiffness: more is more metallic. The figure is the inharmonicity B: partial n of f lies at "
-        "n f √(1 + B n²)"
-    ): _knob("stiffness", "stiffness", MULTIPLIER, "", played=0),
-    "Damping of all partials: right is shorter. The figure is the T60 of the first": _knob(
-        "decay", "decay", MULTIPLIER, "s", played=1, drums=True
+    _knob(
+        "stiffness",
+        "stiffness",
+        MULTIPLIER,
+        "",
+        played=0,
+        tip=(
+            "Bending stiffness: more is more metallic. The figure is the inharmonicity B: partial n of f lies at "
+            "n f √(1 + B n²)"
+        ),
     ),
-    "Damping of high partials: right is darker. The figure is the T60 of the partial near 3 kHz": _knob(
-        "brightness_decay", "HF loss", MULTIPLIER, "s", played=2, drums=True
+    _knob(
+        "decay",
+        "decay",
+        MULTIPLIER,
+        "s",
+        played=1,
+        drums=True,
+        tip="Damping of all partials: right is shorter. The figure is the T60 of the first",
     ),
-    "Time in which a released key falls by 60 dB": Parameter(
-        "damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, wheel_factor=10, played=16, drums=True
+    _knob(
+        "brightness_decay",
+        "HF loss",
+        MULTIPLIER,
+        "s",
+        played=2,
+        drums=True,
+        tip="Damping of high partials: right is darker. The figure is the T60 of the partial near 3 kHz",
     ),
-    (
-        "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. The larger of knob "
-        "and MIDI's soft pedal (controller 67) counts"
-    ): Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, name="palm mute", wheel=1.0, played=20),
-    f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}": Parameter(
-        "pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, name="pluck position", wheel=0.5, played=8
+    Parameter(
+        "damping.release_t60_s",
+        "release",
+        (0.01, 60),
+        0.3,
+        SECONDS,
+        DECAY,
+        wheel_factor=10,
+        played=16,
+        drums=True,
+        tip="Time in which a released key falls by 60 dB",
     ),
-    "Width of the softest pluck, in lengths of the string: wide is mellow": _width(
-        "width", "soft width", 0.12, "low", played=9
+    Parameter(
+        "damping.mute",
+        "mute",
+        (0, 1),
+        0,
+        MUTED,
+        TECHNIQUE,
+        name="palm mute",
+        wheel=1.0,
+        played=20,
+        tip=(
+            "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. The larger of knob "
+            "and MIDI's soft pedal (controller 67) counts"
+        ),
     ),
-    "Width of the hardest pluck, in lengths of the string: narrow is bright": _width(
-        "width_hard", "hard width", 0.06, "high", played=10
+    Parameter(
+        "pluck.position",
+        "position",
+        POSITION_RANGE,
+        0.2,
+        PLACE,
+        PLUCK,
+        name="pluck position",
+        wheel=0.5,
+        played=8,
+        tip=f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}",
     ),
-    "How far the softest key pulls the string": Parameter(
-        "pluck.softest_mm", "softest", PULL_MM, 0.1, MM, PLUCK, "macro", "softest amplitude", played=11
+    _width(
+        "width",
+        "soft width",
+        0.12,
+        "low",
+        played=9,
+        tip="Width of the softest pluck, in lengths of the string: wide is mellow",
     ),
-    "How far the hardest key pulls the string": Parameter(
-        "pluck.hardest_mm", "hardest", PULL_MM, 3.0, MM, PLUCK, name="hardest amplitude", wheel_factor=2, played=12
+    _width(
+        "width_hard",
+        "hard width",
+        0.06,
+        "high",
+        played=10,
+        tip="Width of the hardest pluck, in lengths of the string: narrow is bright",
     ),
-    "Velocity curve: above 0 middle velocities are louder, below 0 softer": Parameter(
-        "pluck.curve", "curve", (-1, 1), 0, CURVE, PLUCK, name="velocity curve", wheel=1.0, played=15, drums=True
+    Parameter(
+        "pluck.softest_mm",
+        "softest",
+        PULL_MM,
+        0.1,
+        MM,
+        PLUCK,
+        "macro",
+        "softest amplitude",
+        played=11,
+        tip="How far the softest key pulls the string",
     ),
-    (
-        "Time in which the softest pluck releases the string, or the softest hammer touches it: longer is "
-        "mellower. 0: at once"
-    ): Parameter(
-        "pluck.release_ms", "soft contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (low velocity)", played=13
+    Parameter(
+        "pluck.hardest_mm",
+        "hardest",
+        PULL_MM,
+        3.0,
+        MM,
+        PLUCK,
+        name="hardest amplitude",
+        wheel_factor=2,
+        played=12,
+        tip="How far the hardest key pulls the string",
     ),
-    "The same of the hardest pluck or hammer": Parameter(
+    Parameter(
+        "pluck.curve",
+        "curve",
+        (-1, 1),
+        0,
+        CURVE,
+        PLUCK,
+        name="velocity curve",
+        wheel=1.0,
+        played=15,
+        drums=True,
+        tip="Velocity curve: above 0 middle velocities are louder, below 0 softer",
+    ),
+    Parameter(
+        "pluck.release_ms",
+        "soft contact",
+        (0, 20),
+        0,
+        CONTACT,
+        PLUCK,
+        "macro",
+        "contact (low velocity)",
+        played=13,
+        tip=(
+            "Time in which the softest pluck releases the string, or the softest hammer touches it: longer is "
+            "mellower. 0: at once"
+        ),
+    ),
+    Parameter(
         "pluck.release_hard_ms",
         "hard contact",
         (0, 20),
@@ -271,27 +402,74 @@ _OF_INSTRUMENTS = {  # by their tips
         "macro",
         "contact (high velocity)",
         played=14,
+        tip="The same of the hardest pluck or hammer",
     ),
-    (
-        "Javari: from the string at rest to the edge of its bridge, which makes it buzz. Nearer buzzes more "
-        "and sooner"
-    ): Parameter(
-        "javari.gap_um", "javari", (0, 200), 5, Taper(0.02, "{:.1f} µm", curve=100.0), "", "macro", played=27
+    Parameter(
+        "javari.gap_um",
+        "javari",
+        (0, 200),
+        5,
+        Taper(0.02, "{:.1f} µm", curve=100.0),
+        "",
+        "macro",
+        played=27,
+        tip=(
+            "Javari: from the string at rest to the edge of its bridge, which makes it buzz. Nearer buzzes more "
+            "and sooner"
+        ),
     ),
-    "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off": Parameter(
-        "noise.onset_db", "stroke", NOISE_DB, OFF_DB, DECIBELS, NOISE, "macro", "stroke noise", played=18, drums=True
+    Parameter(
+        "noise.onset_db",
+        "stroke",
+        NOISE_DB,
+        OFF_DB,
+        DECIBELS,
+        NOISE,
+        "macro",
+        "stroke noise",
+        played=18,
+        drums=True,
+        tip="Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off",
     ),
-    "Noise of the damper or finger that ends a note. The lowest is off": Parameter(
-        "noise.release_db", "release", NOISE_DB, OFF_DB, DECIBELS, NOISE, "macro", "release noise", played=19
+    Parameter(
+        "noise.release_db",
+        "release",
+        NOISE_DB,
+        OFF_DB,
+        DECIBELS,
+        NOISE,
+        "macro",
+        "release noise",
+        played=19,
+        tip="Noise of the damper or finger that ends a note. The lowest is off",
     ),
-    (
-        "Harmonics: a finger touches the string at 1/n of its length as it is plucked, so that partial n is "
-        "the lowest. 1: it does not"
-    ): Parameter("technique.harmonic", "harmonic", (1, 5), 1, COUNT, TECHNIQUE, wheel=2, whole=True, played=21),
-    "Strum: time from one string of a chord to the next. 0: all at once": Parameter(
-        "technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, wheel=40, played=22
+    Parameter(
+        "technique.harmonic",
+        "harmonic",
+        (1, 5),
+        1,
+        COUNT,
+        TECHNIQUE,
+        wheel=2,
+        whole=True,
+        played=21,
+        tip=(
+            "Harmonics: a finger touches the string at 1/n of its length as it is plucked, so that partial n is "
+            "the lowest. 1: it does not"
+        ),
     ),
-    "Strokes of strums: from low to high (down), from high to low (up), or by turns (both)": Parameter(
+    Parameter(
+        "technique.strum_ms",
+        "strum",
+        (0, 60),
+        0,
+        Taper(1, "{:.0f} ms"),
+        TECHNIQUE,
+        wheel=40,
+        played=22,
+        tip="Strum: time from one string of a chord to the next. 0: all at once",
+    ),
+    Parameter(
         "technique.strokes",
         "strokes",
         (0, 2),
@@ -302,20 +480,57 @@ _OF_INSTRUMENTS = {  # by their tips
         "strokes of strums",
         words=STROKES,
         played=23,
+        tip="Strokes of strums: from low to high (down), from high to low (up), or by turns (both)",
     ),
-    "Tremolo: how often a key that is held plucks its string. 0: once": Parameter(
-        "technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, wheel=12, played=24
+    Parameter(
+        "technique.tremolo_hz",
+        "tremolo",
+        (0, 16),
+        0,
+        Taper(0.5, "{:.1f} Hz"),
+        TECHNIQUE,
+        wheel=12,
+        played=24,
+        tip="Tremolo: how often a key that is held plucks its string. 0: once",
     ),
-    "Vibrato: how far the pitch goes up and down. 0: none": Parameter(
-        "technique.vibrato_cents", "vibrato", (0, 100), 0, CENTS, TECHNIQUE, name="vibrato depth", wheel=35, played=25
+    Parameter(
+        "technique.vibrato_cents",
+        "vibrato",
+        (0, 100),
+        0,
+        CENTS,
+        TECHNIQUE,
+        name="vibrato depth",
+        wheel=35,
+        played=25,
+        tip="Vibrato: how far the pitch goes up and down. 0: none",
     ),
-    "How often a vibrato goes up and down in a second": Parameter(
-        "technique.vibrato_hz", "rate", (0.5, 12), 5.5, HERTZ, TECHNIQUE, name="vibrato rate", wheel=7, played=26
+    Parameter(
+        "technique.vibrato_hz",
+        "rate",
+        (0.5, 12),
+        5.5,
+        HERTZ,
+        TECHNIQUE,
+        name="vibrato rate",
+        wheel=7,
+        played=26,
+        tip="How often a vibrato goes up and down in a second",
     ),
-    f"Where the string is heard; {_PLACE_TIP}": Parameter(
-        "pickup.points.0", "place", (0, 1), LISTEN, PLACE, PICKUP, "macro", "listening point", played=29, drums=True
+    Parameter(
+        "pickup.points.0",
+        "place",
+        (0, 1),
+        LISTEN,
+        PLACE,
+        PICKUP,
+        "macro",
+        "listening point",
+        played=29,
+        drums=True,
+        tip=f"Where the string is heard; {_PLACE_TIP}",
     ),
-    "Where the right channel hears the string; an instrument in mono has none": Parameter(
+    Parameter(
         "pickup.points.1",
         "right",
         (0, 1),
@@ -326,30 +541,87 @@ _OF_INSTRUMENTS = {  # by their tips
         "right listening point",
         played=30,
         drums=True,
+        tip="Where the right channel hears the string; an instrument in mono has none",
     ),
-    "Drive of the amplifier before the body, which may be its cabinet; 0 dB: there is none": Parameter(
-        "amp.drive_db", "drive", AMP_DRIVE_DB, 0.0, Taper(1, "{:.0f} dB"), BODY, "macro", "amplifier drive"
+    Parameter(
+        "amp.drive_db",
+        "drive",
+        AMP_DRIVE_DB,
+        0.0,
+        Taper(1, "{:.0f} dB"),
+        BODY,
+        "macro",
+        "amplifier drive",
+        tip="Drive of the amplifier before the body, which may be its cabinet; 0 dB: there is none",
     ),
-    "Tone of the amplifier: above 0 brighter, below darker, about 700 Hz": Parameter(
-        "amp.tone_db", "amp tone", AMP_TONE_DB, 0.0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"
+    Parameter(
+        "amp.tone_db",
+        "amp tone",
+        AMP_TONE_DB,
+        0.0,
+        Taper(0.5, "{:+.1f} dB"),
+        BODY,
+        "macro",
+        "amplifier tone",
+        tip="Tone of the amplifier: above 0 brighter, below darker, about 700 Hz",
     ),
-    "Mix of the body: 0 % the strings alone, 100 % the body alone": Parameter(
-        "body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, name="body mix", wheel=1.0, played=28
+    Parameter(
+        "body.mix",
+        "mix",
+        (0, 1),
+        0.5,
+        PERCENT,
+        BODY,
+        name="body mix",
+        wheel=1.0,
+        played=28,
+        tip="Mix of the body: 0 % the strings alone, 100 % the body alone",
     ),
-    "Size of the body: a larger one resonates lower": Parameter(
-        "body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, name="body size", wheel_factor=2
+    Parameter(
+        "body.size",
+        "size",
+        BODY_SIZE,
+        1.0,
+        TIMES,
+        BODY,
+        name="body size",
+        wheel_factor=2,
+        tip="Size of the body: a larger one resonates lower",
     ),
-    "Mix of the room: 0 % without it, 100 % its reverberation alone": Parameter(
-        "room.mix", "room", (0, 1), 0.0, PERCENT, BODY, wheel=1.0
+    Parameter(
+        "room.mix",
+        "room",
+        (0, 1),
+        0.0,
+        PERCENT,
+        BODY,
+        wheel=1.0,
+        tip="Mix of the room: 0 % without it, 100 % its reverberation alone",
     ),
-    "Time in which the room's reverberation falls by 60 dB": Parameter(
-        "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, name="reverberation time", wheel_factor=3
+    Parameter(
+        "room.t60_s",
+        "time",
+        ROOM_T60_S,
+        1.2,
+        SECONDS,
+        BODY,
+        name="reverberation time",
+        wheel_factor=3,
+        tip="Time in which the room's reverberation falls by 60 dB",
     ),
-    "How far the pitch wheel bends when it is turned all the way": Parameter(
-        "bend_semitones", "bend range", (0, 48), 2, Taper(1, "{:g} semitones"), played=17
+    Parameter(
+        "bend_semitones",
+        "bend range",
+        (0, 48),
+        2,
+        Taper(1, "{:g} semitones"),
+        played=17,
+        tip="How far the pitch wheel bends when it is turned all the way",
     ),
-    "Level of the instrument; saved with it": Parameter("level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro"),
-}
+    Parameter(
+        "level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro", tip="Level of the instrument; saved with it"
+    ),
+)
 OF_INSTRUMENTS = by_id(_OF_INSTRUMENTS)
 # Kernels keep the values of a part together: multipliers of strings, plucks, all others, then body and pick-up
 _ORDER_OF_PARTS: Mapping[str, int] = {"knobs": 0, "pluck": 1, "body": 3, "pickup": 4}
