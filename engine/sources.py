@@ -47,7 +47,7 @@ class SourceState:
         return SourceState(inner, self.frame + steps, self.limit_m)
 
 
-class _TorchModel:
+class TorchModel:
     """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
 
     def __init__(self, model: StringModel[Any]) -> None:
@@ -64,12 +64,22 @@ class _TorchModel:
         motion, after = self._call(self._model.sample, state, frames, steps)
         return motion.numpy(), after
 
+    def log_eigenvalues(self) -> list[NDArray[np.complex128]]:
+        return [log.numpy() for log in self._call(self._model.log_eigenvalues)]
+
     @staticmethod
     def _call(method: Callable[..., Any], *values: Any) -> Any:
         import torch
 
         with torch.inference_mode():
             return method(*(torch.from_numpy(value) if isinstance(value, np.ndarray) else value for value in values))
+
+
+def array_model(preset: Preset) -> TensionArrays | TorchModel:
+    """The model of a preset on arrays, as `StringModel` has it; no motion is checked. Of one string: and torch."""
+    if preset.info.of_many_strings:
+        return TensionArrays(preset.configuration, preset.weights)
+    return TorchModel(preset.model)
 
 
 class ModelSource:
@@ -81,11 +91,8 @@ class ModelSource:
     """
 
     def __init__(self, preset: Preset) -> None:
-        self._model: TensionArrays | _TorchModel
-        if preset.info.of_many_strings:
-            self._model, self.any_frame = TensionArrays(preset.configuration, preset.weights), True
-        else:
-            self._model, self.any_frame = _TorchModel(preset.model), preset.model.any_frame
+        self._model = array_model(preset)
+        self.any_frame = preset.info.of_many_strings or preset.model.any_frame
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points

@@ -19,7 +19,7 @@ from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.resonators.sine_transform import project
-from engine.sources import TruthSource
+from engine.sources import TruthSource, array_model
 
 SMALLEST_AMPLITUDE_MM = 0.5
 STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
@@ -116,24 +116,21 @@ class ErrorPlane:
 
 def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
     """A function of plucks and a job: relative MAEs (plucks,) over the trained horizon, infinite where not finite."""
-    import torch
-
     from engine.truth import default_substeps
 
-    info, model = preset.info, preset.model
+    info, model = preset.info, array_model(preset)
     truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // SUBSTEP_DIVISOR))
 
-    @torch.inference_mode()
     def errors(plucks: list[Pluck], job: Job) -> Array:
         initial = project(np.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
-        state = model.encode(torch.from_numpy(initial / info.scale_m).float())
+        state = model.encode((initial / info.scale_m).astype(np.float32))
         true_state = truth.start(initial)
         sums, first = ErrorSums(info.horizon_steps), 0
         while first < info.horizon_steps:
             steps = min(FRAMES_AT_ONCE, info.horizon_steps - first)
             predicted, state = model.advance(state, steps)
             true, true_state = truth.advance(true_state, steps)
-            sums.add(predicted.numpy() * info.scale_m, true, first)
+            sums.add(predicted * info.scale_m, true, first)
             first += steps
             job.check()
         return sums.per_trajectory()[1]

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.presets import Preset, PresetInfo
+from engine.sources import array_model
 
 NEPERS_OF_60_DB = math.log(1000)
 
+VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
 BELIEVABLE_S = (1e-3, 100.0)  # decay times are clipped to this range
 DECAY_WEIGHT = 0.25  # an octave of decay time counts as this share of the fundamental's frequency
 
@@ -72,7 +74,7 @@ def pole_figure(preset: Preset) -> PoleFigure:
     """The eigenvalues of a preset's model, and those of its string for small amplitudes."""
     info = preset.info
     string_logs = info.resonator.eigenvalues() / info.rate_hz
-    layer_logs = [log.numpy() for log in preset.model.log_eigenvalues()]
+    layer_logs = array_model(preset).log_eigenvalues()
     note = _NOTES.get(info.model, "")
     if not layer_logs:
         note = f"a {info.model} has no eigenvalues: its whole field goes through a network at every sample"
@@ -80,8 +82,6 @@ def pole_figure(preset: Preset) -> PoleFigure:
 
 
 def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
-    from engine.models.eigenvalues import VANISHED  # and torch
-
     kept = [_upper_half(log[log.real > math.log(VANISHED)]) for log in layers]
     log = np.concatenate([*kept, np.empty(0, complex)])
     layer = np.repeat(np.arange(len(kept)), [len(poles) for poles in kept])

@@ -282,6 +282,11 @@ class TensionLaw:
         library = library_of(self.nu_log)
         return library.exp(library.clip(self.nu_log, -30, 5)), library.exp(library.clip(self.theta_log, -16, 6))
 
+    def log_eigenvalues(self) -> list[Values]:
+        """The log eigenvalues of a quiet string."""
+        sigma, omega = self._rates()
+        return [-sigma + 1j * omega]
+
     @property
     def _coupling(self) -> Values:
         return library_of(self.coupling).clip(self.coupling, 0, None)

@@ -14,7 +14,6 @@ from torch import Tensor, nn
 
 from engine.models._tension_law import SLOWEST_LOG
 
-VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
 STORED = frozenset({"nu_log", "theta_log"})  # the names of parameters that hold ν_log and θ_log
 
 

@@ -46,7 +46,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from engine.models._tension_law import (
     CURVES,
@@ -102,9 +102,3 @@ class KoopmanTension(TensionLaw, StringModel[KoopmanTensionState]):
         arrays = resonator_arrays(self.configuration, physics.resonator, physics.rate_hz, physics.scale_m)
         for name, array in arrays.items():
             getattr(self, name).copy_(torch.from_numpy(array))
-
-    @torch.no_grad()
-    def log_eigenvalues(self) -> list[Tensor]:
-        """The log eigenvalues of a quiet string."""
-        sigma, omega = self._rates()
-        return [torch.complex(-sigma, omega)]

@@ -9,7 +9,7 @@ core at a low priority. They rest while a pluck is rendered and while the panel 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeVar
 
@@ -33,6 +33,7 @@ from app.views.controls.parts import lay_out_alone
 from app.views.controls.plain import Label
 from app.views.controls.progress_strip import ProgressStrip
 from app.views.stage import StageView
+from engine.presets import PresetInfo
 
 Location = Literal["stage", "left", "right"]
 V = TypeVar("V")
@@ -181,8 +182,12 @@ class Panel(QWidget):
         """End the panel's thread; called when the window closes."""
         self.background.close()
 
-    def compute(self, work: Work) -> None:
-        """Start a long job in place of the one under way; `background` has its signals."""
+    def compute(self, work: Work, models_of: Iterable[PresetInfo] = ()) -> None:
+        """Start a long job in place of the one under way; `background` has its signals.
+
+        Args:
+            models_of: presets whose models it runs; those of many strings need no torch.
+        """
 
         def on_one_core(job: Job) -> object:
             import torch  # noqa: F401 - whose OpenMP counts threads for each thread that computes
@@ -191,7 +196,7 @@ class Panel(QWidget):
                 return work(job)
 
         self.look()
-        self.background.start(on_one_core)
+        self.background.start(work if all(info.of_many_strings for info in models_of) else on_one_core)
 
     def look(self) -> None:
         """Note that the panel is looked at; to be called while it is visible.

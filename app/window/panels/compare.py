@@ -185,7 +185,7 @@ class ComparePanel(ComputedPanel):
         if missing:
             self._began_s = time.monotonic()
             self._set_computing(0.0)
-            self.compute(lambda job: compare(missing, job))
+            self.compute(lambda job: compare(missing, job), [entry.info for entry, _ in missing])
         self._show()
 
     def _urgency(self, name: str) -> int:

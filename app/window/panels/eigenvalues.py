@@ -77,10 +77,11 @@ class EigenvaluesPanel(ComputedPanel):
         self._draw()
 
     def _begin(self) -> None:
-        subject = self._wanted()
-        if subject is not None:
+        entry = self.library.find(self.session.choices.preset)
+        if entry is not None:
+            subject = subject_of(self.session.choices, entry.path)
             self._say("Reading the preset …")
-            self.compute(lambda job: pole_figure(load_subject(subject)))
+            self.compute(lambda job: pole_figure(load_subject(subject)), [entry.info])
 
     def _show_figure(self, figure: PoleFigure) -> None:
         if self._layer.count() != figure.layers + 1:

@@ -98,7 +98,7 @@ class ErrorPlanePanel(ComputedPanel):
         if entry is not None:
             subject, pluck = subject_of(choices, entry.path), choices.pluck
             self._say("Computing the model's error for plucks of this shape …", 0.0)
-            self.compute(lambda job: self._planes.compute(subject, pluck, job))
+            self.compute(lambda job: self._planes.compute(subject, pluck, job), [entry.info])
 
     def _show_progress(self, share: float, _: str, picture: PlanePicture | None) -> None:
         self.progress.show_share(share)
