@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import contextlib
 import gc
 import sys
@@ -17,6 +18,10 @@ if sys.platform == "win32":
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
+
+if hasattr(builtins, "__orig_import__"):
+    # PySide's own import reads every module's source, for `from __feature__`, and so keeps it: 40 MB, with torch 70.
+    builtins.__import__ = builtins.__orig_import__
 
 from app.instruments.library import FIRST, InstrumentError, read_instrument
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
