@@ -1,4 +1,4 @@
-"""The memory of the running app: in Play 20 s after its start, after 20 notes, then in the Lab.
+"""The memory of the running app: in Play, after notes, in the Lab, and there with a model of one string.
 
 The window opens with default settings.
 """
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from app.window.controller import Controller
 
 START_S, LAB_S = 20.0, 15.0
+OF_ONE_STRING = "nylon_nonlinear_gaussian_16k_koopman_integrated"  # needs torch
 NOTES, NOTE_S = 20, 0.2
 FIRST_KEY = 45
 
@@ -45,8 +46,13 @@ def _watch(controller: Controller) -> None:
         _print(f"Play, after {NOTES} notes")
         controller.window.face_asked.emit("lab")
 
-    def close() -> None:
+    def choose() -> None:
         _print("Lab")
+        controller.presets.choose(OF_ONE_STRING)
+        controller.pluck()
+
+    def close() -> None:
+        _print(f"Lab, {OF_ONE_STRING}")
         controller.window.close()
 
     for number in range(NOTES):
@@ -55,11 +61,14 @@ def _watch(controller: Controller) -> None:
     for time_s, work in (
         (START_S, lambda: _print("Play")),
         (played_s, lab),
-        (played_s + LAB_S, close),
+        (played_s + LAB_S, choose),
+        (played_s + 2 * LAB_S, close),
     ):
         QTimer.singleShot(round(1000 * time_s), work)
 
 
 def _print(what: str) -> None:
-    process = psutil.Process()
-    print(f"{what}: {process.memory_info().rss / 2**20:.0f} MiB resident", flush=True)
+    memory = psutil.Process().memory_full_info()
+    print(
+        f"{what}: {memory.rss / 1e6:.0f} MB resident, {memory.uss / 1e6:.0f} MB of it in no other process", flush=True
+    )

@@ -112,24 +112,23 @@ class _Start(QObject):
         self._alive(self._controller)
         QTimer.singleShot(0, self._controller.instruments.recordings.offer_left)
         self._patience_s = time.monotonic() + PATIENCE_S
-        self._window.face_asked.connect(self._prepare)
+        self._controller.presets.browser.opened.connect(self._prepare)
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Load what the face needs when keys would sound, then take one file after another: of MIDI, all notes."""
+        """Take one file after another when keys would sound: of MIDI, all notes."""
         controller = self._controller
         assert controller is not None
         if controller.performance.playable or time.monotonic() > self._patience_s:
-            self._prepare(controller.session.choices.face)
             if not self._files:
                 return
             controller.take_file(self._files.pop(0))
             self._patience_s = time.monotonic() + PATIENCE_S
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
 
-    def _prepare(self, face: str) -> None:
-        """Load torch for the Lab, where models of one string are chosen; Play needs none, and saves its 200 MB."""
-        if face == "lab" and self._torch.ident is None:
+    def _prepare(self) -> None:
+        """Load torch while presets are looked at: models of one string need it, and the others save its 200 MB."""
+        if self._torch.ident is None:
             self._torch.start()
 
     def _show_failure(self, error: Exception) -> None:
