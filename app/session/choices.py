@@ -150,12 +150,12 @@ class Choices(Monitor):
 
     def _turned(self, turns: Mapping[str, Any]) -> Choices:
         """The choices with TURNED of the pick-up of what is played. Raise ValueError as `changed`."""
-        right = turns.get("listen_right", self.listen_right)
-        pickup = turned_pickup(self.pickup, {"listen_right": right, **turns})
-        values: dict[str, Any] = {"right": right} if {"listen_right", "stereo"} & turns.keys() else {}
+        pickup, right = turned_pickup(self.pickup, turns, self.listen_right), self.right
+        if {"listen_right", "stereo"} & turns.keys():
+            right = turns.get("listen_right", self.listen_right)
         if self.played is None:
-            return self.model_copy(update={"string_pickup": pickup, **values})
-        return self.model_copy(update={"instrument": with_pickup(self.played, pickup), **values})
+            return self.model_copy(update={"string_pickup": pickup, "right": right})
+        return self.model_copy(update={"instrument": with_pickup(self.played, pickup), "right": right})
 
 
 OBSERVED = (*Choices.model_fields, "preset", "ear", *PLUCK)  # names of what may change

@@ -14,8 +14,12 @@ TURNED = (*POINTS, "stereo", "pickup_kind")
 RIGHT_POINT = "pickup.points.1"  # of an instrument in stereo
 
 
-def turned_pickup(pickup: Pickup, turns: Mapping[str, Any]) -> Pickup:
-    """The pick-up after `turns`, by name of TURNED; `listen_right` is used in stereo.
+def turned_pickup(pickup: Pickup, turns: Mapping[str, Any], right: float) -> Pickup:
+    """The pick-up after `turns`.
+
+    Args:
+        turns: values by name of TURNED.
+        right: the right point in stereo, where it is not turned.
 
     Raises:
         ValueError: a value is out of its range; the message names it.
@@ -23,11 +27,10 @@ def turned_pickup(pickup: Pickup, turns: Mapping[str, Any]) -> Pickup:
     for name in POINTS:
         if name in turns:
             bounds.check(name, turns[name], OF_CHOICES[name].limits)
-    left = turns.get("listen", pickup.points[0])
-    stereo = turns.get("stereo", len(pickup.points) > 1)
-    points = (left, turns["listen_right"]) if stereo else (left,)
+    points = turns.get("listen", pickup.points[0]), turns.get("listen_right", right)
+    count = 1 + turns.get("stereo", len(pickup.points) > 1)
     kind = turns.get("pickup_kind", pickup.kind)
-    return Pickup.model_validate({**dict(pickup), "points": points, "kind": kind})
+    return Pickup.model_validate({**dict(pickup), "points": points[:count], "kind": kind})
 
 
 def with_pickup(instrument: Instrument, pickup: Pickup) -> Instrument:

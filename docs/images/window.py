@@ -27,11 +27,8 @@ HERE = Path(__file__).resolve().parent
 PRESET = "nylon_nonlinear_gaussian_16k_lru_400"
 CHOICES = {
     "face": "lab",
-    "preset": PRESET,
-    "keys_play": "place",
-    "position": 0.35,
-    "amplitude_mm": 9.0,
-    "width": 0.06,
+    "single": PRESET,
+    "pluck": {"amplitude_mm": 9.0},
     "seconds": 0.5,
     "left_view": "spectrum",
     "right_view": "space_time",

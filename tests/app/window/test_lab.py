@@ -44,16 +44,16 @@ def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one
     start = lab.choices
     lab.drag(view, place(view, 0.6, 0.5), place(view, 0.6, 0.3), place(view, 0.6, 0.25))
     plucked = lab.choices
-    assert plucked.position == pytest.approx(0.6, abs=0.01) and 1 < plucked.amplitude_mm < 5
+    assert plucked.pluck.position == pytest.approx(0.6, abs=0.01) and 1 < plucked.pluck.amplitude_mm < 5
     lab.wait(lambda: lab.performance.position_s > 0.05)
     knob, at, foot = knobs["width"], QPoint(30, 40), 1 - 30 / view.height()
     lab.drag(knob, at, at - QPoint(0, 5), at - QPoint(0, 10), at - QPoint(0, 15))
-    assert lab.choices.pluck.width > plucked.width
+    assert lab.choices.pluck.width > plucked.pluck.width
     lab.drag(view, place(view, lab.choices.listen, foot), place(view, 0.7, foot), place(view, 0.8, foot))
     assert lab.choices.listen == pytest.approx(0.8, abs=0.01) == knobs["listen"].value
     undone = [lab.key(KEY.Key_Z, CONTROL) or lab.choices for _ in range(3)]
     assert undone[1:] == [plucked, start] and undone[0].listen == start.listen
-    assert knob.value == start.width
+    assert knob.value == start.pluck.width
     lab.key(KEY.Key_Z, CONTROL | SHIFT)
     assert lab.choices == plucked
     lab.drag(view, place(view, 0.4, 0.5), place(view, 0.4, 0.25))
