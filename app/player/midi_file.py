@@ -206,8 +206,6 @@ def _part(
         timed = [entry for entry in timed if channels_in([entry.event]) in (drums, set())]
         others = [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else []
         return _song(path.name + words, instrument, timed, others + ignored)
-    if pads:
-        drums = set()
     channels = notes_on - drums
     if not channels:
         raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +39,8 @@ def test_the_papers_figures_are_printed_too(run, folder, monkeypatch):
     assert out.count("project     rel. MSE 0.000306, rel. MAE") == 1
     reported = facts_of(run, "evaluate {folder}/mine.safetensors --split test --cache {cache}")
     assert "rel_mae" in reported and "paper" not in reported
+    many = facts_of(run, "evaluate studio_any_string --on nylon_nonlinear_noise_4k_s5_400 --cache {cache}")
+    assert many["validation"]["stored_rel_mse"] is None and many["validation"]["rel_mse"] < 1e-9
 
 
 def test_fresh_plucks_that_nobody_trained_on(run):
@@ -127,10 +130,26 @@ def test_heard_differences_are_printed_and_kept(run, tiny, monkeypatch):
 
 
 def test_errors_on_strings_of_a_family_are_by_rise_of_tension(run):
-    evaluate = "family evaluate studio_any_string --strings 2 --rate 8000"
-    facts = facts_of(run, evaluate)
+    facts = facts_of(run, "family evaluate studio_any_string --strings 2 --rate 8000")
     for column in ("inside", "beyond"):
         parts = facts[column]["studio_any_string"]["by_rise"]
         assert sum(part["strings"] for part in parts) == 2
         assert all(0 < part["geometric_mean"] <= 1.001 * part["worst"] for part in parts)
-    assert "rise of tension" in run(evaluate).out
+    out = run("family evaluate studio_any_string --strings 1 --tenth 1 --baselines --rate 4000 --seed 2").out
+    assert out.count("rise of tension") == 2 and "1 strings still sound: -, worst -; - times their first" in out
+    assert (
+        float(re.findall(r"tenth second, 1 of 1 strings still sound: (\S+), worst \S+; [\d.]+ times", out)[0]) < 1e-9
+    )
+    means = {who: float(mean) for who, mean in re.findall(r"(?m)^  (any\w+|[a-z].*?)   +([\d.e-]+) ", out)}
+    untrained = ["backward error analysis (1/12)", "kicks without corrections", "averaging", "linear string"]
+    assert sorted(means, key=lambda who: means[who]) == ["studio_any_string", *untrained]
+
+
+def test_errors_on_drums_are_printed_and_measured_once(run):
+    evaluate = "family evaluate studio_any_string --drums 1 --tenth 1 --rate 4000 --runs {folder}"
+    out, players = run(evaluate).out, facts_of(run, evaluate)["players"]  # the second continues where the first ended
+    for player in players:
+        for figure in ("geometric_mean", "processor_s", "tenth_worst", "tenth_first"):
+            assert re.search(rf"(?m)^  {re.escape(player['player'])} .* {player[figure]:.4g} ", out)
+    assert players[0]["worst"] < 1e-10 < players[2]["worst"] < 1e-6 < 1 < players[3]["worst"]
+    assert "tenth second, 1 of 1 drums of long decays still sound" in out

@@ -29,6 +29,7 @@ def test_impossible_values_are_refused_by_name():
         ("LENGTHLESS", json.dumps(LENGTHLESS)),
         ("STRING", json.dumps(STRING)),
         ("LONG", "x" * 65_537),
+        ("DRUM", json.dumps(json.loads((SHIPPED / "concert_toms.json").read_text())["strings"]["drums"][0]["drum"])),
     ):
         text = text.replace(f": {name}", f": {meant}").replace(f'"{name}"', f'"{meant}"')
     for line in text.splitlines()[2:]:

@@ -13,12 +13,13 @@ from engine.models.base import Physics
 from engine.presets import SHIPPED, STRINGS, find_preset, load_preset, read_described_string, read_info
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import resonator_of
+from training.cli.family import shelf, train
 from training.family import errors as family_errors
 from training.family.drums import draw_drum, measure_drum, measure_drums, store, summary
 from training.family.fit import FitCase, errors, fit_curves, geometric_mean
 from training.family.motion import linear_motion, model_player, untrained, untrained_player
-from training.family.preset import FamilyConfiguration, read_configuration, train_preset
-from training.family.shelf import TITLES, put_on_shelf
+from training.family.preset import read_configuration, train_preset
+from training.family.shelf import TITLES
 from training.family.strings import COLUMNS, FAMILY, draw_string, solve, string_of
 
 RATE_HZ, STEPS = 48_000, 1_200
@@ -77,16 +78,19 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings():
         assert abs(float(at_rest) - 1 / 12) < 0.01
 
 
-def test_a_preset_of_many_strings_is_whole(tmp_path):
-    c = FamilyConfiguration(
-        "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
+def test_a_preset_of_many_strings_is_whole(tmp_path, capsys):
+    sizes = (
+        "modes = 25\nstrings = 2\nvalidation_strings = 1\ntest_strings = 1\nseconds = 0.02\nsteps = 1\nfirst_s = 0.01"
     )
+    (file := tmp_path / "two.toml").write_text(f"title = 'Two'\ndescription = ''\n{sizes}")
+    c = read_configuration(file)
     info = train_preset(c, tmp_path / "two.safetensors")
     loaded = load_preset(tmp_path / "two.safetensors")
     assert loaded.info == info and info.family == FAMILY["inside"]
     assert info.rel_mse is not None and 0 < info.rel_mse < 1e-3
     assert read_configuration().initialisation == "kicks"
-    train_preset(c, tmp_path / "again.safetensors")
+    train(file, tmp_path / "again.safetensors")
+    assert f"again.safetensors: rel. MSE {info.rel_mse:.4g}, rel. MAE" in capsys.readouterr().out
     again = load_preset(tmp_path / "again.safetensors").model.state_dict()
     assert all(torch.equal(weight, again[name]) for name, weight in loaded.model.state_dict().items())
 
@@ -103,8 +107,9 @@ def test_players_are_as_good_as_they_should_be():
     assert means == sorted(means)
 
 
-def test_the_shelf_has_the_strings_of_the_files(tmp_path):
-    put_on_shelf(load_preset(find_preset("studio_any_string")), tmp_path)
+def test_the_shelf_has_the_strings_of_the_files(tmp_path, monkeypatch):
+    monkeypatch.setattr("engine.presets.SHIPPED", tmp_path)
+    shelf()
     for name, title in TITLES.items():
         string, description = read_described_string(STRINGS / f"{name}.toml")
         info = read_info(tmp_path / f"studio_any_{name}.safetensors")
