@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -59,9 +60,9 @@ class StageAxes:
         """The height at which the feet of listening points stand."""
         return self.height - MARGIN_BOTTOM
 
+    @abstractmethod
     def x(self, point: float) -> float:
         """The x of a listening point, in pixels."""
-        raise NotImplementedError
 
 
 class StageView(QWidget):
@@ -115,9 +116,9 @@ class StageView(QWidget):
         self._toggles.append(button)
 
     @property
+    @abstractmethod
     def axes(self) -> StageAxes:
         """Places on the picture, in pixels."""
-        raise NotImplementedError
 
     # State
 
@@ -148,9 +149,9 @@ class StageView(QWidget):
         self._sources = sources
         self.update()
 
+    @abstractmethod
     def show_frame(self, frame: Any) -> None:
         """Show a moment of the motion; None: at rest."""
-        raise NotImplementedError
 
     def set_listening_points(self, left: float | None, right: float | None = None) -> None:
         """Set the points where it is heard; None: has no mark, as the right one in mono, or both at a bridge."""
@@ -224,9 +225,9 @@ class StageView(QWidget):
         self._drag, self._dragged_at = part, at
         self.update()
 
+    @abstractmethod
     def _press(self, part: str | None, event: QMouseEvent) -> None:
         """Take a press on a part of the picture, or on none."""
-        raise NotImplementedError
 
     def _press_again(self, part: str | None, event: QMouseEvent) -> None:
         """Take the second press of a double-click."""
@@ -238,9 +239,9 @@ class StageView(QWidget):
     def _drop(self, part: str) -> None:
         """End the drag of a part."""
 
+    @abstractmethod
     def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
         """Take a key, of an arrow with its direction; return False where it means nothing here."""
-        raise NotImplementedError
 
     def _part_at(self, at: QPointF) -> str | None:
         """The part that can be grabbed there; None: none."""
@@ -250,9 +251,9 @@ class StageView(QWidget):
         side = min(near, key=lambda name: near[name], default=None)
         return side if side is not None and near[side] < GRAB_PIXELS else None
 
+    @abstractmethod
     def _picture_part_at(self, at: QPointF) -> str | None:
         """The same above the marks."""
-        raise NotImplementedError
 
     def _hover(self, part: str | None) -> None:
         self.setCursor(self.CURSORS.get(part, Qt.CursorShape.SizeHorCursor))
@@ -313,17 +314,17 @@ class StageView(QWidget):
     def _paint_behind(self, painter: QPainter) -> None:
         """Paint what lies between the ground and string or drum."""
 
+    @abstractmethod
     def _paint_picture(self, painter: QPainter) -> None:
         """Paint string or drum."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _paint_listening_line(self, painter: QPainter, x: float, colour: QColor) -> None:
         """Paint the line from the picture to the mark of a listening point."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _point_words(self, point: float) -> str:
         """The words for a listening point at its mark."""
-        raise NotImplementedError
 
     def _paint_over(self, painter: QPainter) -> None:
         """Paint what lies above the marks."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -40,25 +41,25 @@ class BrowserDesk(QObject):
         browser.folder_asked.connect(self._open_folder)
 
     @property
+    @abstractmethod
     def chosen(self) -> str:
         """The name of the row that is loaded; "": none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def choose(self, name: str) -> None:
         """Load a row."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reload(self) -> None:
         """Read the folders again: the user may have added files."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _rows(self) -> Sequence[BrowserRow]:
         """The rows that there are now."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _folder(self) -> Path:
         """The folder of the user's own files."""
-        raise NotImplementedError
 
     def show_rows(self) -> None:
         """List what there is now."""

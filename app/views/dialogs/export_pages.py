@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
@@ -156,17 +157,17 @@ class ExportPage(Form):
             raise ValueError(self.missing)
         return self.subject
 
+    @abstractmethod
     def _show(self) -> None:
         """Show the subject, if there is one, and what the choices make of it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def job(self) -> ExportJob:
         """The job that would be done. Raises ValueError: the choices cannot be; the message names the field."""
-        raise NotImplementedError
 
+    @abstractmethod
     def offer(self) -> tuple[str, str]:
         """The button's text, and a note on what will be written. Raises ValueError, WriteError or OSError."""
-        raise NotImplementedError
 
 
 class NotePage(ExportPage):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -55,17 +56,17 @@ class WorkDialog(QDialog):
         self.bar.setVisible(bar)
         self.background.start(work)
 
+    @abstractmethod
     def show_failure(self, message: str) -> None:
         """Show why the work has failed."""
-        raise NotImplementedError
 
+    @abstractmethod
     def show_cancelled(self) -> None:
         """Show that the work was ended."""
-        raise NotImplementedError
 
+    @abstractmethod
     def progress_words(self, text: str, left: str) -> str:
         """The progress in words; `text`: the present step; `left`: the time, as "about 5 s left", or ""."""
-        raise NotImplementedError
 
     def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))

@@ -9,6 +9,7 @@ core at a low priority. They rest while a pluck is rendered and while the panel 
 from __future__ import annotations
 
 import time
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeVar
@@ -143,9 +144,9 @@ class Panel(QWidget):
         super().resizeEvent(event)
         self._cover.setGeometry(self.rect())
 
+    @abstractmethod
     def columns(self) -> Columns | None:
         """The numbers that are shown now; None: nothing is."""
-        raise NotImplementedError(f"{self.key}: a panel has columns(), the numbers that its menu saves")
 
     def by_heading(self, values: Mapping[str, V], unit: str) -> dict[str, V]:
         """Values by source, by the headings that they have in files."""
@@ -247,16 +248,16 @@ class ComputedPanel(Panel):
     def words(self) -> str:
         return self._words.text()
 
+    @abstractmethod
     def _wanted(self) -> object:
         """All that the figure depends on; None: there is nothing to compute."""
-        raise NotImplementedError
 
     def _clear(self) -> None:
         """Show that the figure is another one from now on."""
 
+    @abstractmethod
     def _begin(self) -> None:
         """Begin to compute the figure."""
-        raise NotImplementedError
 
     def _say(self, words: str, share: float | None = None) -> None:
         """Write the words while nothing is pointed at, and show the share that is computed; None: nothing is."""
@@ -324,9 +325,9 @@ class StagePanel(Panel):
             return
         self.view.show_frame(self._frame(moment) if moment.in_motion(choices) else None)
 
+    @abstractmethod
     def _frame(self, moment: Moment) -> object:
         """The string or the drum as it moves now; None: at rest."""
-        raise NotImplementedError
 
     def _move_listening_point(self, side: str, point: float) -> None:
         if side == "right":
