@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.commands import cli
+from app.commands import bundled, cli
 
 ROOT = Path(__file__).parents[1]
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="the bundle was tried on Linux alone")
@@ -31,7 +31,7 @@ sys.exit(run(alive=close_when_playable))
 LISTING = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from app.commands import cli
+from app.commands import bundled, cli
 assert cli.__file__.startswith(sys.path[0])
 for name in ("presets", "instruments"):
     assert cli.main([name, "--json"]) == 0
@@ -64,6 +64,21 @@ def run(*words: object, folder: Path, status: int = 0, environment: dict[str, st
     done = subprocess.run(command, cwd=folder, env=environment or bare, capture_output=True, text=True)
     assert done.returncode == status, done.stderr
     return done.stderr if status else done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "printed"),
+    [
+        (["models"], "koopman_tension"),
+        (["-P", "-c", "import sys; print(__name__, sys.argv)", "a"], "__main__ ['-c', 'a']"),
+        (["-P", "-m", "calendar", "1970", "1"], "January 1970"),
+    ],
+)
+def test_the_start_of_a_bundle_is_the_command_line_or_python(words, printed, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["learned-strings", *words])
+    for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):  # which it sets
+        monkeypatch.setenv(name, "")
+    assert bundled.main() == 0 and printed in capsys.readouterr().out
 
 
 @LINUX

@@ -57,6 +57,10 @@ BYTES = {
     "table": b"a,b\n1,2\n",
     "tiny": CONFIGURATION.encode(),
     "plan": PLAN.encode(),
+    "dmd": CONFIGURATION.replace("koopman_var", "dmd")
+    .replace("state_size = 8, multiplier_widths = [4]", "rank = 20")
+    .encode(),
+    "wild": CONFIGURATION.encode() + b"peak_learning_rate = 1e30\nclip_norm = 1e30\nschedule = 'constant'",
     "epoch": CONFIGURATION.replace("epochs", "epoch").encode(),
     "koopmann": PLAN.replace('"koopman"', '"koopmann"').encode(),
 }

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import runpy
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -136,6 +137,16 @@ def test_a_sweep_ends_with_its_rows(run, folder, script):
     assert again.err == f"learned-strings: plan: 0 of 2 runs to do; rows go to {file}\n"
 
 
+@pytest.mark.parametrize(
+    ("plan", "status", "words"), [("tiny", 0, "8 of 8 runs were never done"), ("none", 1, "no plan 'none'")]
+)
+def test_a_sweep_needs_no_app(plan, status, words, folder, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["training.cli", plan, "--dry-run", "--results", str(folder / "none.csv")])
+    with pytest.raises(SystemExit, match=str(status)):
+        runpy.run_module("training.cli", run_name="__main__")
+    assert words in "".join(capsys.readouterr())
+
+
 def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(run, script, tmp_path):
     begun: list[str] = []
 
@@ -149,7 +160,7 @@ def test_a_sweep_that_was_interrupted_or_failed_continues_with_what_is_left(run,
     found = run(SWEEP)
     assert found.status == 130 and "stopped; the same command continues" in found.err
     before = sorted(tmp_path.rglob("*"))
-    facts = json.loads(run(f"{SWEEP} --dry-run --json").out)
+    facts = json.loads(run(f"{SWEEP} --dry-run --json --minutes 60").out)
     left = [(NAMES[0], "done", 0.5), (NAMES[1], "", None)]
     assert [(each["name"], each["status"], each["rel_mae"]) for each in facts] == left
     assert sorted(tmp_path.rglob("*")) == before
@@ -185,7 +196,7 @@ def test_files_of_other_machines_are_merged(run, tmp_path):
     assert here.read_bytes() == before
 
 
-def test_the_time_left_follows_from_the_runs_so_far():
+def test_the_time_left_follows_from_the_runs_so_far(capsys):
     shown = Shown(lambda what: lambda *_: None, 5, 2)
     one, other = (SimpleNamespace(name=name) for name in "ab")
     for each in (one, other):
@@ -193,6 +204,8 @@ def test_the_time_left_follows_from_the_runs_so_far():
     assert shown.seconds_left() is None
     shown.progressed(one, FitProgress(2, 8, 1, 4, 60, 1e-3, 0.5, RelativeError(0.25, 0.125), 10, 30))
     assert shown.seconds_left() == (30 + 4 * 40) / 2
+    shown.failed(other, "OSError: no space")
+    assert capsys.readouterr().err == "learned-strings: b: failed and is tried again (OSError: no space)\n"
     shown.finished(row_of("a", seconds=20.0))
     shown.finished(row_of("b", status="diverged", seconds=None))
     assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
