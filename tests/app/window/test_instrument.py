@@ -1,6 +1,7 @@
 """The instrument in the window: keys and plucks by hand play it, knobs change it, files and names keep it."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
@@ -138,7 +139,7 @@ def test_knobs_and_transport_change_the_instrument_and_undo_takes_them_back(guit
     assert guitar.instrument.tuning.transpose == 2
 
 
-def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch):
+def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch, tmp_path):
     instruments, bar, asked = guitar.controller.instruments, guitar.window.instrument.bar, list[str]()
     names = ["AC/DC", "My Bass.", "Classical guitar", "Mine", "Yours"]
 
@@ -177,9 +178,53 @@ def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch
     assert not file.exists() and read_instrument(own_instruments() / "yours.json").name == "Yours"
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (False, True), "it is saved, and one's own"
     assert "yours" in instruments.favourites and "mine" not in instruments.favourites
+    (mine := own_instruments() / "yours.json").rename(tmp_path / "yours.json")
+    mine.mkdir()
+    instruments.delete("yours")
+    assert f"{mine}: cannot be deleted (" in guitar.said[-2] and "yours.json: cannot be read (" in guitar.said[-1]
+    mine.rmdir()
+    (tmp_path / "yours.json").rename(mine)
+    instruments.reload()
     instruments.delete("yours")
     assert not list(own_instruments().glob("*.json")) and "yours" not in instruments.favourites
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
+
+
+def test_switches_of_the_strip_reach_the_keys_and_its_choices_the_instrument(guitar):
+    strip, start = guitar.window.instrument, guitar.instrument
+    strip.touch_chosen.emit("slide")
+    strip.technique_switched.emit("harmonics", True)
+    guitar.wait(lambda: guitar.keys.player.compiled.channel(KEYS).harmonics)  # type: ignore[union-attr]
+    channel = guitar.keys.player.compiled.channel(KEYS)  # type: ignore[union-attr]
+    assert (channel.legato, channel.slides, channel.slide_time, channel.tremolo) == (True, True, 90, False)
+    strip.bar.octave_asked.emit(1)
+    guitar.key(KEY.Key_C)
+    assert (guitar.choices.octave, guitar.choices.velocity) == (1, 74)
+    strip.bar.macro_turned.emit(1, 1.0)
+    assert guitar.instrument.knobs.decay < 0.276
+    strip.knobs.figure_asked.emit("knobs.length", 700.0)
+    key_string = guitar.session.stage.shown_string(guitar.instrument)
+    assert key_string is not None and abs(key_string.parameters.length_m - 0.7) < 1e-6
+    strip.bar.scale_asked.emit("19 equal steps")
+    assert "19" in guitar.instrument.tuning.scale and guitar.said[-1].startswith("19 equal steps tunes")
+    strip.bar.scale_asked.emit("")
+    assert guitar.instrument.tuning == start.tuning
+
+
+def test_without_an_instrument_its_controls_change_nothing(lab):
+    desk, bar, before = lab.controller.instruments, lab.window.instrument.bar, lab.choices
+    for ask in (desk.save, desk.save_as, desk.revert):
+        ask()
+    for take in (desk.choose_scale, desk.choose, desk.audition, desk.delete):
+        take("")
+    desk.change("level_db", 1.0)
+    desk.turn_to("knobs.length", 1.0)
+    bar.macro_turned.emit(0, 1.0)
+    bar.body_chosen.emit("guitar")
+    assert lab.choices == before and lab.said == []
+    desk.rename()
+    desk.take_body("hall")
+    assert [words.split()[0] for words in lab.said] == ["Only", "The"] and "choose an instrument" in lab.said[1]
 
 
 def test_the_browser_plays_what_is_there(guitar):
@@ -193,6 +238,24 @@ def test_the_browser_plays_what_is_there(guitar):
     instruments.audition("concert_harp")
     assert guitar.instrument == HARP
     guitar.wait(lambda: guitar.struck[-1].instrument == HARP)
+    instruments.toggle()
+    browser, loaded = instruments.browser, list[str]()
+    for key in (KEY.Key_PageDown, KEY.Key_Up, KEY.Key_PageUp, KEY.Key_Down):
+        guitar.key(key, on=browser.search)
+        loaded.append(guitar.instrument.name)
+    assert len(set(loaded)) == 4 and guitar.instrument == HARP, "a page and a step down, the same up"
+    clicked = partial(guitar.qtbot.mouseClick, browser.list.viewport(), LEFT)
+    mandolin = browser.list.index_of("mandolin")
+    browser.list.scrollTo(mandolin)
+    clicked(pos=browser.list.visualRect(mandolin.siblingAtColumn(0)).center())
+    assert "mandolin" in instruments.favourites
+    middle = browser.list.visualRect(browser.list.index_of("mandolin")).center()
+    clicked(pos=middle)
+    guitar.wait_for_keys()
+    guitar.key(KEY.Key_Space, on=browser.list)
+    guitar.wait(lambda: guitar.struck[-1].instrument.name == "Mandolin")
+    guitar.qtbot.mouseDClick(browser.list.viewport(), LEFT, pos=middle)
+    assert not browser.isVisible()
 
 
 def test_dropped_songs_are_played_without_drums_and_have_a_transport(guitar, tmp_path):
