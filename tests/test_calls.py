@@ -26,9 +26,9 @@ def test_a_call_is_refused_by_name_or_has_its_value(heading, row, tmp_path):
     names |= {"folder": tmp_path, "approx": pytest.approx}
     for line in named:
         exec(line, names)
-    call, refused, words = row.partition(" | ")
+    call, refused, words = row.rpartition(" | ")
     if refused:
-        with pytest.raises((ValueError, RuntimeError), match=words):
+        with pytest.raises(Exception, match=words):
             eval(call, names)
     else:
         call, _, value = row.partition(" → ")

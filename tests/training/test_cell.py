@@ -93,30 +93,6 @@ def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_th
 # Refusals
 
 
-def test_a_name_that_is_no_cell_is_reported():
-    with pytest.raises(SchemaError, match="no training configuration 'no_such_thing'"):
-        load("no_such_thing")
-    with pytest.raises(SchemaError, match="`family train` trains it"):
-        load("nylon_nonlinear_noise_4k_koopman_tension")
-
-
-@pytest.mark.parametrize(
-    ("data", "recipe", "words"),
-    [
-        ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
-        ({}, {"batch_statistics_until": 0.0}, "batch_statistics_until"),
-        ({}, {"latent_epochs": 0, "latent_polish": 1}, "latent_polish needs latent_epochs"),
-        ({}, {"start": "physics", "latent_epochs": 9}, "a pursuit needs some, any other start none"),
-        ({}, {"latent_epochs": 0, "latent_polish": 0}, "a pursuit needs some, any other start none"),
-        ({"largest_tension_rise": 0.0}, {}, "largest_tension_rise must be above 0"),
-        ({"steps": 4002, "stride": 4}, {}, "steps must be a multiple of stride, 4, not 4002"),
-    ],
-)
-def test_wrong_overrides_are_reported(data, recipe, words):
-    with pytest.raises(SchemaError, match=words):
-        configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)
-
-
 CONFIGURATION = """
 title = "a run"
 model = "koopman_var"

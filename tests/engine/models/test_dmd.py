@@ -100,18 +100,3 @@ def test_modes_that_the_data_do_not_hold_vanish():
     assert relative(model(two_modes[:, 0], 1000), two_modes[:, 1:]) ** 2 < 1e-3
     silent = DMD.fit(torch.zeros(1, 10, 101), DMDConfiguration())
     assert torch.equal(silent(torch.ones(1, 101), 5), torch.zeros(1, 5, 101))
-
-
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (torch.zeros(1, 9, 7), r"shape \(batch, frames, 101\), not \(1, 9, 7\)"),
-        (torch.zeros(1, 2, 101), "lags of 2 needs more frames than 2"),
-        (torch.full((1, 9, 101), torch.nan), "not finite"),
-    ],
-)
-def test_impossible_data_and_ranks_are_named(data, words):
-    with pytest.raises(ValueError, match=words):
-        DMD.fit(data, DMDConfiguration())
-    with pytest.raises(ValueError, match="rank must be at most lags times grid_points, 20, not 50"):
-        DMDConfiguration(grid_points=10)
