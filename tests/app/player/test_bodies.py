@@ -1,5 +1,6 @@
 """Bodies of the user's own: taken in whole, found by name, heard, and left out when they are gone."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import soundfile
 
 from app.audio.impulse_file import ImpulseError
 from app.instruments.instrument import BodyChoice, Instrument
-from app.player.bodies import body_names, body_titles, install_body, own_bodies, own_impulse
+from app.player.bodies import body_digest, body_names, body_titles, install_body, own_bodies, own_impulse
 from app.player.effects import body_curves, body_problem, effects_of
 from app.player.offline import render_note
 from engine.effects import BODIES
@@ -40,6 +41,7 @@ def test_a_file_becomes_a_body_whole_once_and_by_a_safe_name(tmp_path):
     file = late(tmp_path / "My Cello: body (near).WAV")
     name = install_body(file)
     (copy,) = own_bodies().iterdir()
+    assert body_digest(name) == hashlib.sha256(file.read_bytes()).hexdigest() and body_digest("guitar") == ""
     assert copy.name == "my_cello_body_near.wav" == f"{name}.wav" and copy.read_bytes() == file.read_bytes()
     one, other = late(tmp_path / "guitar.wav", 77), late(tmp_path / "guitar.flac", 99)
     assert [install_body(file) for file in (one, one, other, one)] == ["guitar_2", "guitar_2", "guitar_3", "guitar_2"]

@@ -10,7 +10,6 @@ import pytest
 from app.instruments.instrument import ASSIGNABLE, WHEEL, BodyChoice, Fretted, Instrument, Knobs, Noise
 from app.instruments.library import SHIPPED as INSTRUMENTS
 from app.instruments.library import read_instrument
-from app.instruments.tuning import TuningChoice
 from app.player import events
 from app.player.compiled import InstrumentPlayer
 from app.player.events import Bend, ControlChange, InstrumentTurned, NoteOff, NoteOn, TimedEvent
@@ -22,8 +21,6 @@ from engine.kernels import midi
 from engine.kernels.constants import QUANTUM
 from engine.parameters import OF_INSTRUMENTS, PLAYED
 from engine.pluck import SHAPES, Pluck
-from engine.presets import load_preset
-from engine.presets.finding import SHIPPED
 from engine.values.effects import Room
 from engine.values.string import Polarisations
 from engine.voices import Mixer, Voice, plain_program
@@ -181,7 +178,8 @@ def test_another_player_begins_as_the_hands_are(stage):
     player.set_gains({"model": 0.25})
     switches = [ControlChange(number, 127, events.KEYS) for number in (midi.HARMONICS, midi.TREMOLO, midi.STRUM)]
     wheels = [(midi.SUSTAIN, 127, 0), (midi.SLIDE, 9, 2), (midi.MOD_WHEEL, 127, 3)]
-    given = [*events.parameter_set(0, 5, 50, 1), Bend(0.25, 1), *(ControlChange(*each) for each in wheels)]
+    tuned = [*events.parameter_set(midi.FINE_TUNING, 80, 3, 2), *events.parameter_set(midi.COARSE_TUNING, 66, 0, 2)]
+    given = [*tuned, *events.parameter_set(0, 5, 50, 1), Bend(0.25, 1), *(ControlChange(*each) for each in wheels)]
     stage.run([(0, event) for event in (*given, *switches)], QUANTUM)
     made, mixer = player.again(44_100), Mixer(44_100)
     mixer.set_player(made.compiled)
@@ -189,7 +187,7 @@ def test_another_player_begins_as_the_hands_are(stage):
     channels = [player.compiled.channel(number) for number in range(of.CHANNELS)]
     assert [made.compiled.channel(number) for number in range(of.CHANNELS)] == channels
     assert (channels[1].bend, channels[1].range_semitones) == (0.25, 5.5)
-    assert channels[0].pedal and channels[2].slide == 9
+    assert channels[0].pedal and channels[2].slide == 9 and channels[2].coarse_tuning == 2
     assert made.at_hand == player.at_hand and set(switches) < set(made.at_hand)
     assert (made.rate_hz, made.compiled.source_gain(0)) == (44_100, 0.25)
     assert player.heard_through == made.heard_through != instrument and made.compiled.wheel == (127, 3)
@@ -300,29 +298,3 @@ def test_a_note_can_be_stopped_while_it_is_rendered(instrument):
     with pytest.raises(InterruptedError):
         render_note(instrument, PRESET, 50, 100, 60.0, 60.0, RATE_HZ, "model", advanced)
     assert len(reached_s) > 1 and reached_s[-1] < 1.0
-
-
-HIGH = {"range": (0, 127), "tuning": TuningChoice(a4_hz=880, transpose=48)}
-
-
-@pytest.mark.parametrize(
-    ("ask", "reported"),
-    [
-        (lambda instrument: Stage(changed(instrument, **HIGH)).player.handle(NoteOn(127, 90)), "key 127"),
-        (
-            lambda instrument: Stage(instrument, preset=load_preset(SHIPPED / "studio_nylon_b3.safetensors")),
-            "one string only",
-        ),
-        (
-            lambda instrument: next(render_events(instrument, PRESET, timed_key(1.0), RATE_HZ, "noise")),
-            "source must be model, truth or difference, not 'noise'",
-        ),
-        (
-            lambda instrument: Stage(instrument).player.keys_of(read_instrument(INSTRUMENTS / "concert_toms.json")),
-            "has drums",
-        ),
-    ],
-)
-def test_what_cannot_be_played_is_an_error(instrument, ask, reported):
-    with pytest.raises(ValueError, match=reported):
-        ask(instrument)

@@ -1,5 +1,6 @@
 """Playing and notes become files: as they are heard, take after take, kept until they are written, and back."""
 
+import shutil
 import threading
 import time
 from collections.abc import Callable
@@ -170,6 +171,19 @@ def test_a_recording_is_asked_about_before_the_window_closes(guitar, tmp_path, e
     assert not guitar.window.isVisible() and left_journals(recordings_folder()) == []
 
 
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_recording_that_no_journal_holds_is_reported_at_once_and_can_be_saved(guitar, tmp_path, begun):
+    if not begun:
+        recordings_folder().write_text("a file in its place")
+    guitar.window.instrument.bar.record.click()
+    if begun:
+        shutil.rmtree(recordings_folder())
+    guitar.play(60)
+    guitar.wait(lambda: any("cannot be written to disk while you play" in words for words in guitar.said))
+    guitar.window.instrument.bar.record.click()
+    save(guitar, tmp_path / "kept.wav")
+
+
 @pytest.mark.parametrize("finish", [True, False])
 def test_an_export_is_asked_about_before_the_window_closes(guitar, tmp_path, finish):
     """Its notes are there at once; its sound is given up, or finished first, as the user says."""
@@ -178,6 +192,8 @@ def test_an_export_is_asked_about_before_the_window_closes(guitar, tmp_path, fin
     journal.write([TimedEvent(0.0, InstrumentTurned(guitar.instrument))])
     journal.write([TimedEvent(float(second), NoteOn(60, 100)) for second in range(6 if finish else 3_600)])
     journal.close()
+    Journal.begun(recordings_folder(), datetime(2026, 1, 1, tzinfo=UTC)).close()  # without a note
+    (damaged := journal.path.with_stem("damaged")).write_text("no journal\n")
     guitar.window.instrument.bar.record.click()
     recordings.offer_left()
     guitar.wait(lambda: guitar.said and "next start" in guitar.said[-1])  # not over another recording
@@ -186,6 +202,8 @@ def test_an_export_is_asked_about_before_the_window_closes(guitar, tmp_path, fin
         recordings.offer_left()
         guitar.wait(lambda: recordings.offered is not None)
     assert asked == ["Recover what was played?"]
+    assert any(words.endswith("it cannot be recovered, and stays where it is.") for words in guitar.said)
+    assert {damaged, journal.path} == set(recordings_folder().glob(f"*{journal.path.suffix}"))
     save(guitar, tmp_path / "take.wav", "Rendering")
     if finish:
         assert close(guitar, "Finish first") == [BUSY]

@@ -197,6 +197,8 @@ def test_switches_of_the_strip_reach_the_keys_and_its_choices_the_instrument(gui
     guitar.wait(lambda: guitar.keys.player.compiled.channel(KEYS).harmonics)  # type: ignore[union-attr]
     channel = guitar.keys.player.compiled.channel(KEYS)  # type: ignore[union-attr]
     assert (channel.legato, channel.slides, channel.slide_time, channel.tremolo) == (True, True, 90, False)
+    guitar.window.action["difference"].trigger()
+    assert not guitar.choices.difference, "it is heard in the Lab"
     strip.bar.octave_asked.emit(1)
     guitar.key(KEY.Key_C)
     assert (guitar.choices.octave, guitar.choices.velocity) == (1, 74)
@@ -225,6 +227,9 @@ def test_without_an_instrument_its_controls_change_nothing(lab):
     desk.rename()
     desk.take_body("hall")
     assert [words.split()[0] for words in lab.said] == ["Only", "The"] and "choose an instrument" in lab.said[1]
+    lab.change(preset="none")
+    lab.window.action["abx"].trigger()
+    assert lab.said[-1].startswith("The listening test needs a preset")
 
 
 def test_the_browser_plays_what_is_there(guitar):
@@ -302,6 +307,8 @@ def test_a_dropped_instrument_is_added_once(guitar, tmp_path, monkeypatch):
     file.write_text(mine.model_dump_json())
     guitar.drop(file)
     assert guitar.instrument == mine and "not added to your library" in guitar.window.notices.text
+    guitar.controller.instruments.browser.folder_asked.emit()
+    assert f"{own_instruments()}: cannot be created (" in guitar.said[-1]
 
 
 def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restored(guitar):

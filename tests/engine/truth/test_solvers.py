@@ -92,7 +92,7 @@ def in_blocks(solver: SplittingSolver, state: ModalState, blocks: tuple[int, ...
     return torch.cat(parts, 1)
 
 
-def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_it_is():
+def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_it_is(monkeypatch):
     solver, state = SplittingSolver(resonator_of(STRING, 10), 16_000, substeps=2), random_state(3, 10)
     kept = state.amplitude.clone(), state.velocity.clone()
     whole, last = solver.advance(state, 257)
@@ -106,6 +106,8 @@ def test_blocks_some_frames_and_arrays_are_the_same_motion_and_a_state_stays_as_
     assert isinstance(found, np.ndarray) and np.array_equal(found, whole.numpy())
     assert np.array_equal(end.velocity, last.velocity.numpy())
     assert np.array_equal(solver.solve(arrays, 257)[:, 1:], found)
+    monkeypatch.setattr("engine.truth.splitting._threads", lambda: 2)
+    assert torch.equal(solver.advance(state, 257)[0], whole)
     assert torch.equal(state.amplitude, kept[0]) and torch.equal(state.velocity, kept[1])
 
 

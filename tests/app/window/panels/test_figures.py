@@ -16,7 +16,7 @@ from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
 from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
 from engine.pluck import Pluck
-from tests.app.window.driver import KEY, LEFT, find, press
+from tests.app.window.driver import KEY, LEFT, choose, find, press
 from tests.app.window.panels.conftest import at, items
 
 LEARNED, STRING, PLUCK = 13, 6, 13  # pixels of the points
@@ -59,6 +59,12 @@ def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab):
     ):
         lab.key(key, on=plane)
         assert lab.choices.solo == solo and words in panel.words
+    lab.qtbot.mouseDClick(plane.viewport(), LEFT, pos=QPoint(1, 1))
+    choose(find(panel, QComboBox, "Axes"), "complex")
+    low, high = plane.getPlotItem().vb.viewRange()[1]
+    for size in (LEARNED, STRING):
+        places = points(plane, size)
+        assert (np.hypot(*places.T) < 1).all() and (low <= places[:, 1]).all() and (places[:, 1] <= high).all()
 
 
 def test_partials_of_a_pluck_are_measured_greyed_and_heard_alone(lab):

@@ -13,6 +13,7 @@ from PySide6.QtCore import QPoint
 
 from app.analysis import heard as heard_module
 from app.rendering import Take
+from app.session.choices import Choices
 from app.views.string.view import StringView
 from app.window.panels import Moment, Panel, StringPanel
 from app.window.panels.error_time import ErrorTimePanel
@@ -20,8 +21,9 @@ from app.window.panels.space_time import SpaceTimePanel
 from app.window.panels.spectrogram import SpectrogramPanel
 from app.window.panels.spectrum import SpectrumPanel
 from app.window.panels.waveform import WaveformPanel
+from engine.pluck import SHAPES
 from engine.values.ear import Ear
-from tests.app.gestures import drag, turn_wheel
+from tests.app.gestures import drag, reported, turn_wheel
 from tests.app.takes import append_to
 from tests.app.window.driver import KEY, LEFT, SHIFT, press
 from tests.app.window.driver import choose as choose_in
@@ -109,6 +111,9 @@ def test_the_spectrogram_has_one_scale(make, take, hear, watch):
     watch(panel, lambda: column().argmax() != highest)
     assert int(column().argmax()) / rows * 2000 == pytest.approx(take.fundamental_hz, abs=30)
     assert panel.plot.getPlotItem().vb.viewRange()[1][1] == pytest.approx(2000)
+    for time_s, words in ((0.5, "0.500 s   300 Hz   -"), (99.0, "")):
+        panel.plot.hovered.emit(time_s, 300.0)
+        assert panel.readout.text().startswith(words) and bool(panel.readout.text()) == bool(words)
     for pickup, label in (("displacement", "dB re 10 mm"), ("velocity", "dB re 30 m/s")):
         choose(panel, pickup_kind=pickup)
         assert bar_of(panel.plot).getAxis("left").labelText == label
@@ -233,6 +238,23 @@ def test_a_view_lets_the_last_take_go(kind, make, take, qtbot, hear):
     del last
     panel.take_started(take)
     qtbot.waitUntil(lambda: gc.collect(1) < 0 or gone() is None)
+
+
+def test_gestures_on_the_string_choose_its_pluck_and_where_it_is_heard(make):
+    panel, usual = make(StringPanel), Choices()
+    plucked = reported(panel.pluck_asked)
+    panel.session.update(position=0.2, amplitude_mm=9.0, shape="gaussian", width=0.1)
+    panel.view.width_stepped.emit(1.0)
+    panel.view.shape_stepped.emit(-1)
+    chosen = panel.session.choices
+    assert chosen.width == pytest.approx(0.105) and chosen.shape == SHAPES[SHAPES.index("gaussian") - 1]
+    panel.view.pluck_reset.emit()
+    chosen = panel.session.choices
+    assert (chosen.position, chosen.amplitude_mm, chosen.width) == (usual.position, usual.amplitude_mm, usual.width)
+    panel.view.listening_point_moved.emit("right", 0.9)
+    panel.view.listening_point_reset.emit("left")
+    assert (panel.session.choices.listen, panel.session.choices.listen_right) == (usual.listen, 0.9)
+    assert len(plucked) == 1
 
 
 def test_the_string_shows_one_moment(make, take, monkeypatch):
