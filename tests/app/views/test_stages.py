@@ -25,6 +25,7 @@ from tests.app.gestures import (
     SHIFT,
     colour_at,
     drag,
+    move,
     picture,
     press_keys,
     reported,
@@ -70,6 +71,18 @@ def test_axes_go_to_pixels_and_back():
     outlines = AXES.band(np.array([-1.0, -2.0]), np.array([1.0, 2.0]))
     heights = [[round(AXES.displacement_mm(p.y()), 6) for p in outline.toList()] for outline in outlines]
     assert heights == [[-1, -2, 2, 1], [-1, -2], [1, 2]]
+
+
+def test_the_pointer_is_over_what_it_can_grab_and_shows_a_whole_warning(view):
+    view.set_warning("Outside the training range")
+    foot, shapes = QPoint(round(AXES.x(0.37)), FOOT), Qt.CursorShape
+    for at, cursor, tip in (
+        (HANDLE, shapes.OpenHandCursor, "Drag along the string for the position"),
+        (foot, shapes.SizeHorCursor, "Drag to hear the string from another point"),
+        (QPoint(300, 5), shapes.CrossCursor, "Outside the training range"),
+    ):
+        move(view, at, Qt.MouseButton.NoButton)
+        assert view.cursor().shape() == cursor and view.toolTip().startswith(tip)
 
 
 def test_the_handle_is_dragged_without_a_jump(view, plucks):

@@ -14,13 +14,13 @@ import pytest
 import torch
 
 from engine.pluck import Pluck
-from engine.presets import PresetError, preset_digest, preset_files
+from engine.presets import preset_digest, preset_files
 from engine.presets.migrations import FORMAT_VERSION, UnknownVersion, migrated
 from engine.presets.of_string import STRINGS, find_string, of_string, read_described_string, read_string
 from engine.schema import SchemaError
 from engine.sources import ModelSource, Runaway, TruthSource
 from engine.values.string import StringParameters
-from tests.engine.sounds import KNOWING, initial_m, relative, shipped
+from tests.engine.sounds import initial_m, relative, shipped
 
 SHIPPED = json.loads(Path(__file__).with_name("shipped.json").read_text(encoding="utf-8"))
 FRAMES = 64  # from the pluck on: enough to tell any other weights or any other reading of them
@@ -132,19 +132,6 @@ def test_a_steel_string_is_played_by_the_same_preset():
     assert of_string(many) is many
     assert of_string(many, modes=7).info.modes == 7
     assert of_string(many, rate_hz=4_000).info.modes == many.info.string.modes_below(2_000)
-
-
-@pytest.mark.parametrize(
-    ("name", "changed", "words"),
-    [
-        ("studio_any_string", {"tension_n": 1e6, "length_m": 0.01}, "no mode below"),
-        ("studio_any_string", {"damping_d1_kg_m_s": 100.0}, "overdamped"),
-        (KNOWING, {}, "choose a preset of many strings"),
-    ],
-)
-def test_an_impossible_string_or_a_preset_of_one_is_refused(name, changed, words):
-    with pytest.raises(PresetError, match=words):
-        of_string(shipped(name), replace(StringParameters(), **changed))
 
 
 def test_a_string_file_is_read_and_may_describe_its_string(tmp_path):

@@ -4,8 +4,8 @@ import itertools
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.playing.keys import SoundingNote
 from app.shared.key_names import note_name
@@ -19,6 +19,7 @@ from tests.app.gestures import (
     RIGHT,
     SHIFT,
     drag,
+    move,
     picture,
     press_keys,
     reported,
@@ -81,6 +82,21 @@ def test_a_click_is_the_note_of_its_string_and_fret(qtbot, neck, notes):
         for key in (40, 63, 86):
             qtbot.mouseClick(neck, LEFT, pos=neck.key_rect(key).center().toPoint())
         assert not neck.in_rows and [key for what, key in notes if what == "on"] == [40, 63, 86], "a fan of the keys"
+
+
+def test_a_velocity_is_shown_before_the_click_and_fast_repeats_are_notes(qtbot, neck, notes):
+    at, none = on(neck, 2, 3, 0.9), Qt.MouseButton.NoButton
+    pressed = reported(neck.pressed)
+    move(neck, at, none)
+    shown = neck.figure
+    qtbot.mouseClick(neck, LEFT, pos=at)
+    qtbot.mouseDClick(neck, LEFT, pos=at)
+    qtbot.mouseRelease(neck, LEFT, pos=at)
+    assert shown == f"velocity {pressed[0][1]}" and notes == 2 * [("on", 53), ("off", 53)]
+    for leave in (lambda: move(neck, NUMBERS, none), lambda: QApplication.sendEvent(neck, QEvent(QEvent.Type.Leave))):
+        move(neck, at, none)
+        leave()
+        assert neck.figure == ""
 
 
 def test_a_note_is_seen_on_the_highest_string_at_or_below_it(neck):

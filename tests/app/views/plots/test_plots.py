@@ -8,15 +8,16 @@ import pyqtgraph as pg
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QImage
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QGuiApplication, QImage
 from PySide6.QtWidgets import QApplication
 
 from app.presets.library import Library
-from app.session.shown import DEFAULT_SOURCES
+from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.stage.session import Session
 from app.views import theme
 from app.views.plots.axis_label import sparse
 from app.views.plots.figures_table import FigureColumn, FiguresTable, TableRow
+from app.views.plots.legend import _texts
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.spectrum import Analyser, SpectrumPanel
 from app.window.panels.waveform import WaveformPanel, extremes
@@ -212,3 +213,10 @@ def test_a_waveform_is_strokes_or_where_a_pixel_has_few_samples_a_smooth_line(wa
     time_s, connect = shown(48_000)
     assert (len(time_s), connect) == (pytest.approx(96, abs=3), "all")
     assert len(shown(10)[0]) == 0, "nothing of what is in view"
+
+
+def test_a_legend_without_room_cuts_its_longest_title(qapp):
+    metrics, sources = QFontMetrics(QFont()), (DEFAULT_SOURCES[1], ShownSource("b", "B", 9 * "wide ", heard=True))
+    assert _texts(sources, metrics, 9_999)[1].endswith(" · heard")
+    short, long = _texts(sources, metrics, 200)
+    assert short == "B  truth" and "…" in long and sum(map(metrics.horizontalAdvance, (short, long))) < 200
