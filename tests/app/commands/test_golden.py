@@ -20,7 +20,8 @@ def plain(text: str, *places: Path) -> str:
     """A text in which folders, versions, durations and widths of columns are no more."""
     for place in places:
         text = text.replace(str(place), "PLACE")
-    lines = (re.sub(r"[ ─]{2,}", "  ", line).rstrip() for line in re.sub(r" in +[\d.]+ (?:ms|s|min)\b", "", text).splitlines())
+    text = re.sub(r" in +[\d.]+ (?:ms|s|min)\b", "", text)
+    lines = (re.sub(r"[ ─]{2,}", "  ", line).rstrip() for line in text.splitlines())
     return "\n".join(line for line in lines if line and not OF_A_VERSION.match(line)) + "\n"
 
 
