@@ -101,7 +101,7 @@ class InstrumentDesk(BrowserDesk):
         self._playback = Playback(self._play_event, performance.notes.sound, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
         self._judged: object = None  # all that the words about the training depend on, as they are
-        self._take: RecordedTake | None = None  # that is played as soon as its instrument can be
+        self._waiting: tuple[Instrument, Callable[[], None]] | None = None  # begun as soon as it can be played
         self._turned = False  # whether keys play the instrument as a knob was turned in the take
         self.recordings = Recordings(window, session, performance.notes, library)
         self.reload()
@@ -196,8 +196,8 @@ class InstrumentDesk(BrowserDesk):
         if self.instrument is not None:
             drum = self._session.stage.drum_key
             key = sum(self.instrument.range) // 2 if drum is None else drum
-            self._song.stop()
-            self._playback.play(_note(key))
+            self.stop()
+            self._begin_when_playable(lambda: self._playback.play(_note(key)))
 
     def change(self, field: str, value: float | str) -> None:
         """Change a field of the instrument, by its path; a value beyond its bounds is ignored."""
@@ -357,16 +357,23 @@ class InstrumentDesk(BrowserDesk):
         self._session.play_instrument()
         if self.instrument != take.played.instrument:
             self._session.update(played=take.played.instrument)
-        self._take = take
+        self._begin_when_playable(lambda: self._song.load(one_line(take.name), take.played.events))
+
+    def _begin_when_playable(self, begin: Callable[[], None]) -> None:
+        """Begin what plays the instrument that is there: now, or once it is loaded if it is still there then."""
+        if self.instrument is not None:
+            self._waiting = self.instrument, begin
+            self._play_waiting()
 
     def _play_waiting(self) -> None:
-        """Begin the take that waits; leave a knob that was turned in one that has ended."""
-        take = self._take
-        if take is not None and self.instrument != take.played.instrument:
-            self._take = None  # another instrument was chosen meanwhile
-        elif take is not None and self._performance.notes.keys.player is not None:
-            self._take = None
-            self._song.load(one_line(take.name), take.played.events)
+        """Begin the take or the note that waits; leave a knob that was turned in one that has ended."""
+        if self._waiting is not None:
+            instrument, begin = self._waiting
+            if self.instrument != instrument:
+                self._waiting = None  # another was chosen meanwhile
+            elif self._performance.notes.keys.player is not None:
+                self._waiting = None
+                begin()
         elif self._turned and not self._playback.playing:
             self._turned = False
             self._performance.hear_instrument(None)
@@ -418,7 +425,7 @@ class InstrumentDesk(BrowserDesk):
 
     def stop(self) -> None:
         """Stop the MIDI file or the take that is played, or the note of an audition."""
-        self._take = None
+        self._waiting = None
         self._song.stop()
         self._playback.stop()
 

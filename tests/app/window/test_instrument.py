@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from threading import Event
 from typing import Any
 
 from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
@@ -14,6 +15,7 @@ from app.player.midi_file import midi_bytes
 from app.player.strings import Strings, on_string
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE
+from app.playing.keys import Keys
 from app.playing.midi import MidiChoices
 from app.playing.note import PluckVoices
 from app.rendering.subject import path_of, string_of
@@ -232,7 +234,7 @@ def test_without_an_instrument_its_controls_change_nothing(lab):
     assert lab.said[-1].startswith("The listening test needs a preset")
 
 
-def test_the_browser_plays_what_is_there(guitar):
+def test_the_browser_plays_what_is_there(guitar, monkeypatch):
     instruments = guitar.controller.instruments
     instruments.choose("mandolin")
     instruments.change("knobs.decay", 3.0)
@@ -243,6 +245,15 @@ def test_the_browser_plays_what_is_there(guitar):
     instruments.audition("concert_harp")
     assert guitar.instrument == HARP
     guitar.wait(lambda: guitar.struck[-1].instrument == HARP)
+    loading, begin = Event(), Keys._begin
+    monkeypatch.setattr(Keys, "_begin", lambda *args: loading.wait(20) and begin(*args))
+    count = len(guitar.struck)
+    instruments.audition("thin_bars")  # of drums, which another player has to load
+    guitar.qtbot.wait(100)
+    assert len(guitar.struck) == count
+    loading.set()
+    guitar.wait(lambda: guitar.struck[-1].instrument == guitar.instrument)
+    instruments.audition("concert_harp")
     instruments.toggle()
     browser, loaded = instruments.browser, list[str]()
     for key in (KEY.Key_PageDown, KEY.Key_Up, KEY.Key_PageUp, KEY.Key_Down):
