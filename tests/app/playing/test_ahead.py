@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -146,6 +147,12 @@ def test_the_one_that_is_heard_soonest_goes_first(at, monkeypatch):
     at.wait(lambda: voice.waits_s > 0)
     at.wait(lambda: len(at.begun_s) == 3)
     assert 1 - CARE * 0.8 <= at.begun_s[2] < 1.0, "some of it is rendered while it is heard"
+
+
+def test_a_model_that_is_half_as_quick_as_its_sound_is_waited_for_as_long_as_the_rest_takes():
+    samples = AheadSamples(Mock(), Mock(rate_hz=RATE_HZ, frames=RATE_HZ, speed=0.5), object())
+    samples.given = RATE_HZ // 4
+    assert samples.waits_s == pytest.approx((1 - CARE * 0.5 - 0.25) / 0.5)
 
 
 def test_where_more_sound_than_can_be_rendered_the_oldest_make_room(at, monkeypatch):

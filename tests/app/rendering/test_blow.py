@@ -143,7 +143,9 @@ def test_errors_are_those_over_the_surface(tom):
     resonator, speeds = TOM_MODES.resonator(np.zeros((1, 2))), HARD.speeds(TOM_MODES)
     struck = StruckDrum(resonator, np.zeros(len(TOM_MODES)), speeds, TOM_MODES.scale**2, 0.1, "tom", TOM_MODES.drum)
     players, course = {"model": model_player(LOADED.preset.model)}, tom.error_course
-    expected = motion_errors(struck, players, RATE_HZ, tom.frames - 1)[0].rel_mse["model"]
+    shares: list[float] = []
+    expected = motion_errors(struck, players, RATE_HZ, tom.frames - 1, shares.append)[0].rel_mse["model"]
+    assert shares == sorted(shares) and shares[-1] == 1
     assert course.rel_mse == pytest.approx(expected, rel=0.01)
     curve = course.curves["rmse"][: course.ready]
     assert course.ready == course.windows > 5

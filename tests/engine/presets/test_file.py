@@ -222,3 +222,4 @@ def test_plucks_and_strings_outside_training_are_reported(small_preset, name, ch
     found = outside_training(info, pluck)
     assert len(found) == len(words)
     assert all(word in "; ".join(found) for word in words)
+    assert "is not the noise" in "; ".join(outside_training(replace(info, initial="noise"), pluck))
