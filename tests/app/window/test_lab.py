@@ -1,6 +1,7 @@
 """The Lab: gestures and keys change the session, the session picture and sound; notes sound in their own time."""
 
 import shutil
+import time
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from app.views.string.view import StringView
 from app.window.performance import growth_words
 from app.window.settings import load_settings
 from engine.kernels.constants import QUANTUM
+from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from tests.app.window.conftest import SPEAKERS
@@ -65,6 +67,24 @@ def test_gestures_on_the_string_and_knobs_pluck_listen_and_are_undone_one_by_one
     assert lab.rings[1].request.preset.stem == "first" and lab.pluck().request.preset.stem == "second"
     lab.controller.play_or_stop()
     lab.wait(lambda: all(each.over for each in lab.struck))
+
+
+def test_how_long_a_model_is_waited_for_is_shown_and_space_stops_it(lab, monkeypatch):
+    advance = KoopmanVar.advance
+
+    def slow(model: KoopmanVar, state: Any, steps: int, readout: Any = None) -> Any:
+        time.sleep(steps / 2_000)
+        return advance(model, state, steps, readout)
+
+    monkeypatch.setattr(KoopmanVar, "advance", slow)
+    words = lab.window.error_label
+    lab.change(preset="first", seconds=6.0, position=0.21)
+    lab.wait(lambda: lab.performance.ready)
+    note = lab.pluck()
+    lab.wait(lambda: words.text().startswith("Koopman, variable: buffering, starts in "))
+    lab.key(KEY.Key_Space)
+    assert note.over and not lab.performance.playing
+    lab.wait(lambda: "buffering" not in words.text())
 
 
 def test_keys_pluck_stop_switch_loop_and_step_and_the_computer_is_an_instrument(lab):
