@@ -82,9 +82,7 @@ def test_a_preset_of_many_strings_is_whole(tmp_path, capsys):
     sizes = (
         "modes = 25\nstrings = 2\nvalidation_strings = 1\ntest_strings = 1\nseconds = 0.02\nsteps = 1\nfirst_s = 0.01"
     )
-    (file := tmp_path / "two.toml").write_text(f"title = 'Two'
-description = ''
-{sizes}")
+    (file := tmp_path / "two.toml").write_text(f"title = 'Two'\ndescription = ''\n{sizes}")
     c, shares = read_configuration(file), list[float]()
     info = train_preset(c, tmp_path / "two.safetensors", report=lambda share, *_: shares.append(share))
     assert shares == sorted(shares) and max(shares) == 1
