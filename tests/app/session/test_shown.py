@@ -10,7 +10,7 @@ from app.presets.library import Library, PresetEntry, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
 from app.session.monitor import Monitor
-from app.session.shown import readable_unit, shown_sources
+from app.session.shown import shown_sources
 from app.session.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
 from engine.presets import find_string, read_info
@@ -64,20 +64,6 @@ def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small
     assert (other.slots, other.title, other.remark, other.gain) == ("B", "Steel E4, bright", " · heard", 1.0)
     (only,) = shown_sources(Choices(a="truth", b="truth", heard="b"), library)
     assert (only.slots, only.heard) == ("A B", True)
-
-
-@pytest.mark.parametrize(
-    ("peak", "pickup", "factor", "unit"),
-    [
-        (4e-3, "displacement", 1e3, "mm"),
-        (3e-5, "displacement", 1e6, "µm"),
-        (0.0, "displacement", 1e3, "mm"),
-        (6.0, "velocity", 1.0, "m/s"),
-        (1e-12, "velocity", 1e9, "nm/s"),
-    ],
-)
-def test_a_unit_has_few_digits(peak, pickup, factor, unit):
-    assert readable_unit(peak, pickup) == (factor, unit)
 
 
 STRINGS = {name: read_string(find_string(name)) for name in ("nylon_e2", "piano_c4")}

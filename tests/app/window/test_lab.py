@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QAbstractButton, QToolButton
 from app.playing.note import PluckVoices
 from app.views.stage import MARGIN_X
 from app.views.string.view import StringView
-from app.window.performance import growth_words
 from app.window.settings import load_settings
 from engine.kernels.constants import QUANTUM
 from engine.models.koopman_var import KoopmanVar
@@ -254,22 +253,6 @@ def test_a_loop_begins_each_turn_at_its_frame_with_the_pluck_that_is_chosen(soun
     sounding.change(loop=False)
     sounding.wait(lambda: turn.seconds > TURN_S + 0.05)
     assert sounding.notes.latest is turn and not turn.over
-
-
-@pytest.mark.parametrize(
-    ("errors", "own", "words"),
-    [
-        ([0.001, 0.004], 0.001, ""),  # grown, but too small to be noticed
-        ([0.02, 0.05], 0.028, ""),  # as large as ever
-        ([0.03, 1.16], 0.028, "116 % past the end of its training"),
-        ([0.2, 0.05], 0.01, "20 % on this pluck"),
-        ([0.2], None, "20 % on this pluck"),
-        ([float("nan")], 0.01, ""),
-        ([], None, ""),
-    ],
-)
-def test_an_error_that_grew_is_put_into_words(errors, own, words):
-    assert words in growth_words(errors, own) and bool(growth_words(errors, own)) == bool(words)
 
 
 def test_a_preset_is_plucked_as_trained_and_a_pluck_by_hand_stays_while_models_are_compared(opened):

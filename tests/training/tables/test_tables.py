@@ -9,11 +9,9 @@ from training.results import Row
 from training.tables.compact import as_compact
 from training.tables.paper import (
     COLUMNS,
-    PRINTED,
     DatasetColumn,
     MeanFigure,
     factor,
-    mark,
     paper_errors,
 )
 from training.tables.tidy_csv import as_csv
@@ -147,30 +145,6 @@ def test_figures_of_the_paper(string, horizon, model, column, mse, mae):
     assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
     entry = figures[string, horizon, model, DatasetColumn(*column)]
     assert (entry.rel_mse, entry.rel_mae) == (MeanFigure(*mse), MeanFigure(*mae))
-
-
-@pytest.mark.parametrize(
-    ("ours", "paper", "expected"),
-    [
-        ((0.08, None), (0.1, 0.02), "equal"),  # on the boundary, which floats miss
-        ((0.12, None), (0.1, 0.02), "equal"),
-        ((0.0799, None), (0.1, 0.02), "better"),
-        ((0.1201, None), (0.1, 0.02), "worse"),
-        ((0.05, 0.06), (0.1, 0.02), "equal"),  # ours is the larger deviation
-        ((0.05, 0.03), (0.1, 0.04), "equal"),  # 3, 4, 5: both count, as variances of a difference do
-        ((0.0499, 0.03), (0.1, 0.04), "better"),
-        ((0.05, None, 0.03), (0.1, 0.04), "equal"),  # which strings are in the split counts as the seeds do
-        ((0.04, 0.03, 0.04), (0.1, 0.02), "better"),
-        ((0.04, 0.03, 0.04), (0.1, 0.034), "equal"),
-        ((5e-6, 1e-7), (0.0, 0.0), "equal"),  # the paper's may be anything below its last decimal
-        ((PRINTED, None), (0.0, 0.0), "equal"),
-        ((6e-5, None), (0.0, 0.0), "worse"),
-        ((5e-6, None), (0.0001, 0.0), "better"),
-        ((float("inf"), None), (0.1, 0.02), "worse"),
-    ],
-)
-def test_marks(ours, paper, expected):
-    assert mark(MeanFigure(*ours), MeanFigure(*paper)) == expected
 
 
 def test_a_figure_may_be_off_by_both_of_its_errors_and_its_ratio_is_one_of_printed_figures():
