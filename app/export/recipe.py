@@ -197,8 +197,10 @@ class SoundRecipe(Origin):
         """
         subject = preset if self.string is None else StringOf(preset, self.string, self.preset_rate_hz, self.modes)
         try:
+            if self.event is not None and self.event.velocity == 0:
+                raise ValueError("event: velocity 0 strikes no key; it must lie in 1 … 127")
             struck = None if self.event is None else Struck(self.find_instrument()[0], self.event)
-            sound = NoteSound(subject, self.pluck, self.seconds, self.ear, struck=struck)
+            sound = NoteSound(subject, self.pluck, self.seconds, replace(self.ear, solo=0), struck=struck)
             check_sources(sound, (self.source,), sound.load().info.rate_hz)
         except ValueError as error:
             raise _unusable_error(file, str(error)) from error
