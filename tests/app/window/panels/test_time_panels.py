@@ -4,6 +4,7 @@ import gc
 import math
 import weakref
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -246,11 +247,10 @@ def test_gestures_on_the_string_choose_its_pluck_and_where_it_is_heard(make):
     panel.session.update(position=0.2, amplitude_mm=9.0, shape="gaussian", width=0.1)
     panel.view.width_stepped.emit(1.0)
     panel.view.shape_stepped.emit(-1)
-    chosen = panel.session.choices
+    chosen = panel.session.choices.pluck
     assert chosen.width == pytest.approx(0.105) and chosen.shape == SHAPES[SHAPES.index("gaussian") - 1]
     panel.view.pluck_reset.emit()
-    chosen = panel.session.choices
-    assert (chosen.position, chosen.amplitude_mm, chosen.width) == (usual.position, usual.amplitude_mm, usual.width)
+    assert panel.session.choices.pluck == replace(usual.pluck, shape=chosen.shape)
     panel.view.listening_point_moved.emit("right", 0.9)
     panel.view.listening_point_reset.emit("left")
     assert (panel.session.choices.listen, panel.session.choices.listen_right) == (usual.listen, 0.9)
