@@ -144,9 +144,9 @@ class Panel(QWidget):
         super().resizeEvent(event)
         self._cover.setGeometry(self.rect())
 
-    @abstractmethod
     def columns(self) -> Columns | None:
         """The numbers that are shown now; None: nothing is."""
+        raise NotImplementedError(f"{self.key}: a panel has columns(), the numbers that its menu saves")
 
     def by_heading(self, values: Mapping[str, V], unit: str) -> dict[str, V]:
         """Values by source, by the headings that they have in files."""
