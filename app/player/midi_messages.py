@@ -126,10 +126,10 @@ class _Reader:
         ticked: ticks from the beginning, and a channel message or a tempo in µs, track by track.
     """
 
-    def __init__(self, raw: bytes, most: int) -> None:
+    def __init__(self, raw: bytes, most_messages: int) -> None:
         self._raw = raw
-        self._most = most
-        self._left = most
+        self._most = most_messages
+        self._left = most_messages  # of these
         self.ticked: list[tuple[int, int | Message]] = []
         self.tracks = self.clipped = self.skipped = 0
 

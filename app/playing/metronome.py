@@ -27,7 +27,7 @@ class Metronome:
     def __init__(self, sound: Sound) -> None:
         self._sound = sound
         self._meter = Meter()
-        self._beginning: Beginning | None = None
+        self._beginning: Beginning | None = None  # of the count-in; None: no click is due
         self._next = 0  # beat, from the first of the count-in
         self._voices: list[Voice] = []  # the latest clicks
 

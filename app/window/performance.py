@@ -177,7 +177,10 @@ class Performance(QObject):
             self._session.send(Asked(request))
 
     def _ask(self) -> None:
-        """Ask for the motion that is to be shown; where there is none, nothing is."""
+        """Ask the worker for the motion that is to be shown; none is where no string or drum is chosen.
+
+        What loops and seeks start from is the pluck of a string; a drum, or a key of an instrument, starts none.
+        """
         request = self._session.stage.request
         plucked = request if request is not None and request.struck is None else None
         self.notes.choose(plucked)
@@ -229,7 +232,7 @@ class Performance(QObject):
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _hand_over_turn(self) -> None:
-        """Hand the next turn of the loop to the mixer, shortly before it begins."""
+        """Hand the next turn of the loop over before it begins: a note of its own, where the shown motion ends."""
         stage = self._session.stage
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
         note, take = stage.lead or stage.note, stage.take
@@ -250,12 +253,13 @@ class Performance(QObject):
         self._session.send(Turned(note))
 
     def _forget_turn(self) -> None:
+        """Drop the turn that was handed over, if there is one; the note before it rings on."""
         if self._turn is not None:
             (note, turn), self._turn = self._turn, None
-            turn.release(0.0)
+            turn.release(0.0)  # s: at once, so that it never begins
             if isinstance(turn, KeyNote):
                 self.notes.keys.recorder.cancel(turn.event)
-            note.release_at(0)
+            note.release_at(0)  # no frame: it is not to fade where the turn would have begun
 
     def _hear_worker(self, signal_name: str, *values: Any) -> None:
         """Hear a signal of the render worker, in its thread."""

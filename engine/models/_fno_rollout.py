@@ -49,7 +49,11 @@ def _analyse(field: Tensor, matrix: Tensor) -> Tensor:
 
 
 def _synthesise(spectrum: Tensor, matrix: Tensor) -> Tensor:
-    points, batch, width = spectrum.shape  # as many frequencies
+    """The field (points, batch, width / 2) of a spectrum (points, batch, width): width is real, then imaginary parts.
+
+    The cosines and sines of `matrix` give half of the points; the other half mirrors them.
+    """
+    points, batch, width = spectrum.shape
     parts = torch.stack(spectrum.chunk(2, dim=2)).view(2, points, batch * width // 2)
     even, odd = torch.bmm(matrix, parts).view(2, points // 2 + 1, batch, width // 2)
     first = (points + 1) // 2

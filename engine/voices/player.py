@@ -350,7 +350,7 @@ class CompiledPlayer(KernelMemory):
         began = max((int(voice["began_frame"]) for voice in voices), default=0)
         known = began > 0 and bool(voices[0]["struck_s"])
         took_s = possible_s(voices[0]["began_s"] - voices[0]["struck_s"]) if known else None
-        return Playing(frames / self.rate_hz, max(0, began), took_s)
+        return Playing(seconds=frames / self.rate_hz, began_frame=max(0, began), struck_to_began_s=took_s)
 
     @property
     def rests(self) -> bool:

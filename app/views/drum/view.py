@@ -54,12 +54,12 @@ class DrumView(StageView):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._name = ""
+        self._name = ""  # of the drum
         self._shape: Shape = "circle"
-        self._sides = (1.0, 1.0)
-        self._place: Place = (0.0, 0.0)
+        self._sides = (1.0, 1.0)  # length and width in m
+        self._place: Place = (0.0, 0.0)  # of the strike
         self._frame: HeadFrame | None = None
-        self._scales_m: dict[str, float] = {}
+        self._scales_m: dict[str, float] = {}  # the displacement of the full colour, by source
 
     # What is shown
 
