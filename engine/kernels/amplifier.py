@@ -33,6 +33,10 @@ def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> Non
     """Set the amplifier of a mixer, see `engine.values.effects.Amp`; a tone of the peak NOMINAL keeps its level.
 
     The input is scaled to the level that it would have without `level_db`, so that it changes no drive.
+
+    Args:
+        drive_db: gain before the shape; at 0 and below the amplifier is off.
+        tone_db: gain of what lies above PIVOT_HZ; what lies below it is lowered as much.
     """
     amp, on = mixer.amplifier, drive_db > 0
     factor, level = 10 ** (drive_db / 20), 10 ** (level_db / 20)
@@ -55,7 +59,7 @@ def amplify(mixer: Mixer) -> None:
     if wanted > 0.0 and (first or share == 0.0):
         amp.drive = wanted
         amp.gain, amp.tone = amp.wanted_gain, amp.wanted_tone
-    sounds = _take(mixer, amp)
+    sounds = _take(mixer, amp)  # whether there is any input
     amp.quiet = 0 if sounds else amp.quiet + 1
     goal = 1.0 if wanted > 0.0 else 0.0
     step = 1.0 if first else QUANTUM / (FADE_S * mixer.rate_hz)
@@ -69,8 +73,11 @@ def amplify(mixer: Mixer) -> None:
 
 @kernel
 def _begin(amp: Amplifier) -> None:
-    """Reset the amplifier, as if there had never been any input: all is at rest, which is where the bias has it."""
-    rest = BIAS / math.sqrt(1 + BIAS * BIAS)
+    """Reset the amplifier, as if there had never been any input, and compute its low-pass, (TAPS,) of sum 1.
+
+    That is a sinc with a Kaiser window, for the way to the higher rate and back.
+    """
+    rest = BIAS / math.sqrt(1 + BIAS * BIAS)  # the shape's output without input
     amp.low = 0.0
     amp.last = BIAS
     amp.mean = rest
@@ -79,7 +86,7 @@ def _begin(amp: Amplifier) -> None:
     amp.shaped[:] = rest
     filter, total = amp.filter, 0.0
     for tap in range(TAPS):
-        place = tap - (TAPS - 1) / 2
+        place = tap - (TAPS - 1) / 2  # from the middle, never 0: TAPS is even
         inside = 1 - (2 * place / TAPS) ** 2
         turns = 2 * math.pi * PASSED * place / OVERSAMPLING
         value = math.sin(turns) / turns * _bessel(KAISER * math.sqrt(inside))
@@ -93,7 +100,10 @@ def _begin(amp: Amplifier) -> None:
 
 @kernel
 def _bessel(x: float) -> float:
-    """I₀."""
+    """I₀(x), the modified Bessel function, by its power series Σ (x/2)^2k / k!².
+
+    The Kaiser window of the amplifier's filter takes x of 0 … KAISER, where 40 terms are exact to rounding.
+    """
     total = term = 1.0
     for k in range(1, 40):
         term *= (x / (2 * k)) ** 2
@@ -103,7 +113,10 @@ def _bessel(x: float) -> float:
 
 @kernel
 def _take(mixer: Mixer, amp: Amplifier) -> bool:
-    """The next input behind the last one, through the high-pass. Returns whether there is any."""
+    """Take the mean of the mix's channels, through the high-pass, as the next input; return True if there is any.
+
+    The last LAGS frames of the input before stay in front of it.
+    """
     sounds, low = False, amp.low
     raw, mix = amp.input, mixer.mix
     follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer.rate_hz)
@@ -122,7 +135,10 @@ def _take(mixer: Mixer, amp: Amplifier) -> bool:
 
 @kernel
 def _shape(amp: Amplifier) -> None:
-    """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
+    """Bring the input to the higher rate, through drive, bias and shape, into `amp.shaped`.
+
+    That is (OVERSAMPLING, SHAPED_FRAMES): the row is a sample within its frame; LAGS frames before stay in front.
+    """
     filter = amp.filter
     raw = amp.input
     all_shaped = amp.shaped
@@ -154,7 +170,10 @@ def _shape(amp: Amplifier) -> None:
 
 @kernel
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
-    """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
+    """Bring the shaped sound back to the rate of the mixer, without its mean, through gain and tone, into the mix.
+
+    Its share of the mix goes from `share` to `share_to` within the quantum, as the amplifier is switched on or off.
+    """
     filter = amp.filter
     out = amp.out
     mix = mixer.mix

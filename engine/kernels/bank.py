@@ -25,7 +25,7 @@ from engine.kernels.modes import row, rows, weights
 SHORT, LONG = 32, 64  # frames of a segment, at first and later
 INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
 DEAD = math.log(4e-7)  # of full scale: a latent that is quieter is left out
-LOOK_EVERY = 8  # quanta
+LOOK_EVERY = 8  # quanta from one look at which latents' modulation is heard to the next
 NO_FIXED_POINT = 3e-4  # nepers: the second step would change a smaller change by less than its square
 STRAIGHT = 5e-6  # radians and nepers of a segment that may come from a cubic term that is left out
 _TWO_PI = 2 * math.pi
@@ -59,6 +59,7 @@ def _exp(x: float) -> float:
 
 @inlined
 def _tanh(x: float) -> float:
+    """The hyperbolic tangent, as `compiled.tanh` computes it, in double precision; |x| counts up to 18."""
     y = 0.5 * (-18.0 if x < -18 else 18.0 if x > 18 else x)
     s = y * y
     t = y * (135135 + s * (17325 + s * (378 + s))) / (135135 + s * (62370 + s * (3150 + 28 * s)))
@@ -67,13 +68,13 @@ def _tanh(x: float) -> float:
 
 @kernel
 def _room(scratch: np.ndarray, row: int, count: int) -> np.ndarray:
-    """The first numbers of a row of the scratch."""
+    """The first `count` numbers of the scratch from a row on: a row has MOST_LATENTS, more run into the next rows."""
     return scratch[row * MOST_LATENTS : row * MOST_LATENTS + count]
 
 
 @kernel
 def energies(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray) -> None:
-    """E_m (modes,) at a time in trained samples."""
+    """Write the energies E_m (modes,) at a time since the pluck, in trained samples."""
     n = program.modes
     sigma = behind(program, program.sigma, n)
     start = row(voice, at.ENERGY_0)
@@ -83,7 +84,14 @@ def energies(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndar
 
 @kernel
 def higher_orders(program: at.BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
-    """f(E) - K E, (2 modes,)."""
+    """Write f(E) - K E into `out`, (2 modes,): slopes of each latent's log gain, then of its phase.
+
+    They are in nepers and rad a trained sample.
+
+    Args:
+        energy: E (modes,).
+        scratch: rows to work in; they are overwritten.
+    """
     n = program.modes
     omega = behind(program, program.omega, n)
     out[: 2 * n] = 0.0
@@ -147,7 +155,7 @@ def higher_orders(program: at.BankProgram, energy: np.ndarray, out: np.ndarray, 
 
 @kernel
 def strike(voice: at.Voice, program: at.BankProgram, scratch: np.ndarray) -> None:
-    """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
+    """Fill in what follows from z(0), whose log |z| and angle `LEVEL_0` and `ANGLE_0` hold, as a voice begins."""
     n = program.modes
     sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
     energy = row(voice, at.ENERGY_0)
@@ -173,13 +181,16 @@ def strike(voice: at.Voice, program: at.BankProgram, scratch: np.ndarray) -> Non
 
 @kernel
 def _width(node: int) -> int:
-    """Nodes from this one to the next that is used: what is left to change does so ever more slowly."""
+    """The number of nodes from this one to the next that is used: it grows, for changes become ever slower."""
     return 1 if node < 16 else 2 if node < 64 else 4 if node < 256 else 8
 
 
 @kernel
 def _integrate_from(voice: at.Voice, program: at.BankProgram, first: int, scratch: np.ndarray) -> None:
-    """The higher orders at the voice's node, half-way and at the next, from the first of these on that is new."""
+    """Compute the higher orders at the voice's node, half-way to the next one and there.
+
+    They go to AT_LEFT, AT_MIDDLE and AT_RIGHT. `first`: the first of these three, 0 … 2, that is to be computed.
+    """
     n = program.modes
     energy, more = _room(scratch, 4, n), scratch[5 * MOST_LATENTS :]
     for half in range(first, 3):
@@ -190,7 +201,7 @@ def _integrate_from(voice: at.Voice, program: at.BankProgram, first: int, scratc
 
 @kernel
 def _integrate_to(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
-    """Move on to the node before a time."""
+    """Add to INTEGRAL, by Simpson's rule, up to the last node that is not after a time in trained samples."""
     wanted = int(time / program.spacing)
     while voice.node + _width(voice.node) <= wanted:
         width = _width(voice.node)
@@ -207,7 +218,12 @@ def _integrate_to(voice: at.Voice, program: at.BankProgram, time: float, scratch
 
 @kernel
 def _change(program: at.BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
+    """Write what A adds to the log gain of each latent, in nepers (modes,).
+
+    Args:
+        level: log |z| (modes,).
+        alive: the number of latents that count, the first ones.
+    """
     n = program.modes
     weight = behind(program, program.change, n * n)  # transposed
     squares, energy = _room(scratch, 0, alive), _room(scratch, 1, alive)
@@ -217,7 +233,7 @@ def _change(program: at.BankProgram, level: np.ndarray, alive: int, out: np.ndar
         energy[m] = _exp(2 * level[m])
         squares[m] = energy[m]
         most = max(most, energy[m])
-    for _ in range(3):
+    for _ in range(3):  # rounds of a fixed point, at most
         change[:] = 0.0
         for m in range(alive):
             if squares[m] > 1e-7 * most:
@@ -239,7 +255,14 @@ def _change(program: at.BankProgram, level: np.ndarray, alive: int, out: np.ndar
 
 @kernel
 def _move(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
-    """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
+    """Write level, phase and their slopes at a time as the first four rows of `out`, (5, modes).
+
+    The fifth row becomes what A adds to the level, where that can be heard; else it stays.
+
+    Args:
+        time: since the pluck, in trained samples.
+        out: nepers and rad, slopes of them a trained sample; the level's slope is without the decay σ.
+    """
     n = program.modes
     sigma, omega = behind(program, program.sigma, n), behind(program, program.omega, n)
     coupling, largest = behind(program, program.coupling, 2 * n * n), behind(program, program.largest, n)
@@ -291,9 +314,9 @@ def _move(voice: at.Voice, program: at.BankProgram, time: float, out: np.ndarray
 def generate(
     voice: at.Voice, program: at.BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
+    """Write the next quantum, (4, QUANTUM): rows 0 and 1 of the first set of weights, a row for each point.
 
-    Where it is not audible only time advances.
+    Rows 2 and 3 are of the second set, where `fading` to it. Where it is not audible only time advances.
     """
     n = program.modes
     ratio = program.ratio
@@ -307,6 +330,7 @@ def generate(
     if audible:
         out[:] = 0.0
         length = SHORT if first < program.early else LONG
+        # (QUANTUM, 2, modes): real parts, then imaginary ones
         z = scratch[SCRATCH_ROWS * MOST_LATENTS :].view(np.float32)[: 2 * QUANTUM * n]
         if not voice.segment_valid:
             _keep_end(voice, program, first * ratio, scratch)
@@ -326,7 +350,7 @@ def generate(
         voice.segment_valid = 0
     voice.generated = first + QUANTUM
     # Beyond those that were audible there is no level: what is dead stays so
-    loudest, alive = -1e9, 1
+    loudest, alive = -1e9, 1  # nepers; latents up to the last that can be heard
     sigma = behind(program, program.sigma, n)
     levels, latest = row(voice, at.LEVEL_0), row(voice, at.LEVEL)
     time = (first + QUANTUM) * ratio
@@ -343,9 +367,12 @@ def generate(
 
 @kernel
 def _keep_end(voice: at.Voice, program: at.BankProgram, time: float, scratch: np.ndarray) -> None:
-    """Keep the state at which the next segment begins."""
+    """Compute a voice's state at a time since the pluck, in trained samples, and keep it for the next segment.
+
+    Rows LEVEL, PHASE, LEVEL_RATE and PHASE_RATE are those of `_move`; row CHANGE is what A adds there.
+    """
     n = program.modes
-    end = _room(scratch, 8, 5 * n)
+    end = _room(scratch, 8, 5 * n)  # (5, modes), from row 8 of the scratch on, which `_move` does not work in
     end[4 * n :] = 0.0
     _move(voice, program, time, end, scratch)
     rows(voice, at.LEVEL, 4)[:] = end[: 4 * n]
@@ -357,17 +384,23 @@ def _keep_end(voice: at.Voice, program: at.BankProgram, time: float, scratch: np
 def _segment(
     voice: at.Voice, program: at.BankProgram, first: int, length: int, alive: int, z: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
+    """Write z at `length` frames, float32 (frames, 2, modes) with the real parts first.
+
+    Args:
+        first: frame since the pluck, at which the kept state is.
+        alive: the number of latents that are computed, the first ones; the others' z stays as it was.
+    """
     n = program.modes
     ratio = program.ratio
     limit = program.limit
-    end = _room(scratch, 8, 5 * n)
+    end = _room(scratch, 8, 5 * n)  # as in `_keep_end`: the state after the segment
     end[4 * n :] = 0.0
     _move(voice, program, (first + length) * ratio, end, scratch)
     sigma = behind(program, program.sigma, n)
-    width, count = length * ratio, float(length)
+    width, count = length * ratio, float(length)  # in trained samples, and in frames
     level, phase = row(voice, at.LEVEL), row(voice, at.PHASE)
     level_rate, phase_rate = row(voice, at.LEVEL_RATE), row(voice, at.PHASE_RATE)
+    # (modes,) each: z; its ratio from frame to frame, r; the ratio of that, s; and of that in turn, c
     turns = scratch[16 * MOST_LATENTS :].view(np.float32)
     zr = turns[:n]
     zi = turns[n : 2 * n]
@@ -377,7 +410,7 @@ def _segment(
     si = turns[5 * n : 6 * n]
     cr = turns[6 * n : 7 * n]
     ci = turns[7 * n : 8 * n]
-    bent = 0.0
+    bent = 0.0  # the largest cubic term, in nepers or rad over frames cubed
     for m in range(alive):
         held_left = min(max(level_rate[m] * width, -limit), limit) - sigma[m] * width
         held_right = min(max(end[2 * n + m] * width, -limit), limit) - sigma[m] * width
@@ -422,7 +455,10 @@ def _segment(
 
 @kernel
 def _sum(voice: at.Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
-    """Add Re Σ w z at each frame of the quantum."""
+    """Add Re Σ w z and the bias to `out`, (QUANTUM,), w being the weights of set `which` at a point.
+
+    `z`: (QUANTUM, 2, modes), real parts first.
+    """
     n, alive = voice.modes, voice.audible_count
     reals, imaginaries = weights(voice, which, point, 0), weights(voice, which, point, 1)
     w, v = scratch[32 * MOST_LATENTS :].view(np.float32), scratch[33 * MOST_LATENTS :].view(np.float32)
@@ -439,9 +475,13 @@ def _sum(voice: at.Voice, which: int, point: int, z: np.ndarray, out: np.ndarray
 
 @kernel
 def _look(voice: at.Voice, program: at.BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
-    """Find the latents that are heard as modulated, and those whose squares are heard in that; there come no more."""
+    """List the latents whose modulation can be heard (ROW_LIST), and those whose squares modulate them (COLUMN_LIST).
+
+    Where no modulation can be heard the voice is not modulated any more.
+    """
     n = program.modes
     alive = voice.audible_count
+    # M, (modes, modes, 4): log gain by Re z² and Im z², then phase by both
     matrix, largest = behind(program, program.modulation, 4 * n * n), behind(program, program.largest_modulation, n)
     squares, loud = _room(scratch, 20, n), _room(scratch, 21, n)
     loudest = 0.0
@@ -482,7 +522,10 @@ def _look(voice: at.Voice, program: at.BankProgram, z: np.ndarray, scratch: np.n
 def _modulate(
     voice: at.Voice, program: at.BankProgram, z: np.ndarray, fading: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """Add what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
+    """Add what modulation changes to the outputs (4, QUANTUM): w z (e^g - 1), for latents of ROW_LIST.
+
+    g is M z² with what A adds. `z`: (QUANTUM, 2, modes), real parts first.
+    """
     n = program.modes
     matrix, limit = behind(program, program.modulation, 4 * n * n), program.limit
     row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
@@ -502,6 +545,7 @@ def _modulate(
             a, b = z[frame * 2 * n + m], z[frame * 2 * n + n + m]
             real[frame] = a * a - b * b
             imaginary[frame] = np.float32(2) * a * b
+    # (QUANTUM,): log gain and phase of one latent, then the parts of z (e^g - 1)
     growth, turn = scratch[22 * MOST_LATENTS :].view(np.float32), scratch[23 * MOST_LATENTS :].view(np.float32)
     for place in range(rows_kept):
         j = row_list[place]

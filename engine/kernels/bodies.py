@@ -31,7 +31,10 @@ def given_frames(frames: int, own_hz: float, size: float, rate_hz: float, longes
 
 @kernel
 def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound: np.ndarray) -> None:
-    """Write all modes, (4, modes), after one blow, in whole runs, which are computed side by side."""
+    """Write the sound (frames, 2) of all modes, (4, modes), after one blow, in whole runs of RUN frames.
+
+    The runs are computed side by side. `size`: a factor of the body's lengths; its modes are lower by it.
+    """
     runs, step_s = len(sound) // RUN, 1 / rate_hz
     x, y = row(work, ONE, runs), row(work, ONE + 1, runs)
     left, right = row(work, SPARE, RUN * runs), row(work, SPARE + 1, RUN * runs)  # frames of all runs, then the next

@@ -28,6 +28,7 @@ def _sources() -> list[Path]:
 
 @cache
 def _version() -> str:
+    """The name of these very sources: 16 hexadecimal digits of a hash of their files and of the values' names."""
     digest = hashlib.sha256()
     for source in _sources():
         digest.update(source.read_bytes())
@@ -89,5 +90,6 @@ def set_whole() -> None:
 
 
 def _mark() -> Path | None:
+    """The file whose presence says that everything has been compiled; None where nothing is kept."""
     place = folder()
     return place and place / f"whole-{_version()}"

@@ -125,7 +125,10 @@ def touch(player: Player, table: Table, by: Touch) -> None:
 
 @kernel
 def sound(player_address: int, mixer_address: int) -> None:
-    """Add all noises to the mixer's quantum, both channels alike."""
+    """Add all noises of a player to the mixer's quantum, both channels alike.
+
+    They are heard where exactly one source sounds, at its gain, and no mode is heard alone; else at a gain of 0.
+    """
     player = player_at(player_address)
     if player.table == 0:
         return
@@ -164,7 +167,10 @@ def sound(player_address: int, mixer_address: int) -> None:
 
 @kernel
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
-    """Add a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
+    """Add a force to a frame of the mix, at a gain that moves from `before` to `gain` within the quantum.
+
+    `stops`: quanta in which the noise fades out, this one included; 0: it does not.
+    """
     share = (frame + 1) / of.QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
@@ -175,7 +181,7 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
 
 @kernel
 def _run(noise: Noise, begin: int, end: int, before: float, gain: float, mix: np.ndarray) -> None:
-    """Add a noise to frames of the mix, while its gain goes from `before` to `gain`."""
+    """Add a noise to the frames `begin` to `end` of the mix, while its gain goes from `before` to `gain`."""
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope

@@ -10,6 +10,10 @@ between each take their share of the frequencies.
 The input's spectra do not depend on the response. So another response is computed beside the one that is heard for
 a window and then faded to; what has been played rings on in it. After as much silence as the response is long,
 nothing is left and nothing is computed.
+
+There are two *lanes*, 0 and 1: what the input is through the response that is heard, `convolver.lane`, and through
+the next one. A *window* is WINDOW_QUANTA quanta, and `convolver.phase` the number of a quantum within it. Spectra are
+(partitions, channels, 2, bins), real parts first.
 """
 
 from __future__ import annotations
@@ -75,7 +79,7 @@ def convolve(mixer: Mixer) -> None:
 
 @kernel
 def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
-    """Leave only what may ring on. Return True if there is anything."""
+    """Replace samples of the mix that are no numbers, too large or too small by 0; return True if any is left."""
     sounds = False
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
@@ -116,7 +120,7 @@ def _exchange(mixer: Mixer, convolver: Convolver) -> None:
 
 @kernel
 def _take(mixer: Mixer, convolver: Convolver) -> None:
-    """The next response is the one that is heard."""
+    """Make the next response the one that is heard; its lane becomes `convolver.lane`."""
     convolver.step = -1
     convolver.lane = 1 - convolver.lane
     mixer.effects_now = mixer.effects_next
@@ -143,9 +147,9 @@ def _late(convolver: Convolver) -> np.ndarray:
 
 @kernel
 def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
-    """The spectra of the input's last two quanta and, where a window is over, of its last two windows.
+    """Keep a quantum of input, and compute the spectra of its last two quanta and, as a window ends, two windows.
 
-    softly: the first window of a sound that began before; with an edge it would click, and ring on.
+    `softly`: the input fades in over a window, as it began before; with an edge it would click, and ring on.
     """
     phase = convolver.phase
     early_input, late_input = convolver.early_input[:], convolver.late_input[:]
@@ -170,7 +174,7 @@ def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
 
 @kernel
 def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> None:
-    """The spectra (2, 2, half + 1) of two real signals (2, 2 half), whose later halves become the earlier."""
+    """Write the spectra (2, 2, half + 1) of two real signals (2, 2 half); move their later halves to the front."""
     n, half = signals.shape[1], signals.shape[1] // 2
     re, im, re2, im2 = _work(convolver, n)
     for frame in range(n):
@@ -190,7 +194,10 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
 
 @kernel
 def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
-    """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
+    """Write a quantum of a lane to its part of `wet`; return after how many quanta of silence it has rung out.
+
+    `later`: the lane is needed in the next window too, for which its late partitions are computed.
+    """
     channels = impulse.channels
     early = impulse.early
     late = impulse.late
@@ -213,7 +220,10 @@ def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int
 
 @kernel
 def _compute(convolver: Convolver, response: np.ndarray, lane: int) -> None:
-    """Compute this quantum's part of what the late partitions give in the next window."""
+    """Compute this quantum's part of what the late partitions give in the next window.
+
+    `response`: their spectra, (late, channels, 2, WINDOW + 1).
+    """
     phase, sums = convolver.phase, convolver.late_sums[lane]
     count = min(len(response), convolver.late_filled)
     if 1 <= phase <= _SUMMING:
@@ -234,6 +244,8 @@ def _multiply(spectra: np.ndarray, place: int, response: np.ndarray, begin: int,
     Args:
         spectra: of the input, a ring (partitions, 2, 2, bins), whose latest is at `place`.
         response: (partitions, channels, 2, bins).
+        begin, end: the frequencies that are computed, by their numbers.
+        sums: (2 sides, 2, bins), in which they are written.
     """
     ring, channels = len(spectra), response.shape[1]
     for side in range(2):
@@ -252,7 +264,7 @@ def _multiply(spectra: np.ndarray, place: int, response: np.ndarray, begin: int,
 
 @kernel
 def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> None:
-    """The later halves (2, half) of two real signals from their spectra, by one complex transform."""
+    """Write the later halves (2, half) of two real signals from their spectra, by one complex transform."""
     half = goal.shape[1]
     n, bins = 2 * half, half + 1
     re, im, re2, im2 = _work(convolver, n)
@@ -276,7 +288,10 @@ def _work(convolver: Convolver, n: int) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 @kernel
 def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """The output: a lane, or the fade from one to the other. A lane without a response is the mix itself."""
+    """Replace the mix by the lane that is heard, or by a fade from it to the next.
+
+    A lane without a response is the mix itself: where `wet_now`, or `wet_next`, is False.
+    """
     step, lane = convolver.step, convolver.lane
     now, following = convolver.wet[lane], convolver.wet[1 - lane]
     done = (step - 1) * WINDOW + convolver.phase * QUANTUM

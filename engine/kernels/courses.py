@@ -50,7 +50,13 @@ PARTS = lanes.PARTS * SHARED  # slots of all their parts
 
 @kernel
 def _joins(course: int, late: int, voice: at.Voice, now: int) -> bool:
-    """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
+    """Return True if a voice is a string of a course, and has its next quantum to come at the same frame.
+
+    Args:
+        course: the course's number, above 0.
+        late: frames after the mixer's quantum begins at which the course's own does.
+        now: the mixer's frame at which its quantum begins.
+    """
     if voice.course != course or voice.course_done == now + 1:
         return False
     if voice.state == at.WAITING:
@@ -115,7 +121,10 @@ def _string(mixer: Mixer, number: int) -> CourseString:
 
 @kernel
 def _generate(mixer: Mixer, strings: int, first: bool) -> None:
-    """The next quantum of the strings that are generated now; `first`: those that sense velocity are behind."""
+    """Generate the next quantum of the first `strings` of `mixer.generated`, each into its place of `mixer.out`.
+
+    `first`: they are voices that sense velocity, and are not yet ahead of what was heard of them.
+    """
     scratch = mixer.scratch[:]
     alone = voice_at(_string(mixer, 0).address)
     if alone.course == 0:
@@ -152,7 +161,10 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
 
 @kernel
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
-    """A quantum of latents that share a tension."""
+    """Write a quantum of strings that are latents with one tension, which meet at the bridge after each frame.
+
+    `shared`: their lowest modes that may have a part in the bridge.
+    """
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
     one = _string(mixer, 0)
     other = _string(mixer, min(1, strings - 1))
@@ -167,7 +179,12 @@ def _ring(mixer: Mixer, strings: int, shared: int) -> None:
 
 @kernel
 def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> None:
-    """A quantum of strings that are solved."""
+    """Write a quantum of strings that are solved, which meet at the bridge after each frame.
+
+    Args:
+        shared: their lowest modes that may have a part in the bridge.
+        sums: (SHARED,), room for the sum of all strings' parts, by mode.
+    """
     scratch = mixer.scratch[:]
     for frame in range(QUANTUM):
         for number in range(strings):
@@ -227,6 +244,9 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
     """Compute the parts of strings' modes in the bridge's motion, and what that takes from them in a frame.
 
     A mode that rests has no part, so that it is not moved; one that others have not loses as much as alone.
+
+    The parts of a string are (PARTS, SHARED): s_i of the speed, as factors of y (of v, where solved) and of x; then
+    what the bridge's motion takes from y or v.
     """
     scratch, step_s = mixer.scratch[:], 1 / mixer.rate_hz
     sums[:shared] = 0.0
@@ -284,7 +304,7 @@ def _advance(string: CourseString, voice: at.Voice, scratch: np.ndarray, frame: 
 
 @kernel
 def _put_back(string: CourseString, voice: at.Voice, scratch: np.ndarray) -> None:
-    """A string as it is after a quantum."""
+    """Copy a string's latents from the scratch back to its voice after a quantum, and note its loudness."""
     x, y = motion(voice)
     tension.save(x, y, tension.order_of(voice)[: voice.heard], scratch, string.first)
     voice.moving, loudness = string.moving, tension_program_at(voice.program).loudness

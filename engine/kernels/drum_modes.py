@@ -91,7 +91,12 @@ def bessels(x: float, out: np.ndarray) -> float:
 
 @kernel
 def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray, scratch: np.ndarray) -> int:
-    """Write rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`; return their number."""
+    """Write rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`; return their number.
+
+    Args:
+        out: (most, 4); further zeros are left out.
+        before, after, scratch: room for values of J_m, of orders from 0 on.
+    """
     count, x = 0, 0.0
     bessels(x, before)
     while x < highest:
@@ -202,7 +207,7 @@ def _across(n: int, turn: float, sine: float, cosine: float) -> float:
 
 @kernel
 def _hankel(z: float, s: float, slope: float, bessel_m: float) -> float:
-    """∫ J_m(zr) J_m(sr) r dr to r = 1, where J_m(z) = 0; `bessel_m`: J_m(s)."""
+    """∫ J_m(zr) J_m(sr) r dr to r = 1, where J_m(z) = 0; `slope`: J_m'(z); `bessel_m`: J_m(s)."""
     if abs(z - s) < 1e-6 * z:
         return slope * slope / 2 * (2 - s / z)  # to second order
     return -z * slope * bessel_m / (z * z - s * s)
@@ -210,7 +215,7 @@ def _hankel(z: float, s: float, slope: float, bessel_m: float) -> float:
 
 @kernel
 def _height(m: int, slope: float) -> float:
-    """1/√(∫ J² cos² dA / A)."""
+    """1/√(∫ J² cos² dA / A): the factor that normalises a circle's mode; `slope`: J_m' at the edge."""
     return (1.0 if m == 0 else math.sqrt(2.0)) / abs(slope)
 
 
@@ -262,7 +267,10 @@ def spread(turn: float, tools: Tools) -> float:
 
 @kernel
 def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The share of each mode's square at a wavenumber s over all directions, at a size of 1: ∫ density ds = 1."""
+    """Write the share (modes,) of each mode's square at a wavenumber s over all directions: ∫ density ds = 1.
+
+    s is at a size of 1; `scratch` has room for functions of all orders.
+    """
     if drum[SHAPE] == CIRCLE:
         bessels(s, scratch[: int(surface[M].max()) + 1])
         for mode in range(surface.shape[1]):
@@ -294,6 +302,10 @@ def air_at(
 
     ∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du. And ∫ D(s)/√(k² - s²) ds over s < k, with
     s = k sin α.
+
+    Args:
+        ka: k times size, k being the wavenumber of sound in air.
+        points: of the first integral, whose u ends at 8 EXACT.
     """
     shares, rest = scratch[: surface.shape[1]], scratch[surface.shape[1] :]
     out[:] = 0.0
@@ -320,7 +332,13 @@ def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
 
 @kernel
 def _column(k: float, size_m: float, shell_m: float, scratch: np.ndarray) -> tuple[float, float]:
-    """Impedance of a shell's column of air less that of a piston in a baffle, of ρc: its two parts."""
+    """Impedance of a shell's column of air less that of a piston in a baffle, over ρc: real and imaginary parts.
+
+    Args:
+        k: wavenumber of sound in air, in 1/m.
+        size_m, shell_m: radius and length of the column.
+        scratch: room for two numbers.
+    """
     ka = k * size_m
     falls, turn = math.exp(-ka * ka / 2), -2 * k * (shell_m + BEYOND_THE_END * size_m)
     x, y = falls * math.cos(turn), falls * math.sin(turn)
@@ -331,7 +349,7 @@ def _column(k: float, size_m: float, shell_m: float, scratch: np.ndarray) -> tup
 
 @kernel
 def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
-    """κ times size up to which modes are looked at for the lowest below a frequency, so many at most."""
+    """The κ times size up to which modes are looked at, to find all below a frequency, or the `most` lowest."""
     load = drum[DENSITY] * drum[THICKNESS] * (2 * math.pi * highest_hz) ** 2
     bending = stretching(drum) * drum[THICKNESS] ** 2 / 6
     highest = size(drum) * math.sqrt(2 * load / (drum[TENSION] + math.sqrt(drum[TENSION] ** 2 + 4 * bending * load)))
@@ -423,7 +441,7 @@ def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: 
 
 @kernel
 def lowest(drum: np.ndarray) -> float:
-    """κ of the lowest mode."""
+    """The wavenumber κ of the lowest mode in 1/m."""
     if drum[SHAPE] == CIRCLE:
         return 2 * J01 / drum[LENGTH]
     return _hypot(math.pi / drum[LENGTH], math.pi / drum[WIDTH])
@@ -444,7 +462,10 @@ def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarr
 
 @kernel
 def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: np.ndarray) -> None:
-    """Raise a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
+    """Raise a drum's pitch by a ratio, in place: a membrane's by its tension, a plate's by its size.
+
+    `work` and `out` are those of `modes`; they are overwritten.
+    """
     if ratio == 1.0:
         return
     if drum[TENSION] == 0.0:
@@ -465,7 +486,10 @@ def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: 
 
 @kernel
 def losses(drum: np.ndarray, modal: np.ndarray, out: np.ndarray) -> None:
-    """σ: (d₁ + d₃κ²)/2μ, and what is radiated."""
+    """Write each mode's decay rate σ in 1/s, (n,): (d₁ + d₃κ²) over twice its mass by area, and radiation.
+
+    `modal` are modes (7, n) as `modes` writes them: `found` of the module.
+    """
     for mode in range(len(out)):
         lost = drum[D1] + drum[D3] * (modal[Z, mode] / size(drum)) ** 2
         out[mode] = lost / (2 * modal[MASS, mode]) + modal[RADIATED, mode]
@@ -475,7 +499,12 @@ def losses(drum: np.ndarray, modal: np.ndarray, out: np.ndarray) -> None:
 def struck(
     drum: np.ndarray, modal: np.ndarray, x: float, y: float, radius_m: float, tools: Tools, out: np.ndarray
 ) -> None:
-    """Speeds in m/s that a sudden blow of 1 N s gives, spread over a disc at a place."""
+    """Write the speeds in m/s, (n,), of a sudden blow of 1 N s, spread over a disc about a place.
+
+    Args:
+        modal: (7, n), as `modes` writes them.
+        x, y: the place, in half-lengths from the centre.
+    """
     for mode in range(len(out)):
         scale = math.sqrt(drum[DENSITY] * drum[THICKNESS] / modal[MASS, mode]) / mass_kg(drum)
         out[mode] = (
@@ -513,7 +542,10 @@ def blow(
 
 @kernel
 def radiated(drum: np.ndarray, modal: np.ndarray, x: float, y: float, tools: Tools, out: np.ndarray) -> None:
-    """Sound pressure in Pa of modes at amplitude 1 m, 1 m off, as from a baffle: see `DrumModes.radiated`."""
+    """Write the sound pressure in Pa, (n,), of modes at amplitude 1 m, 1 m off, as from a baffle.
+
+    See `DrumModes.radiated`. `x` and `y` are the parts of the unit vector to the listener along the surface.
+    """
     for mode in range(len(out)):
         omega, scale = modal[OMEGA, mode], math.sqrt(drum[DENSITY] * drum[THICKNESS] / modal[MASS, mode])
         moved = (

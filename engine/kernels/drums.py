@@ -66,7 +66,7 @@ def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
 
 @kernel
 def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
-    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives."""
+    """Write the speeds (modes,) that a mallet's blow of a speed in m/s gives; `struck`: those that 1 N s gives."""
     masses_kg = drum.mass_kg, drum.mallet_kg
     drum_modes.blow(rows_of(drum)[SQUARE], struck, drum.contact_s, masses_kg, speed, out[: drum.modes])
 
@@ -110,7 +110,10 @@ def gain_of(player: Player, table: Table, key: int) -> float:
 
 @kernel
 def take(player: Player, table: Table, note: Note) -> bool:
-    """The gain of a note of a key's drum, and the contact of its blow; False: there is no such drum."""
+    """Set a note's gain and its blow's strength and hardness, by its key's drum; return False if there is none.
+
+    A drum with more modes than the player's voices hold counts as none.
+    """
     note.drum = 1
     if not has_drum(table, note.key) or drum_of(table, note.key).modes > player.modes:
         return False
@@ -124,7 +127,7 @@ def take(player: Player, table: Table, note: Note) -> bool:
 
 @kernel
 def make_voice(player: Player, table: Table, address: int, event: Event, source: int) -> None:
-    """A voice that sets out from the speeds that a blow gives the modes of a key's drum."""
+    """Make a source's voice at an address, which sets out with the speeds that a blow gives a key's drum."""
     drum = drum_of(table, event.key)
     source_rows = rows_of(drum)
     struck = source_rows[STRUCK]
@@ -151,7 +154,7 @@ def make_voice(player: Player, table: Table, address: int, event: Event, source:
 
 @kernel
 def weigh(player: Player, table: Table, voice: at.Voice, which: int, key: int) -> None:
-    """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
+    """Set one of the two sets of weights of a voice, 0 or 1, to its key's drum; modes too high are not heard."""
     highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum_of(table, key))
     for point in range(table.points):
         real, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)

@@ -121,7 +121,7 @@ def row(work: np.ndarray, number: int, size: int) -> np.ndarray:
 
 @kernel
 def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
-    """Clear a signal of a work space from one place to another."""
+    """Set a signal of a work space, its rows `signal` and `signal + 1`, to 0 from the place `first` to `end`."""
     re, im = row(work, signal, end), row(work, signal + 1, end)
     for k in range(first, end):
         re[k] = im[k] = 0.0
@@ -146,7 +146,8 @@ def turn_any(work: np.ndarray, period: int, count: int, wanted: int, behind: int
     Places count modulo `size`, a power of two that is not below the number of all that is given and wanted.
 
     Args:
-        given: places from 0 on that may hold something; the others are negative.
+        period: in places: frequencies are the multiples of 1/period.
+        count: places from 0 on that may hold something; the others are negative.
         wanted: places from 0 on that are wanted; the others are negative.
         behind: the longest way from a place that is given down to one that is wanted.
     """

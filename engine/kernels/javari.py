@@ -45,7 +45,7 @@ from engine.kernels.memory import tension_program_at, truth_program_at
 from engine.kernels.modes import damped, following, motion, row
 from engine.kernels.rotation import rotation
 
-PHASE, MOST_STEPS = 0.15, 6
+PHASE, MOST_STEPS = 0.15, 6  # rad of the contact in a step, steps of a frame
 
 
 @kernel
@@ -95,7 +95,7 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
 
 @kernel
 def generate(voice: at.Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The next quantum, (4, of.QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
+    """Write the next quantum, (4, QUANTUM), of a string with an edge, as `generate` of `tension` and `truth` does."""
     if voice.kind == at.TRUTH:
         _ring_solved(voice, truth_program_at(voice.program), fading, audible, out)
     else:
@@ -111,7 +111,10 @@ def generate(voice: at.Voice, fading: bool, audible: bool, out: np.ndarray, scra
 
 @kernel
 def _prepare(voice: at.Voice, step_s: float) -> None:
-    """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
+    """Compute what a force of 1 N at the edge changes within a step, for a string whose modes are new.
+
+    Rows GIVEN and GIVEN_SPEED: of each mode's amplitude and speed; `javari.give`: of the displacement at the edge.
+    """
     shapes, give = row(voice, at.JAVARI), 0.0
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
@@ -128,7 +131,7 @@ def _prepare(voice: at.Voice, step_s: float) -> None:
 def _ring(
     voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """A quantum of latents that share a tension."""
+    """Write a quantum of latents that share a tension, with the edge's force in each of a frame's steps."""
     tension.bring_up_to_date(voice, program)
     moving, steps = voice.moving, voice.javari.steps
     step_s, nodes = 1 / (program.rate_hz * steps), voice.steps // steps
@@ -153,9 +156,10 @@ def _ring(
     nothing, total = (0.0, 0.0), 0.0
     gap = voice.javari.gap_m
     give = voice.javari.give
-    pushed = voice.javari.force
+    pushed = voice.javari.force  # N: mean force of the frame before
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
+    # d of the module: how far the string is beyond the edge, in m; below 0: it does not touch
     before = sums[0] * moved[1] - moved[0] - gap
     for frame in range(of.QUANTUM):
         for ear in range(ears):
@@ -190,7 +194,7 @@ def _ring(
 
 @kernel
 def _ring_solved(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
-    """A quantum of a string that is solved."""
+    """Write a quantum of a string that is solved, with the edge's force in each of a frame's steps."""
     sub_steps = truth.set_up(voice, program)
     steps = voice.javari.steps
     step_s = 1 / (program.rate_hz * steps)
@@ -202,6 +206,7 @@ def _ring_solved(voice: at.Voice, program: at.TruthProgram, fading: bool, audibl
     q, v = motion(voice)
     shapes = row(voice, at.JAVARI)
     compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    # d of the module, how far the string is beyond the edge, in m; and the mean force of the frame before, in N
     before, pushed = -gap, voice.javari.force
     for mode in range(moving):
         before -= shapes[mode] * q[mode]

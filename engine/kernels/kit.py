@@ -45,11 +45,11 @@ KIT_DRUM = np.dtype(
 KIT_KEY = np.dtype(
     [
         ("drum", W),  # slot of its `KIT_DRUM`; 0: it has none
-        ("ratio", R),
-        ("softest_m_s", R),
+        ("ratio", R),  # of its pitch to that of the drum as it is given
+        ("softest_m_s", R),  # speed of the softest blow
         ("hardest_m_s", R),
-        ("stale", W),  # sum of what of it has changed
-        ("modes", W),
+        ("stale", W),  # bits MODES_MOVED, LOSSES_MOVED, PLACES_MOVED: what has changed; 0: nothing
+        ("modes", W),  # so many has its tuned drum; 0: it is silent
         ("tuned", R, DRUM),  # its drum as it is tuned
     ]
 )
@@ -65,7 +65,7 @@ KIT = np.dtype(
         ("work", W),  # slot of room to work in
         ("found", W),  # slot of the modes of all keys, (KEYS, ROWS, capacity)
         ("stale", W),  # whether any key is
-        ("values", R, len(FOLLOWED)),
+        ("values", R, len(FOLLOWED)),  # of the instrument, in the order of FOLLOWED
         ("keys", KIT_KEY, of.KEYS),
     ]
 )
@@ -93,7 +93,7 @@ def begin(kit_address: int, table_address: int) -> None:
 
 @kernel
 def follow(kit_address: int, which: int, value: float) -> None:
-    """Follow the change of one of the instrument's values."""
+    """Note the change of one of the instrument's values, by its number, if drums depend on it: all keys are stale."""
     kit = kit_at(kit_address)
     for number in range(len(FOLLOWED)):
         if which == FOLLOWED[number]:
@@ -123,12 +123,14 @@ def prepare(kit_address: int, table_address: int, player_address: int) -> None:
 
 @kernel
 def _bessels(kit_address: int) -> np.ndarray:
+    """The kit's table of Bessel functions, (steps, columns), see `drum_modes.tabulate`."""
     kit = kit_at(kit_address)
     return shaped(reals(kit_address), kit.bessels, (kit.steps, kit.columns))
 
 
 @kernel
 def _strike(kit_address: int, table_address: int, event: Event) -> None:
+    """Bring the key of an event up to date, if the event begins a note."""
     if event.kind == of.NOTE_ON:
         _update(kit_address, table_address, event.key)
 
@@ -145,7 +147,10 @@ def _possible(drum: np.ndarray) -> bool:
 
 @kernel
 def _update(kit_address: int, table_address: int, key: int) -> None:
-    """Write the block of a key that is stale."""
+    """Bring the block of a key in the table up to date, where the key is stale.
+
+    Its modes are computed only if they have moved. A key whose drum became impossible has none.
+    """
     kit = kit_at(kit_address)
     memory = reals(kit_address)
     table = table_at(table_address)

@@ -4,6 +4,9 @@ A block is one piece of memory, `BLOCK` numbers: rows (LANES,) of four modes. Al
 one stream, on a boundary that vector instructions like; unused lanes are zero. Loops that a compiler makes into
 vectors by itself must first find out whether two rows overlap; they take the last few modes one by one: at ten to a
 hundred modes that took longer than the work.
+
+An *ear* is a set of weights at one listening point. All ears hear `near` blocks; the `far` blocks, which follow them
+in memory, are heard by none and only stretch the string.
 """
 
 from __future__ import annotations
@@ -42,6 +45,7 @@ def place(number: int) -> int:
 
 @kernel
 def blocks_of(modes: int) -> int:
+    """The number of blocks that so many modes fill, the last one in part."""
     return (modes + LANES - 1) // LANES
 
 
@@ -64,7 +68,10 @@ def aligned(typing_context: Any, memory: Any):
 
 
 class _Blocks:
-    """Writes the code of a loop over blocks of four modes, and of sums over all of them."""
+    """A writer of code: of a loop over blocks of four modes, and of so many sums over all of them.
+
+    Its values are LLVM's, of the code that it writes. A sum is a vector, (LANES,), until `totals`.
+    """
 
     def __init__(self, context, builder, memory_type, memory, sums: int) -> None:
         self.builder = builder
@@ -78,6 +85,7 @@ class _Blocks:
         return self.builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_LANE, LANES), [0] * LANES))
 
     def begin(self, first, block, slots: int = BLOCK) -> None:
+        """Let the rows be those of a block, by its number, of blocks of so many slots from the slot `first` on."""
         self._place = self.builder.add(first, self.builder.mul(block, _WHOLE(slots)))
 
     def row(self, which: int):
@@ -91,7 +99,11 @@ class _Blocks:
         return self.builder.bitcast(self.builder.gep(self._data, [slot]), _VECTOR.as_pointer())
 
     def sweep(self, first, blocks, ears: int, linear=None, squared=None) -> None:
-        """Turn blocks, unless they are only to be summed, and add what they give: see `_sweep`."""
+        """Turn blocks, and add what they give to the sums, see `_sweep`; without `linear` they are only summed.
+
+        Args:
+            linear, squared: S (1 - 2R) and S², in all lanes.
+        """
         builder = self.builder
         with cgutils.for_range(builder, blocks) as loop:
             self.begin(first, loop.index)
@@ -177,7 +189,7 @@ turn, _sum = (_sweep(turns) for turns in (True, False))
 def add_up(
     memory: np.ndarray, first: int, near: int, far: int, ears: int, at_points: np.ndarray
 ) -> tuple[float, float]:
-    """The sums of blocks as they are, as `turn`."""
+    """Return (S, R) of blocks as they are, and write what ears hear to `at_points`: as `turn`, without a turn."""
     return _sum(memory, first, near, far, ears, 0.0, 0.0, at_points)
 
 
@@ -200,7 +212,10 @@ def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
 
 @intrinsic
 def felt(typing_context, memory, blocks, modes, parts):
-    """The sums over blocks of x, and of x κ p, times the first row of their parts, see `press`."""
+    """The sums over blocks of x, and of x κ p, times the first row of their parts.
+
+    `modes` and `parts` are first slots: of the blocks, and of (blocks, PRESSED, LANES), as in `press`.
+    """
 
     def generate(context, builder, signature, arguments):
         code, part = (_Blocks(context, builder, signature.args[0], arguments[0], 2) for _ in range(2))
@@ -222,7 +237,7 @@ PRESSED = 3  # rows of parts in a contact: displacement there, and what x and y 
 def press(typing_context, memory, blocks, modes, parts, force):
     """Change x and y of blocks by a force at a contact, and return their sums, as `turn` does.
 
-    `parts`: first slot of (blocks, PRESSED, LANES).
+    `modes` is the first slot of the blocks, `parts` that of (blocks, PRESSED, LANES).
     """
 
     def generate(context, builder, signature, arguments):

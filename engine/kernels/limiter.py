@@ -44,6 +44,7 @@ def limit(mixer: Mixer) -> None:
 
 @kernel
 def _reduce(mixer: Mixer) -> None:
+    """Write the quantum that waited, times its gain, to the mix; keep the level that is held and the least gain."""
     mix, waiting = mixer.mix[:], mixer.waiting[:]
     peaks, gains = mixer.peaks[:], mixer.gains[:]
     level, reduction = mixer.limiter, mixer.reduction

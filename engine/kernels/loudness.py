@@ -65,13 +65,13 @@ def _place(omega: float) -> float:
 
 @kernel
 def _noise(body: np.ndarray, mix: float) -> float:
-    """The power of noise through strings and body together; the sound is divided by its root."""
+    """The power of noise of power 1 through direct sound and body, mixed; the sound is divided by its root."""
     return (1 - mix) ** 2 + 2 * mix * (1 - mix) * body[of.BODY_CROSS] + mix * mix
 
 
 @kernel
 def _power(body: np.ndarray, mix: float, place: float) -> float:
-    """The square of the body's gain, before that division."""
+    """The square of the gain of direct sound and body, mixed, at a place of the grid; to be divided by `_noise`."""
     alike = 2 * mix * (1 - mix) * _at(body, of.BODY_REAL, place)
     return max((1 - mix) ** 2 + alike + mix * mix * _at(body, of.BODY_POWER, place), 0.0)
 
@@ -100,7 +100,12 @@ def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: floa
 
 @kernel
 def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: float, least: float) -> float:
-    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it."""
+    """An estimate of the highest sample of a sound, re full scale.
+
+    Args:
+        swings, body, mix: as the module and `gain` have them.
+        least: where the sum of all amplitudes is not above it, that sum stands in for the search in time.
+    """
     x, y = of.SOUND_X * modes, of.SOUND_Y * modes
     noise, onset = 1.0, 0.0
     if mix > 0.0:
@@ -143,7 +148,10 @@ def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: flo
 
 @kernel
 def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
-    """The highest of both channels' samples, of modes that turn from step to step."""
+    """The highest of both channels' samples in so many frames, of modes that turn from frame to frame.
+
+    Rows SOUND_X and SOUND_Y hold the modes as they set out, and are overwritten.
+    """
     left, right = sound[of.SOUND_LEFT * modes :][:modes], sound[of.SOUND_RIGHT * modes :][:modes]
     x, y = sound[of.SOUND_X * modes :][:modes], sound[of.SOUND_Y * modes :][:modes]
     cosine, sine = sound[of.SOUND_COSINE * modes :][:modes], sound[of.SOUND_SINE * modes :][:modes]

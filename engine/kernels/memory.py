@@ -128,7 +128,7 @@ def copy(typing_context: Any, into: Any, record: Any):
 
 @intrinsic
 def part(typing_context: Any, memory: Any, first: Any, count: Any):
-    """`memory[first : first + count]`, whose bounds nobody checks."""
+    """The numbers `memory[first : first + count]`, whose bounds nobody checks."""
 
     def generate(context, builder, signature, arguments):
         data = context.make_array(memory)(context, builder, arguments[0]).data
@@ -145,7 +145,7 @@ def behind(record: Any, slot: int, count: int) -> np.ndarray:
 
 @intrinsic
 def shaped(typing_context: Any, memory: Any, first: Any, shape: Any):
-    """The same as an array of any shape, a tuple of whole numbers."""
+    """The numbers of memory from the slot `first` on as an array of any shape, whose bounds nobody checks."""
     kind = types.Array(memory.dtype, len(shape), "C", readonly=not memory.mutable)
 
     def generate(context, builder, signature, arguments):

@@ -33,7 +33,10 @@ UNDERFLOW = 4  # PortAudio's flag
 
 @kernel
 def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
-    """The next frames, float32 (frames * channels,)."""
+    """Write the next frames, float32 (frames * channels,), channels side by side; `now_s`: the device clock's time.
+
+    One channel has the mean of left and right; further channels than two are silent.
+    """
     channels = mixer.channels
     mix = mixer.mix[:]
     done = 0
@@ -56,6 +59,10 @@ def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
 
 @inlined
 def _quantum(mixer: Mixer, now_s: float) -> None:
+    """Render the next quantum into the mix: events, voices, noises, sympathy, effects, then volume and limiter.
+
+    A player before this one plays as well, so that its notes ring on. `now_s`: the device clock's time.
+    """
     here = address_of(mixer)
     player = mixer.player
     before = mixer.player_before
@@ -72,7 +79,7 @@ def _quantum(mixer: Mixer, now_s: float) -> None:
         voice = voice_at(mixer.voices[place])
         while voice.previous_voice != 0 and voice.begin_at < mixer.frames + QUANTUM:
             take_over(voice, mixer.frames, mixer.scratch[:])
-    given_s = now_s + AHEAD / mixer.rate_hz if mixer.limiting else now_s
+    given_s = now_s + AHEAD / mixer.rate_hz if mixer.limiting else now_s  # later by the limiter's delay
     _add_voices(mixer, 1, given_s)
     if before != 0:
         sound(before, here)
@@ -107,7 +114,7 @@ def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
 
 @kernel
 def _take_up(mixer: Mixer) -> None:
-    """Voices that were handed over; beyond the last place they are refused, and over."""
+    """Move voices that were handed over from the ring to the active ones; where no place is free they are over."""
     pushed = mixer.pushed
     fence()
     while mixer.taken < pushed:
@@ -123,7 +130,7 @@ def _take_up(mixer: Mixer) -> None:
 
 @kernel
 def _finish(mixer: Mixer) -> None:
-    """Volume, test tone, limiter and meter."""
+    """Apply volume, test tone, limiter and meter to the mix; samples that are no numbers or too large become 0."""
     mix = mixer.mix[:]
     volume = mixer.volume
     wanted = mixer.wanted_volume
@@ -162,7 +169,12 @@ def _finish(mixer: Mixer) -> None:
     error_model="numpy",
 )
 def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped-def]
-    """PaStreamCallback; `user` is the mixer."""
+    """PortAudio's callback: fill `output`, float32 (frames, channels), and return 0, to continue.
+
+    Args:
+        times: three doubles in s, of which the second is now and the third when the first sample is heard.
+        user: the mixer.
+    """
     mixer = mixer_at(user)
     clock = carray(times, (3,), np.float64)
     now_s = clock[1]

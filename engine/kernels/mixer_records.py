@@ -75,11 +75,11 @@ COURSE_STRING = np.dtype(  # of those on one bridge, while a quantum of them is 
         ("ears", W),  # sets of weights that are heard
         ("apart", W),  # rows from the output of one to that of the next
         ("sub_steps", W),  # of one that is solved
-        ("stretch", R),
+        ("stretch", R),  # S and R of `kernels.tension`, at the present node
         ("second", R),
-        ("total", R),
-        ("silence", R),
-        ("heard", R, 2 * MOST_EARS),
+        ("total", R),  # Σ |z|², computed every 16 frames
+        ("silence", R),  # of its program
+        ("heard", R, 2 * MOST_EARS),  # two sums for each set of weights: see `kernels.lanes`
     ]
 )
 
@@ -91,11 +91,11 @@ MIXER = np.dtype(
         ("now_s", R),  # the device clock at the last call
         ("dac_s", R),  # and when its first sample is heard
         ("underflows", W),  # that the device reported
-        ("active", W),  # voices
+        ("active", W),  # voices that have a place in `voices`
         ("pushed", W),  # voices that were handed over
         ("taken", W),  # and taken up
-        ("wanted_volume", R),
-        ("volume", R),
+        ("wanted_volume", R),  # a factor
+        ("volume", R),  # as it is now
         ("limiter", R),  # the level that it holds
         ("release", R),  # its factor a frame
         ("reduction", R),  # the least gain since it was read, 1: none
@@ -115,8 +115,8 @@ MIXER = np.dtype(
         ("effects_next", W),  # of the one that is being faded to; 0: none is, or to none
         ("player", W),  # address of the player whose events are played; 0: none
         ("player_before", W),  # address of the player before, whose notes ring on; 0: none
-        ("voices", W, MOST_VOICES),  # addresses
-        ("ring", W, RING),  # addresses
+        ("voices", W, MOST_VOICES),  # addresses of those that are active
+        ("ring", W, RING),  # addresses of those that were handed over, from `taken` to `pushed`
         ("gaps", GAP, GAPS),
         ("course", COURSE_STRING, MOST_COURSE),
         ("generated", W, MOST_COURSE),  # which of these are generated now

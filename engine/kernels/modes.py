@@ -47,7 +47,7 @@ def motion(voice: at.Voice) -> tuple[np.ndarray, np.ndarray]:
 
 @kernel
 def table(voice: at.Voice, first: int, count: int) -> np.ndarray:
-    """The same as an array (count, modes)."""
+    """Rows of a voice, from the number `first` on, as an array (count, modes)."""
     return shaped(rows(voice, first, count), 0, (count, voice.modes))
 
 
@@ -71,7 +71,7 @@ def gliding(voice: at.Voice) -> bool:
 
 @kernel
 def glide(voice: at.Voice) -> None:
-    """A step towards the modes that it is to have."""
+    """Move a voice's modes a quantum's step towards those of the latest wish that is due."""
     wanted = voice.resonator
     if wanted != voice.current_modes:
         fence()
@@ -86,7 +86,7 @@ def glide(voice: at.Voice) -> None:
 
 @kernel
 def damped(omega_squared: float, sigma: float) -> float:
-    """√(ω² - σ²); a mode that would no longer swing swings slowly."""
+    """√(ω² - σ²) in rad/s, but ω/10 at least: a mode that would no longer swing swings slowly."""
     return math.sqrt(max(omega_squared - sigma * sigma, 0.01 * omega_squared))
 
 
@@ -110,9 +110,9 @@ def run_up(voice: at.Voice, seconds: float) -> None:
 
 @kernel
 def rest_silent(q: np.ndarray, v: np.ndarray, squares: np.ndarray, moving: int, silence: float) -> tuple[int, float]:
-    """Lay the highest modes to rest whose amplitude is below a share of that of all.
+    """Set the highest modes to 0, amplitude and speed, whose amplitude is below a share `silence` of that of all.
 
-    Returns how many are left, and Σ q² + v²/ω² of all, squares being ω².
+    Of the first `moving` modes; `squares` are their ω². Return how many are left, and Σ q² + v²/ω² of all.
     """
     total = 0.0
     for m in range(moving):
@@ -136,7 +136,14 @@ def turn(
     coupling: np.ndarray,
     stretches: np.ndarray,
 ) -> float:
-    """A kick of the tension, then the exact turn of each mode by `flow`, (4, modes), see `rotation`; the stretch."""
+    """Apply a kick of the tension, then the exact turn of each mode; return the stretch Σ η² q² after it.
+
+    Args:
+        moving: the number of modes that move, the first ones.
+        flow: (4, modes), see `rotation`.
+        kick: the time of the kick, times the stretch before it.
+        coupling, stretches: k and η², (modes,).
+    """
     qq = flow[0]
     qv = flow[1]
     vq = flow[2]
@@ -154,7 +161,7 @@ def turn(
 
 @kernel
 def rest_above(voice: at.Voice, rate: float) -> int:
-    """Lay modes to rest that lie too high for the rate; the highest of the others."""
+    """Set modes to 0 that lie too high for the rate in Hz; return the number of the highest that does not."""
     squares = row(voice, at.OMEGA_SQUARED)
     sigmas = row(voice, at.SIGMA)
     first, second = motion(voice)

@@ -66,7 +66,7 @@ def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
 
 @kernel
 def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_address: int) -> None:
-    """Write the memory that `prepare` needs."""
+    """Write into NEEDS the slots of memory that `prepare` and a convolver need for a body and a room."""
     body, needs = body_at(body_address), needs_at(needs_address)
     needs.frames = longest(body, rate_hz, size, t60_s)
     needs.part = partitioned_slots(needs.frames, 2)
@@ -86,13 +86,17 @@ def prepare(
     found_address: int,
     memory_address: int,
 ) -> None:
-    """Write RESPONSES of a body and a room, and the responses behind them.
+    """Write RESPONSES of a body and a room, and behind them the responses in partitions: body, room, both.
 
     Each argument stands for itself in C.
 
     Args:
+        rate_hz: of the responses.
+        size: of the body, a factor of its lengths.
+        t60_s: of the room.
         noise_address: 32-bit whole numbers (frames, 2), of NOISE_UNIT.
-        found_address: all 0.
+        found_address: all 0, as many slots as `measure` found.
+        memory_address: room to work in, as many slots as `measure` found.
     """
     body = body_at(body_address)
     prepared = responses_at(found_address)
@@ -147,13 +151,16 @@ def _respond(
 
 @kernel
 def weigh(found_address: int, body_mix: float, room_mix: float, weights_address: int) -> None:
-    """Write the weights (4,) of a mix."""
+    """Write the weights (4,) of a mix of nothing, body, room and both, of which body and room are heard 0 … 1."""
     responses.weigh(responses_at(found_address).powers, body_mix, room_mix, part(reals(weights_address), 0, 4))
 
 
 @kernel
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
-    """Write some slots of a mix of responses as the convolver reads it."""
+    """Write `count` slots, from `first` on, of a mix of the responses as the convolver reads it.
+
+    Its weights (4,) are those of `weigh`; that of nothing, the direct sound, is a sample at the beginning.
+    """
     prepared = responses_at(found_address)
     weights, into = reals(weights_address), reals(into_address)
     end = min(first + count, prepared.part)

@@ -31,7 +31,10 @@ def above(additions: Additions, string: Row) -> float:
 
 
 def value(additions: Additions, which: int, partial: int, higher: float) -> float:
-    """The value `which`, of five, of a partial, from 0, of a string so much higher; ratios fade by logarithms."""
+    """The value `which`, CENTS … SECOND_SHARE, of a partial, from 0, of a string; ratios fade by logarithms.
+
+    `higher`: the string's pitch over that of the recorded note, see `above`.
+    """
     row, rest = additions[4][which], additions[1][which]
     known, there = len(row), round((partial + 1) * higher) - 1  # the note's partial of nearly the same frequency
     near = row[partial] if partial < known else rest

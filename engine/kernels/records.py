@@ -35,7 +35,7 @@ Needs: TypeAlias = Any
 EVENT = np.dtype(
     [
         ("frame", W),  # of the mixer, at which it counts; 0: at once
-        ("kind", W),
+        ("kind", W),  # NOTE_ON … CHOKE, or NOTHING
         ("channel", W),  # 0 … 16
         ("key", W),  # of a note; the number of a controller, or of one of the values
         ("value", R),  # velocity, bend in -1 … 1, value of a controller or a parameter, semitones, seconds of a fade
@@ -79,14 +79,14 @@ TABLE = np.dtype(
     [
         ("serial", W),  # rises from table to table
         ("instrument", W),  # the same where only knobs were turned
-        ("mode", W),
+        ("mode", W),  # POLY, GUITAR or MPE
         ("low", W),  # lowest key
         ("high", W),
         ("strings", W),  # of a set; 0: one string is fretted for all keys
         ("shape", W),  # of plucks
         ("stops", W),  # whether a pluck stops its string, or is added to its motion
-        ("let_ring", W),
-        ("bend_by", W),
+        ("let_ring", W),  # whether strings ring on when their keys are released
+        ("bend_by", W),  # BY_TENSION or BY_LENGTH
         ("points", W),  # listening points, 1 or 2
         ("level", R),  # of the whole instrument, a factor
         ("body", W),  # slot of the body's curves; 0: it has none
@@ -96,12 +96,12 @@ TABLE = np.dtype(
         ("wheel_goal", R),  # where it leads
         ("grid", W),  # points of the grid on which plucks have their shape
         ("sines", W),  # slot of sin(π k / (grid - 1)), k below 2 (grid - 1)
-        ("sources", W),  # voices of a note
-        ("kinds", W, of.MOST_SOURCES),
-        ("programs", W, of.MOST_SOURCES),  # addresses
+        ("sources", W),  # of sound, a model or a solver each: a note has one voice of each
+        ("kinds", W, of.MOST_SOURCES),  # of their voices: BANK, TRUTH, RENDERED or TENSION
+        ("programs", W, of.MOST_SOURCES),  # addresses of what the voices of each share
         ("pairs", W),  # partials with a second mode, of the other polarisation; 0: there is one direction
         ("pulled", R, 2),  # parts of a pluck in both directions
-        ("heard", R, 2),  # what they are heard with
+        ("heard", R, 2),  # factors with which both directions are heard
         ("detuning", R),  # ω² of the second over that of the first
         ("conductance", R, 2),  # of the bridge, in s/kg
         ("variation", R),  # of plucks from stroke to stroke, 0 … 1
@@ -163,12 +163,12 @@ ATTACK = np.dtype(
 
 CHANNEL = np.dtype(
     [
-        ("bend", R),
+        ("bend", R),  # of the pitch wheel, -1 … 1
         ("slide", W),  # 0 … 127; -1: never moved
         ("range_semitones", R),  # below 0: the instrument's
         ("plays", W),  # whether a note has come
-        ("coarse", W),  # the registered parameter that is chosen
-        ("fine", W),
+        ("coarse", W),  # number of the registered parameter that is chosen, upper part
+        ("fine", W),  # and lower part
         ("mute", R),  # 0 … 1
         ("slide_time", W),  # 0 … 127
         ("held", W, of.KEYS),  # whether each key is down
@@ -184,21 +184,21 @@ CHANNEL = np.dtype(
 NOTE = np.dtype(
     [
         ("number", W),  # its own, of the player's notes
-        ("state", W),
+        ("state", W),  # FREE or RINGS
         ("id", W),  # of its event
         ("age", W),  # rises from note to note
         ("channel", W),
         ("key", W),
-        ("place", W),  # which string of the instrument it is
+        ("place", W),  # which string of the instrument it is: a number of `playing.channels.place_of`
         ("string", W),  # on which of a set it is played, from the highest, 0; -1: the key chooses
         ("held", W),  # whether its key is down
         ("kept", W),  # whether the pedal was down as it was released
-        ("damped", W),
+        ("damped", W),  # whether the damper lies on it
         ("has_place", W),  # whether it is the latest of its place
         ("released", W),  # whether it fades out: it made room, or was stopped
         ("drum", W),  # whether it is a drum's
         ("modes", W),
-        ("gain", R),
+        ("gain", R),  # the factor that makes its key as loud as others
         ("by_hand", W),  # whether its pluck came with its event
         ("points", W),  # of the points where it is heard, or goes to be heard
         ("point", R, 2),
@@ -238,8 +238,8 @@ NOTE = np.dtype(
 
 REPORT = np.dtype(
     [
-        ("kind", W),
-        ("id", W),
+        ("kind", W),  # BEGAN, ENDED or REFUSED
+        ("id", W),  # of the note
         ("channel", W),
         ("key", W),
         ("frame", W),  # of the mixer
@@ -280,10 +280,10 @@ NOISE = np.dtype(
 SYMPATHY = np.dtype(
     [
         ("owner", W, of.MOST_SYMPATHETIC),  # key or string of each partial
-        ("cosine", R, of.MOST_SYMPATHETIC),
+        ("cosine", R, of.MOST_SYMPATHETIC),  # of its turn in a frame, times what decay leaves of it
         ("sine", R, of.MOST_SYMPATHETIC),
-        ("gain", R, of.MOST_SYMPATHETIC),
-        ("x", R, of.MOST_SYMPATHETIC),
+        ("gain", R, of.MOST_SYMPATHETIC),  # from x to its force on the bridge
+        ("x", R, of.MOST_SYMPATHETIC),  # its motion, x + iy
         ("y", R, of.MOST_SYMPATHETIC),
         ("played", R, of.MOST_SYMPATHETIC),  # 1 for partials of strings that are played, which are stopped, else 0
         ("partials", W),  # of strings that ring with those that are played
@@ -312,7 +312,7 @@ PLAYER = np.dtype(
         ("here", W),  # its own address
         ("chord", W),  # the latest chord that is strummed, from 1; 0: none was
         ("chord_began", W),  # frame of the mixer
-        ("source_gains", R, of.MOST_SOURCES),
+        ("source_gains", R, of.MOST_SOURCES),  # factors of the table's sources; 0: not heard
         ("chord_begun", W),  # notes of it that have begun
         ("chord_up", W),  # whether it goes from the highest to the lowest
         ("next_up", W),  # whether the next does, where strokes alternate

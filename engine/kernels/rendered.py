@@ -13,7 +13,10 @@ from engine.kernels.voice_records import RenderedProgram, Voice
 
 @kernel
 def generate(voice: Voice, program: RenderedProgram, out: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM). Where the samples are not there yet it fades out, stands still, and counts."""
+    """Write the next quantum, (4, QUANTUM), one row for each point.
+
+    Where the samples are not there yet it fades out, then stands still and counts the frames as `starved`.
+    """
     taps = program.taps
     phases = program.phases
     ratio = program.ratio

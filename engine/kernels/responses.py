@@ -34,7 +34,7 @@ def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
 
 @kernel
 def analyse(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
-    """Write the spectrum of a response, as one signal, into the work space."""
+    """Write the spectrum of a response, left and right as one complex signal, into rows `signal` and `signal + 1`."""
     load(work, signal, sound, size)
     turn(work, signal, signal + 1, size)
 
@@ -127,7 +127,7 @@ def resampled_frames(frames: int, from_hz: float, to_hz: float) -> int:
 
 @kernel
 def _periods(frames: int, from_hz: float, to_hz: float) -> tuple[int, int]:
-    """The frames at either rate of a response with at least as much silence, which are whole at both."""
+    """The frames at either rate of one duration that is whole at both, at least twice that of the response."""
     numerator, denominator = fraction(to_hz / from_hz)
     units = (frames + denominator - 1) // denominator
     return 2 * units * denominator, 2 * units * numerator
@@ -159,7 +159,7 @@ def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, 
             resampled[frame, 0], resampled[frame, 1] = sound[frame, 0], sound[frame, 1]
         return
     padded, made = _periods(len(sound), from_hz, to_hz)
-    kept = min(padded, made) // 2  # and not the last, whose phase is lost
+    kept = min(padded, made) // 2  # frequencies from 0 on, without that at half the lower rate: its phase is lost
     size = _resampling_size(len(sound), len(resampled), from_hz, to_hz)
     load(work, ONE, sound, size)
     turn_any(work, padded, len(sound), kept, len(sound) + kept - 2, size)
@@ -182,7 +182,7 @@ def _measured(frames: int, rate_hz: float) -> tuple[int, int, int]:
 
 @kernel
 def level(work: np.ndarray, sound: np.ndarray, rate_hz: float) -> None:
-    """Scale a response: noise of equal power in each octave keeps it, in the mean of both channels."""
+    """Scale a response so that noise of equal power in each octave keeps its level, in the mean of both channels."""
     size, first, last = _measured(len(sound), rate_hz)
     analyse(work, ONE, sound, size)
     power = total = 0.0
@@ -253,6 +253,7 @@ def weigh(cases: np.ndarray, body_mix: float, room_mix: float, weights: np.ndarr
     weights[_BODY] = body_mix * (1 - room_mix)
     weights[_ROOM] = (1 - body_mix) * room_mix
     weights[_BOTH] = body_mix * room_mix
+    # 1: the body is heard, 2: the room, 3: both, as parts are numbered
     case = (_BODY if body_mix > 0 else 0) + (_ROOM if room_mix > 0 else 0)
     power = 0.0
     for i in range(4):
@@ -311,7 +312,7 @@ def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
 
 @kernel
 def _between(values: np.ndarray, place: float) -> float:
-    """The value at a place between two: linear, and the last beyond."""
+    """The value at a place, from 0, between two values: linear, and the last one beyond the end."""
     if place >= len(values) - 1:
         return values[len(values) - 1]
     before = int(place)

@@ -17,7 +17,7 @@ SOURCE, LISTENER = (0.36, 0.42, 0.43), (0.61, 0.55, 0.50)  # in sides
 APART_M = 0.35  # of the two microphones
 MIXING_S = 3e-3  # times the root of the volume in m³
 BANDS_HZ = (125.0, 500.0, 2_000.0, 8_000.0)
-BANDS_T60 = (1.15, 1.0, 0.8, 0.4)  # times the T60
+BANDS_T60 = (1.15, 1.0, 0.8, 0.4)  # times the T60: the decay of each band
 SUBSONIC_HZ = 40.0
 
 
@@ -29,19 +29,23 @@ def room_frames(t60_s: float) -> int:
 
 @kernel
 def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, sound: np.ndarray) -> None:
-    """Write the response of a room.
+    """Write the response of a room: reflections of its walls at first, then decaying noise.
 
     Args:
+        work: a work space of `fourier`, (ROWS, N).
+        t60_s: the time in which sound decays by 60 dB.
         made: (`room_frames`, 2), independent noise of power 1; it is overwritten.
-        sound: its response at `rate_hz`.
+        sound: its response at `rate_hz`, (frames, 2).
     """
-    grown = math.sqrt(t60_s / 0.5)
+    grown = math.sqrt(t60_s / 0.5)  # the sides, times SIDES_M
     volume_m3 = SIDES_M[0] * SIDES_M[1] * SIDES_M[2] * grown**3
     mixing_s = MIXING_S * math.sqrt(volume_m3)
     direct_m = _reflect(work, grown, mixing_s, len(made))
     early_left, early_right = row(work, ONE, len(made)), row(work, ONE + 1, len(made))
+    # The root of the power of all reflections in a frame; the direct sound has the power 1
     late = direct_m * math.sqrt(4 * math.pi * SPEED_M_S / volume_m3 / of.ROOM_HZ)
     for frame in range(len(made)):
+        # From reflections (0) to noise (π/2), between half of the mixing time and all of it
         turn = min(max(2 * (frame / of.ROOM_HZ) / mixing_s - 1, 0.0), 1.0) * (math.pi / 2)
         cosine, sine = math.cos(turn), late * math.sin(turn)
         made[frame, 0] = early_left[frame] * cosine + made[frame, 0] * sine
@@ -55,9 +59,15 @@ def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, so
 
 @kernel
 def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> float:
-    """Write the reflections of walls that reflect all, as signal ONE; the direct sound's way in m.
+    """Write the reflections of walls that reflect all, and return the length of the direct sound's path in m.
 
-    They start when the direct sound arrives as 1. `grown`: the sides, times SIDES_M.
+    They are signal ONE of `work`: the left microphone's in row ONE, the right one's in row ONE + 1. Frame 0 is the
+    arrival of the direct sound, whose height would be 1 and which is left out.
+
+    Args:
+        grown: a factor: the room's sides over SIDES_M.
+        until_s: the time after which no reflections are written.
+        frames: the length of both rows.
     """
     square = 0.0
     for axis in range(3):
@@ -65,8 +75,9 @@ def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> flo
     direct_m = math.sqrt(square)
     silence(work, ONE, 0, frames)
     last = min(float(frames), until_s * of.ROOM_HZ)
+    # Periods of two sides, to either direction of each axis, in which images of the source are looked for
     furthest = math.ceil((until_s * SPEED_M_S + direct_m) / (2 * grown * min(SIDES_M))) + 1
-    images = 2 * (2 * furthest + 1)  # of an axis: as it is, and mirrored
+    images = 2 * (2 * furthest + 1)  # of an axis: in each period one as the source is, and one mirrored
     for x in range(images):
         for y in range(images):
             for z in range(images):
@@ -76,7 +87,7 @@ def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> flo
                 for side in range(2):
                     along_m = apart_m[1] - (side - 0.5) * APART_M
                     way_m = math.sqrt(apart_m[0] ** 2 + along_m**2 + apart_m[2] ** 2)
-                    place = (way_m - direct_m) / SPEED_M_S * of.ROOM_HZ
+                    place = (way_m - direct_m) / SPEED_M_S * of.ROOM_HZ  # in frames, not whole
                     if 0 <= place < last:
                         _add(row(work, ONE + side, frames), place, direct_m / way_m)
     return direct_m
@@ -84,14 +95,17 @@ def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> flo
 
 @kernel
 def _apart(number: int, axis: int, furthest: int, grown: float) -> float:
-    """The distance from listener to image along an axis in m; image number `2 furthest` is the source itself."""
+    """The distance from listener to image along an axis in m; image number `2 furthest` is the source itself.
+
+    Odd numbers are mirrored images. `grown` is the room's sides over SIDES_M.
+    """
     mirrored = -1.0 if number % 2 else 1.0
     return grown * SIDES_M[axis] * (2 * (number // 2 - furthest) + mirrored * SOURCE[axis] - LISTENER[axis])
 
 
 @kernel
 def _add(sound: np.ndarray, place: float, height: float) -> None:
-    """Add a sample between two frames."""
+    """Add a sample of a height to a sound (frames,) at a place between two frames, shared out linearly."""
     before = int(place)
     sound[before] += (1 - (place - before)) * height
     if before + 1 < len(sound):
@@ -100,7 +114,10 @@ def _add(sound: np.ndarray, place: float, height: float) -> None:
 
 @kernel
 def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
-    """Give each band its own decay; bands overlap, and are the whole together."""
+    """Give each band of a sound (frames, 2) its own decay; bands overlap, and their sum is the whole spectrum.
+
+    Signals ONE (a band) and TWO (the sum) of `work` are used.
+    """
     size = power_of_two(2 * len(sound))
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     total_re, total_im = row(work, TWO, size), row(work, TWO + 1, size)
@@ -125,7 +142,10 @@ def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
 
 @kernel
 def _share(band: int, hz: float) -> float:
-    """The part that a band has in a frequency: linear over octaves between its neighbours, all beyond the ends."""
+    """The share of a band in a frequency, 0 … 1: falling linearly, in octaves, to 0 at the middles of its neighbours.
+
+    The first band has all below its middle, the last one all above.
+    """
     before, after = BANDS_HZ[max(band - 1, 0)], BANDS_HZ[min(band + 1, len(BANDS_HZ) - 1)]
     if hz < BANDS_HZ[band]:
         return (

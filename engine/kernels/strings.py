@@ -141,6 +141,7 @@ def chosen(strings: Any, count: int, key: int) -> int:
 
     Args:
         strings: records or objects with the key of each open string as its `note`, the highest first.
+        count: the number of strings.
     """
     for number in range(count):
         if strings[number].note <= key:
@@ -227,7 +228,9 @@ def loss(string: Row, partial: Mode, air: float, friction: float, bending: float
 
 
 def mute(string: Row, modes: int, pairs: int, share: float, out: Out) -> None:
-    """Add to σ, of `out` as of `rows`, the losses to a hand that lies on the string from the bridge on.
+    """Add to σ, in `out` as `rows` writes it, the losses to a hand that lies on the string from the bridge on.
+
+    `share`: strength of the mute, 0 … 1.
 
     A resistance per length from 0 to a gives σ_n = σ∞ (1 - sin(2ηa) / 2ηa): low partials ring on, high ones stop.
     Length and σ∞ are estimates: E2 of a guitar then falls by 60 dB in half a second, its tenth partial in 20 ms.
@@ -240,7 +243,7 @@ def mute(string: Row, modes: int, pairs: int, share: float, out: Out) -> None:
 
 
 def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
-    """Add to σ, of `out` as of `rows`, the losses to a finger that touches the string at 1/node of its length.
+    """Add to σ, in `out` as `rows` writes it, the losses to a finger that touches the string at 1/node of its length.
 
     A resistance R at x gives σ_n = R/(ρAℓ) sin²(nπx/ℓ), to first order (Rayleigh, Theory of Sound, § 102): partials
     with a node there stay as they are. With R = √(TρA) the largest is 2 f₁.
@@ -253,9 +256,9 @@ def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
 
 
 def stand(string: Row, modes: int, pairs: int, conductance: tuple[float, float], out: Out) -> None:
-    """Move what pairs lose to a bridge from σ of `out`, as of `rows`, to the place behind η²: what is shared of it.
+    """Move what pairs lose to a shared bridge from σ, in `out` as `rows` writes it, to a fifth row behind η².
 
-    `conductance`: of that, in both directions.
+    `conductance`: the shared part of the bridge's, in both directions, in s/kg.
     """
     pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):

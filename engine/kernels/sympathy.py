@@ -71,7 +71,10 @@ def tune(player: Player, table: Table) -> None:
 
 @kernel
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
-    """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
+    """Add the force of partials that a force (frames,) drives to `out` (frames,).
+
+    Return the largest gain² (x² + y²) of any partial: the square of its swing, re full scale.
+    """
     count = bank.partials
     x, y = bank.x[:count], bank.y[:count]
     cosine, sine = bank.cosine[:count], bank.sine[:count]

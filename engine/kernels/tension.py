@@ -2,6 +2,11 @@
 
 A voice is what that module says, at the device's own rate, in metres and seconds. Its modes are its own and may
 change while it rings: what the latents turn by follows from them and from the program's three curves.
+
+A frame has a whole number of *nodes*, h apart. At each the tension kicks the latents z = x + iy; then they turn to
+the next one. S = Σ η² A x² is their stretch, R = Σ η² κ r x² corrects it: `sums` are (S, R). Modes of a drum that
+nobody hears *rest*: they only decay, and count in S and R by their averages. Those that are *felt* still stretch it.
+Blocks of modes, the ears that hear them, and `near` and `far` blocks are those of `kernels.lanes`.
 """
 
 from __future__ import annotations
@@ -29,7 +34,13 @@ BEHIND_PROGRAM = slots(at.TENSION_PROGRAM)
 
 @kernel
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copy modes, in this order, with their rows, see `advance`, into blocks of `kernels.lanes`; the rest is 0."""
+    """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes of the last block become 0.
+
+    Args:
+        rows: (7, modes), see `advance`.
+        order: numbers of the modes that are copied.
+        memory, first: where the blocks are, from the slot `first` on.
+    """
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
         if number < len(order):
@@ -87,7 +98,9 @@ def node(
     It takes each number by itself, as `lanes.turn`: all stay in registers.
 
     Args:
-        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks there.
+        sums, rest: (S, R) of the blocks at this node, and what resting modes add; returned are those at the next.
+        largest_stretch: S is not above it.
+        at_points: written for the ears, at the next node; see `lanes`.
     """
     tension = min(sums[0] + rest[0], largest_stretch)
     linear, squared = tension * (1 - 2 * (sums[1] + rest[1])), tension * tension
@@ -116,7 +129,11 @@ def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> 
 
 @kernel
 def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
-    """Lay the highest modes to rest that are silent; those left."""
+    """Set the highest modes that are silent to 0, for good; return how many are left.
+
+    Args:
+        silence: share of the amplitude of all, whose square is `total`.
+    """
     while moving > 1:
         x = first + lanes.place(moving - 1)
         y = x + lanes.LANES
@@ -182,7 +199,10 @@ def advance(
 
 @kernel
 def _nodes(voice: at.Voice, program: at.TensionProgram, kick: float) -> int:
-    """The nodes in a frame for the modes that move, as `KoopmanTension.step`; `kick`: Σ η² k (q² + v²/ω²)."""
+    """The nodes in a frame for the modes that move, as `KoopmanTension.step`; `kick`: Σ η² k (q² + v²/ω²).
+
+    With a javari they are a multiple of its steps.
+    """
     last = voice.moving - 1
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     first_rate = damped(squares[0], sigmas[0]) / program.node_phase
@@ -210,7 +230,10 @@ def _needs_fewer_nodes(voice: at.Voice, program: at.TensionProgram) -> bool:
 
 @kernel
 def prepare(voice: at.Voice, program: at.TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
-    """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
+    """Compute the rows (7, modes) of `advance` from a voice's modes, and the nodes of a frame.
+
+    It is done as in `KoopmanTension.step`. The amplitudes q in m and speeds v in m/s, (modes,), set the nodes.
+    """
     n, rate = voice.modes, program.rate_hz
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
@@ -261,7 +284,7 @@ def prepare(voice: at.Voice, program: at.TensionProgram, q: np.ndarray, v: np.nd
 
 @kernel
 def _turn(voice: at.Voice, mode: int, sign: float) -> None:
-    """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
+    """Turn a mode by the angle that it has swung through since the rows were prepared: forward (1) or back (-1).
 
     Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
     """
@@ -276,7 +299,7 @@ def _turn(voice: at.Voice, mode: int, sign: float) -> None:
 
 @kernel
 def _fall(voice: at.Voice) -> None:
-    """Modes that rest because nobody hears or feels them decay to the present."""
+    """Let modes that rest, because nobody hears or feels them, decay by the quanta that they have rested."""
     frames = voice.rested * QUANTUM
     if frames == 0:
         return
@@ -307,7 +330,7 @@ def _wake(voice: at.Voice) -> None:
         voice.refresh = 0
     for place in range(voice.felt, voice.moving):
         _turn(voice, order[place], 1.0)
-    voice.felt = voice.moving
+    voice.felt = voice.moving  # none rests
 
 
 @kernel
@@ -321,8 +344,9 @@ def _look(voice: at.Voice, program: at.TensionProgram, sets: int, scratch: np.nd
     x, y = motion(voice)
     rows, sigmas = following(voice), row(voice, at.SIGMA)
     stretches, order = rows[3], order_of(voice)
+    # |z|² of each mode, and its largest share of the power at any point that is heard
     sizes, largest_shares = scratch[:moving], scratch[moving : 2 * moving]
-    rested = scratch[2 * moving : 3 * moving]
+    rested = scratch[2 * moving : 3 * moving]  # 1: it has rested until now; 0: not
     for place in range(moving):
         rested[order[place]] = 1.0 if place >= voice.felt else 0.0
     total = stretch = 0.0
@@ -374,7 +398,7 @@ def _look(voice: at.Voice, program: at.TensionProgram, sets: int, scratch: np.nd
 
 @kernel
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
-    """Apply half of the kick that `node` begins with to y in place, forward or back."""
+    """Apply half of the kick that `node` begins with to y (modes,) in place, forward (1) or back (-1)."""
     first = second = 0.0
     for m in range(len(x)):
         stretch = rows[3, m] * x[m] * x[m]
@@ -419,9 +443,11 @@ def physical(voice: at.Voice, q: np.ndarray, v: np.ndarray) -> None:
 
 @kernel
 def set_out(voice: at.Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
-    """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
+    """Write a voice's x and y, in which kicks act, half a kick before the first node, as `KoopmanTension._set_out`.
 
-    As `KoopmanTension._set_out`. `bounded`: the largest energy is there, and may only fall; else it is set.
+    Args:
+        q, v: amplitudes in m and speeds in m/s, (modes,).
+        bounded: the largest energy is there, and may only fall; else it is set.
     """
     n = voice.modes
     x, y = motion(voice)
@@ -491,7 +517,10 @@ def bring_up_to_date(voice: at.Voice, program: at.TensionProgram) -> None:
 def generate(
     voice: at.Voice, program: at.TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
+    """Write the next quantum, (4, QUANTUM); frame 0 is the string at its release.
+
+    Row 2 s + p is of the set s of weights at the point p; the second set is heard where `fading` to it.
+    """
     bring_up_to_date(voice, program)
     nodes, points = voice.steps, voice.points
     rests, rest = program.unheard > 0, (0.0, 0.0)
@@ -512,7 +541,7 @@ def generate(
     load(x, y, following(voice), quiet, scratch, behind)
     moving = len(loud)
     total = 0.0
-    apart = 2 if points == 1 else 1
+    apart = 2 if points == 1 else 1  # rows of `out` from ear to ear
     largest = voice.largest_stretch
     stretched = QUANTUM * nodes * rest[0]
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)

@@ -31,7 +31,10 @@ def _sub_steps(voice: at.Voice, program: at.TruthProgram) -> int:
 
 @kernel
 def _prepare(voice: at.Voice, program: at.TruthProgram, sub_steps: int) -> None:
-    """The exact damped rotations between kicks, of half the palindrome."""
+    """Compute the exact damped rotations between kicks, of half the palindrome: four rows (modes,) for each stage.
+
+    With no sub-steps, 0, they are one rotation over a whole frame.
+    """
     n = voice.modes
     squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     for stage in range(at.STAGES // 2 if sub_steps else 1):
@@ -48,7 +51,10 @@ def _prepare(voice: at.Voice, program: at.TruthProgram, sub_steps: int) -> None:
 
 @kernel
 def set_up(voice: at.Voice, program: at.TruthProgram) -> int:
-    """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
+    """Bring what follows from a voice's modes up to date for a quantum; return its sub-steps of a frame.
+
+    They are 0 where it is linear and has no javari.
+    """
     changed = gliding(voice)
     if changed:
         glide(voice)
@@ -61,10 +67,10 @@ def set_up(voice: at.Voice, program: at.TruthProgram) -> int:
 
 @kernel
 def hear(voice: at.Voice, program: at.TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
-    """The output of a frame.
+    """Write a frame of the output, (4, QUANTUM), before the motion advances; every 16 frames look at the loudness.
 
-    The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
-    a contact may wake them they are not.
+    The highest modes are left out from when they are below the program's silence: sub-steps follow those left. On a
+    string with a javari, whose contact may wake them, none are left out.
     """
     q, v = motion(voice)
     squares = row(voice, at.OMEGA_SQUARED)
@@ -84,7 +90,7 @@ def hear(voice: at.Voice, program: at.TruthProgram, frame: int, fading: bool, au
 
 @kernel
 def ring(voice: at.Voice, program: at.TruthProgram, sub_steps: int, count: int) -> None:
-    """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
+    """Advance a voice by `count` of a frame's sub-steps; where these are 0, as it is linear, by whole frames."""
     moving = voice.moving
     q, v = motion(voice)
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
@@ -99,7 +105,10 @@ def ring(voice: at.Voice, program: at.TruthProgram, sub_steps: int, count: int) 
 
 @kernel
 def generate(voice: at.Voice, program: at.TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
+    """Write the next quantum, (4, QUANTUM); frame 0 is the string at its release.
+
+    Row 2 s + p is of the set s of weights at the point p; the second set is heard where `fading` to it.
+    """
     sub_steps = set_up(voice, program)
     for frame in range(QUANTUM):
         hear(voice, program, frame, fading, audible, out)

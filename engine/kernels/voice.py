@@ -30,7 +30,10 @@ WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 @kernel
 def generate(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
-    """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
+    """Write the next quantum of displacement at a voice's points, (2, QUANTUM) of `out`, (4, QUANTUM).
+
+    While it fades to other points, what it is there is written too, as rows 2 and 3, and mixed in.
+    """
     kind = voice.kind
     if kind == at.RENDERED:
         rendered.generate(voice, rendered_program_at(voice.program), out)
@@ -51,7 +54,10 @@ def generate(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray, sc
 
 @kernel
 def move_points(voice: at.Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
-    """Fade what a quantum is at its points to what it is at others."""
+    """Fade a quantum at a voice's points, rows 0 and 1 of `out`, to that at its next ones, rows 2 and 3, in MOVE_S.
+
+    At the end of the fade the second set of weights becomes the first.
+    """
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
     for point in range(voice.points):
         for frame in range(QUANTUM):
@@ -80,6 +86,10 @@ def remember(voice: at.Voice, audible: bool, first: bool, out: np.ndarray) -> No
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `warm` has reached `WARMED`: at the pluck at once, else two quanta later.
+
+    Args:
+        first: this quantum is the first one that the voice is ahead of what was heard of it: see `is_first`.
+        out: displacement of full scale, (2, QUANTUM) of it.
     """
     if first:
         voice.warm = 0
@@ -102,7 +112,7 @@ def remember(voice: at.Voice, audible: bool, first: bool, out: np.ndarray) -> No
 
 @kernel
 def differentiate(voice: at.Voice, out: np.ndarray, taps: np.ndarray) -> None:
-    """The velocity of the quantum before the latest, (2, QUANTUM) of `out`."""
+    """Write the velocity in the quantum before the latest, (2, QUANTUM) of `out`; `taps`: filter (2 REACH + 1,)."""
     for point in range(voice.points):
         past = voice.history[point]
         for frame in range(QUANTUM):
@@ -135,17 +145,17 @@ def take_over(voice: at.Voice, now: int, scratch: np.ndarray) -> None:
 
 @kernel
 def _never_begin(voice: at.Voice) -> None:
-    """A voice that waits ends without a sound."""
+    """Let a voice that waits end without a sound."""
     voice.gain = voice.gain_to = voice.wanted_gain = 0.0
     voice.release = 1
 
 
 @kernel
 def _join(voice: at.Voice, before: at.Voice, now: int, scratch: np.ndarray) -> None:
-    """The pluck is added to the motion of the voice before, which fades as this one begins.
+    """Add the motion of the voice before to this one's pluck; the voice before fades as this one begins.
 
-    One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
-    kind, the string is at rest.
+    If the other has not begun yet it is not heard at all: both plucks are this voice's. Where it is over, or of
+    another kind, the string is at rest.
     """
     rings = before.state == at.SOUNDING and before.generated > 0
     waits = before.state == at.WAITING and before.prepared == 0
@@ -154,14 +164,14 @@ def _join(voice: at.Voice, before: at.Voice, now: int, scratch: np.ndarray) -> N
         joins = rings or before.joins == 1
         if joins and voice.velocity:
             _past(voice, before)
-        q, v = scratch[:m], scratch[m : 2 * m]
+        q, v = scratch[:m], scratch[m : 2 * m]  # amplitudes and speeds of the voice before
         if voice.kind == at.TENSION and rings:
             tension.physical(before, q, v)
         else:
             q[:], v[:] = motion(before)
         amplitudes, speeds = motion(voice)
         squares = row(voice, at.OMEGA_SQUARED)
-        widest = 0.0
+        widest = 0.0  # m: the largest displacement that it may add
         for mode in range(min(n, m)):
             amplitudes[mode] += q[mode]
             speeds[mode] += v[mode]
@@ -180,7 +190,10 @@ def _join(voice: at.Voice, before: at.Voice, now: int, scratch: np.ndarray) -> N
 
 @kernel
 def _past(voice: at.Voice, before: at.Voice) -> None:
-    """Displacement before the pluck: the motion so far, and the string held where the pluck begins."""
+    """Fill a voice's history, which is the displacement before its pluck, at its points.
+
+    It is what the voice before gave so far, plus the displacement of this pluck, held until it begins.
+    """
     pulled = row(voice, 0)
     for point in range(voice.points):
         weighed, held = weights(voice, 0, point, 0), 0.0
@@ -193,7 +206,10 @@ def _past(voice: at.Voice, before: at.Voice) -> None:
 
 @kernel
 def _look_at_wishes(voice: at.Voice, now: int) -> None:
-    """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
+    """Let `resonator` be the latest WISH for other modes whose frame is not after `now`.
+
+    Wishes count in their order, and wait for those before them.
+    """
     latest = voice.resonator
     address = voice.pending_modes if latest == 0 else wish_at(latest).next
     while address != 0:
@@ -207,12 +223,17 @@ def _look_at_wishes(voice: at.Voice, now: int) -> None:
 
 @kernel
 def is_heard(voice: at.Voice) -> bool:
+    """Return True if a voice's gain is not 0, or is about to rise from it."""
     return voice.gain != 0 or voice.gain_to != 0
 
 
 @kernel
 def begin(voice: at.Voice, mixer: Mixer) -> int:
-    """Begin a voice's next quantum before it is generated; return its state where none is: it waits, or is over."""
+    """Begin a voice's next quantum before it is generated; return the voice's state.
+
+    That is SOUNDING where the quantum is to be generated, else WAITING or OVER. What a late voice left over of the
+    quantum before is added to the mix. A release, or another wanted gain, begins a fade of the gain.
+    """
     mix, now = mixer.mix[:], mixer.frames
     if voice.state == at.WAITING:
         if voice.begin_at >= now + QUANTUM:
@@ -240,7 +261,12 @@ def begin(voice: at.Voice, mixer: Mixer) -> int:
 
 @kernel
 def end(voice: at.Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
-    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state. One that is not `moved` stands still."""
+    """Add a generated quantum, (2, QUANTUM) of `out`, to the mix, with gain and fade-in; return the voice's state.
+
+    Args:
+        now_s: the device clock's time, noted where the voice begins.
+        moved: False: the voice stands still, as it has no samples yet.
+    """
     mix = mixer.mix[:]
     left_over = voice.left_over[:]
     points = voice.points

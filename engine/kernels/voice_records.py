@@ -88,15 +88,15 @@ VOICE = np.dtype(
         ("looped", W),  # whether a rendered voice, of the device's own rate, begins again after its last sample
         ("audible_count", W),  # latents up to the last that can be heard
         ("warm", W),  # quanta of its own displacement that a velocity voice has behind it, without an unheard one
-        ("resonator", W),  # address of the latest of these that are due; the kernel glides there
-        ("current_modes", W),  # the one that it is gliding to, or has reached
-        ("glide", W),  # quanta left of the way
+        ("resonator", W),  # address of the latest WISH for other modes that is due; 0: none yet
+        ("current_modes", W),  # address of the WISH that it is gliding to, or has reached; 0: none
+        ("glide", W),  # quanta left of the way there
         ("previous_voice", W),  # address of the voice that has the string until this one begins; 0: none
         ("prepared", W),  # whether the rows that follow from its modes are there
-        ("steps", W),  # nodes, or sub-steps, of a frame, for which they were made
+        ("steps", W),  # nodes of a frame (TENSION), or its sub-steps (TRUTH), for which they were made
         ("decay", R),  # of the largest energy in a frame
         ("largest_energy", R),  # of latents that share a tension
-        ("largest_stretch", R),
+        ("largest_stretch", R),  # of S, their stretch: see `kernels.tension`
         ("peak", R),  # m: of the displacement at its release, a least one
         ("joins", W),  # whether its fade-in is the complement of the other's fade
         ("ends_at", W),  # frames since the pluck, from which on it fades out whatever it still gives
@@ -134,7 +134,7 @@ AT_LEFT = 7
 AT_MIDDLE = 9
 AT_RIGHT = 11  # two each: the higher orders at the node, half-way and at the next
 LEVEL, PHASE, LEVEL_RATE, PHASE_RATE = range(13, 17)  # where the last segment ended
-ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
+ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers: latents that are modulated, and those that modulate
 CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
 BANK_ROWS = 21
 
@@ -195,7 +195,7 @@ BANK_PARTS = BANK_PROGRAM.names[12:] if BANK_PROGRAM.names else ()
 TRUTH_PROGRAM = np.dtype(
     [
         ("substeps", R),  # in a period of the highest mode
-        ("silence", R),
+        ("silence", R),  # share of all modes' amplitude, below which the highest are laid to rest
         ("loudness", R),  # nepers: log of full scale's share of a metre
         ("rate_hz", R),
         ("rotations", R, STAGES // 2),  # shares of a sub-step, of the first half
@@ -206,9 +206,9 @@ TRUTH_PROGRAM = np.dtype(
 TENSION_PROGRAM = np.dtype(
     [
         ("coefficients", W),  # of each of the three curves, which follow
-        ("node_phase", R),
-        ("highest_phase", R),
-        ("silence", R),
+        ("node_phase", R),  # rad that the lowest mode may turn between two nodes, at most
+        ("highest_phase", R),  # rad that the highest one may
+        ("silence", R),  # share of all modes' amplitude, below which the highest are laid to rest
         ("loudness", R),  # nepers: log of full scale's share of a metre
         ("rate_hz", R),
         ("unheard", R),  # of the output: a mode that is quieter, and hardly stretches a drum, rests; 0: none does
@@ -218,9 +218,9 @@ TENSION_PROGRAM = np.dtype(
 RENDERED_PROGRAM = np.dtype(
     [
         ("taps", W),  # of the filter, to either side
-        ("phases", W),
+        ("phases", W),  # places between two samples for which it is tabulated
         ("ratio", R),  # samples a frame
-        ("filter", W),  # slot of (phases + 1, 2 taps)
+        ("filter", W),  # slot of (phases + 2, 2 taps), whose last row is there twice
     ]
 )
 

@@ -1,4 +1,7 @@
-"""Notes that ring follow knobs, wheels and dampers: their voices glide to other modes, all of a note alike."""
+"""Notes that ring follow knobs, wheels and dampers: their voices glide to other modes, all of a note alike.
+
+`frame` is the mixer's frame at which something counts (0: at once), `now` the first frame of its next quantum.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,10 @@ def level_of(player: Player, table: Table, note: Note, which: int) -> float:
 
 @kernel
 def retune(player: Player, table: Table, note: Note, seconds: float, frame: int, now: int) -> None:
-    """Let a note glide to its string as knobs, wheels and damper have changed it, where they have."""
+    """Let a note glide, in so many seconds, to its string as knobs, wheels and damper have changed it.
+
+    Nothing happens where they have not changed it, or to a drum.
+    """
     string, changed = player.bent, False
     if note.drum != 0:
         return
@@ -53,7 +59,7 @@ def retune(player: Player, table: Table, note: Note, seconds: float, frame: int,
         changed = True
     if not changed:
         return
-    filled = 0
+    filled = 0  # address of the first voice's wish, whose rows the others copy
     for source in range(of.MOST_SOURCES):
         if slots.voice_over(note.voices[source]):
             continue
@@ -68,7 +74,7 @@ def retune(player: Player, table: Table, note: Note, seconds: float, frame: int,
 
 @kernel
 def damp(player: Player, table: Table, note: Note, frame: int, now: int) -> None:
-    """Put the damper on a string or a drum that nothing holds."""
+    """Put the damper on a note's string or drum, unless key, pedal or instrument let it ring, or it is damped."""
     if note.held + note.kept + note.damped != 0 or table.let_ring != 0:
         return
     note.damped = 1
@@ -105,7 +111,7 @@ def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
 
 @kernel
 def glide(player: Player, table: Table, channel: int, seconds: float, frame: int, now: int) -> None:
-    """Let strings follow the wheels of a channel; -1: all, whatever has changed."""
+    """Let strings glide, in so many seconds, to where the wheels of a channel have them; channel -1: all strings."""
     for note in player.notes:
         moved = channel < 0 or channels.acts_on(table.mode, channel, note.channel)
         if moved and slots.sounds(note):

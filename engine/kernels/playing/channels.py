@@ -9,6 +9,8 @@ computer and the screen too, which have none; in MPE, as the master's, for every
 
 A release belongs to the earliest stroke of its key that has none: a key that is struck again before it was released
 is held until the last of its releases.
+
+Channels are numbered from 0, see `constants.CHANNELS`. `mode` is the table's: POLY, GUITAR or MPE.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another 
 
 @kernel
 def rest(player: Player, number: int) -> None:
-    """A channel as if nobody had moved anything on it but pedals and footswitches."""
+    """Put a channel's wheels, tuning and choice of a parameter at rest; pedals, footswitches and volume stay."""
     channel = player.channels[number]
     channel.bend = 0.0
     channel.range_semitones = -1.0
@@ -60,7 +62,7 @@ def begin(player: Player, number: int) -> None:
 
 @kernel
 def loudness(player: Player, mode: int, channel: int) -> float:
-    """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
+    """The factor of loudness of what was struck on a channel, by volume and expression: General MIDI's squares."""
     share = 1.0
     for number in range(of.CHANNELS):
         if acts_on(mode, number, channel):
@@ -99,12 +101,13 @@ def semitones(player: Player, mode: int, channel: int) -> float:
 
 @kernel
 def _is_member(mode: int, number: int) -> bool:
+    """Return True if a channel is a member of MPE's zone: neither its master nor the computer's keys."""
     return mode == of.MPE and number != of.FIRST and number != of.ON_SCREEN
 
 
 @kernel
 def _bend_range(player: Player, mode: int, number: int) -> float:
-    """Semitones of a whole bend of a channel."""
+    """The semitones of a whole bend of a channel, as set on it, else MPE's for members, else the instrument's."""
     wide = player.channels[number].range_semitones
     if wide >= 0.0:
         return wide
@@ -113,9 +116,10 @@ def _bend_range(player: Player, mode: int, number: int) -> float:
 
 @kernel
 def set_parameter(player: Player, mode: int, number: int, controller: int, value: int) -> bool:
-    """Follow the controllers that choose a registered parameter and set it; whether they set one that counts here.
+    """Follow the controllers that choose a registered parameter and set it; return True if one that counts was set.
 
-    Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
+    These are range of bends, fine and coarse tuning. `number` is the channel's, `value` 0 … 127. Increments are of
+    the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
     """
     state = player.channels[number]
     if controller in (midi.OTHER, midi.FINE_OTHER):
@@ -172,7 +176,11 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
 
 @kernel
 def place_of(player: Player, table: Table, event: Event) -> int:
-    """The string of the instrument that an event's note has; 256 (n + 1): string n of a set, which was given."""
+    """The place of an event's note: a number for the string of the instrument on which it is played.
+
+    256 (n + 1) is string n of a set, from the highest, 0, where the channel or the event gives it. Else each key is a
+    string: key + 1, in MPE plus 256 (channel + 1).
+    """
     channel, string = event.channel, event.string
     if _is_string(player, table, channel):
         return 256 * (channel + 1)
@@ -183,7 +191,7 @@ def place_of(player: Player, table: Table, event: Event) -> int:
 
 @kernel
 def release_latest(player: Player, channel: int, key: int) -> bool:
-    """Take a release of a key for its earliest stroke that has none; return whether that is the latest."""
+    """Take a release of a key for its earliest stroke that has none; return True if no other awaits its release."""
     strokes = player.channels[channel].strokes
     strokes[key] = max(strokes[key] - 1, 0)
     return strokes[key] == 0
@@ -191,7 +199,7 @@ def release_latest(player: Player, channel: int, key: int) -> bool:
 
 @kernel
 def release_key(player: Player, channel: int, key: int) -> None:
-    """A key is not down, and none of its strokes awaits a release."""
+    """Note that a key is not down, and that none of its strokes awaits a release."""
     player.channels[channel].held[key] = player.channels[channel].strokes[key] = 0
 
 
@@ -213,7 +221,7 @@ def switched(player: Player, mode: int, channel: int, which: int) -> bool:
 
 @kernel
 def moves_in_s(player: Player, mode: int, channel: int) -> float:
-    """The time in which a note moves to another key of its channel."""
+    """The time in s in which a note moves to another key of its channel: by a slide where portamento is on."""
     for number in range(of.CHANNELS):
         state = player.channels[number]
         if state.switches[of.SLIDES] != 0 and acts_on(mode, number, channel):

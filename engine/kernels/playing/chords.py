@@ -1,6 +1,8 @@
 """Events that wait for their frames, and strums: notes within some milliseconds are one chord.
 
-Its first note begins at once, the others wait their turns in the queue.
+Its first note begins at once, the others wait their turns in the queue: a note's turn is its number in the chord's
+order, which sets its frame. An event that waits has the number of its chord as `chord`, else 0.
+`now` is the first frame of the mixer's next quantum.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ USUAL_STRUM_MS = 12.0  # of its footswitch
 
 @kernel
 def _height(player: Player, table: Table, event: Event) -> int:
-    """Rises from the lowest note of a chord to the highest: by strings where these are given, else by keys."""
+    """A number that rises from the lowest note of a chord to the highest: by strings where given, else by keys."""
     place = channels.place_of(player, table, event)
-    string = of.CHANNELS + 1 - place // 256 if place % 256 == 0 else 0
+    string = of.CHANNELS + 1 - place // 256 if place % 256 == 0 else 0  # a multiple of 256: its string is given
     return string * of.KEYS + event.key
 
 
@@ -85,7 +87,10 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
 
 @kernel
 def strum(player: Player, table: Table, event: Event, now: int) -> bool:
-    """Let a note wait for its turn in a chord; False: it begins now."""
+    """Let a note wait for its turn in a chord, in the queue; return False if it begins now.
+
+    Its event is changed: while it waits `frame` is that of its turn, and `came` that at which it came.
+    """
     chord = player.chord
     if event.chord != 0:  # its turn has come
         player.chord_begun += event.chord == chord
@@ -103,7 +108,7 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     if player.queued == of.QUEUED:
         return False
     player.next_up = 1 - player.chord_up
-    turn = player.chord_begun
+    turn = player.chord_begun  # notes of the chord before it, those that have begun and those that wait
     for place in range(player.queued):
         turn += player.queue[place].chord == chord
     event.chord, event.came = chord, frame
@@ -126,7 +131,10 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
 
 @kernel
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Put what is meant for a note behind it where that waits for its turn in a chord; return True if it does."""
+    """Put an event for a note that waits for its turn in a chord behind that note; return True if there is one.
+
+    Its frame is as much later as the note's is.
+    """
     by_id = event.id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):
         waiting = player.queue[place]
@@ -154,7 +162,7 @@ def forget_turns(player: Player, mode: int, channel: int) -> None:
 
 @kernel
 def queue(player: Player, event: Event) -> None:
-    """Put an event behind those of its frame and of earlier ones."""
+    """Copy an event into the queue, which is sorted by frames, behind those of its frame; there must be room."""
     place = player.queued
     while place > 0 and player.queue[place - 1].frame > event.frame:
         copy(player.queue[place], player.queue[place - 1])

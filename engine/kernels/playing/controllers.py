@@ -13,7 +13,10 @@ KNOB_S = 0.04  # of the glide to other modes
 
 @kernel
 def stop(player: Player, seconds: float, frame: int) -> None:
-    """Let all strings fade out, those too that nobody plays, and forget their places."""
+    """Let all notes and noises fade out, touch the strings that nobody plays, release all keys, and forget chords.
+
+    `frame`: the mixer's frame from which notes fade; 0: at once.
+    """
     for note in player.notes:
         if note.state == of.RINGS:
             voices.release_note(player, note, seconds, frame)
@@ -34,7 +37,16 @@ SWITCHED_BY = (midi.SUSTAIN, midi.LEGATO, midi.PORTAMENTO, midi.HARMONICS, midi.
 
 @kernel
 def controller(player: Player, table: Table, channel: int, number: int, value: int, frame: int, now: int) -> None:
+    """Follow a MIDI controller on a channel: switches, wheels, volume, and messages that release, stop or reset.
+
+    Args:
+        number: of the controller, see `kernels.midi`.
+        value: 0 … 127; others are cut.
+        frame: the mixer's frame at which it counts; 0: at once.
+        now: the first frame of the mixer's next quantum.
+    """
     mode, state = table.mode, player.channels[channel]
+    # Whether the modulation wheel turns a value that changes strings which ring
     turns = 0 <= table.wheel < of.KNOBS or table.wheel == of.VALUE.damping_mute
     value = min(max(value, 0), 127)
     for switch in range(of.SWITCHES):

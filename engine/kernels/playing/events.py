@@ -37,7 +37,7 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
 
 @kernel
 def _cancel(player: Player, id: int, now: int) -> None:
-    """Forget the events whose frames are to come; but a table counts at once, for later events go by it.
+    """Forget the events whose frames are to come, refusing their notes; but a table counts at once.
 
     Args:
         id: of a note, of which alone events are forgotten; 0: all are.
@@ -126,7 +126,10 @@ def _superseded(event: Event, following: Event) -> bool:
 
 @kernel
 def play(player_address: int, mixer_address: int) -> None:
-    """Play all events that are due in the mixer's next quantum, before it is rendered."""
+    """Play all events that are due in the mixer's next quantum, before it is rendered.
+
+    New ones come from the ring `player.events`; those of later quanta wait in `player.queue`.
+    """
     player, mixer = player_at(player_address), mixer_at(mixer_address)
     now, pushed = mixer.frames, player.pushed
     fence()
@@ -134,6 +137,7 @@ def play(player_address: int, mixer_address: int) -> None:
     while player.taken < pushed:
         taken = player.taken
         event, following = player.events[taken % of.EVENTS], player.events[(taken + 1) % of.EVENTS]
+        # Whether the next event counts at once too
         at_once = taken + 1 < pushed and following.frame <= now
         if at_once and event.frame <= now and _superseded(event, following):
             pass

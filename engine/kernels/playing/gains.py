@@ -17,7 +17,7 @@ LEAST_SWING_M = 1e-9
 
 @kernel
 def forget_gains(player: Player) -> None:
-    """Gains of keys are computed again, each with the next note of its key."""
+    """Forget the gains of all keys, so that each is computed again with the next note of its key."""
     player.limit = 0.0
     player.gains[:] = 0.0
 
@@ -49,6 +49,7 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
     together = decay
     if table.course > 1 and not keys.has_octave(table, key, string):  # at first they are in phase
         together *= 1 + (table.course - 1) * table.bridge
+    # Rows (modes,): first ω², σ, k and η²; then ω, left and right replace all of these but σ
     rows = player.sound[: of.SOUND_ROWS * modes]
     conductance = together * table.conductance[0], together * table.conductance[1]
     losses = decay * table.losses[0], inside * table.losses[1], inside * table.losses[2]
@@ -74,7 +75,10 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
 
 @kernel
 def _look_at_peaks(player: Player, table: Table) -> None:
-    """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
+    """Compute the pluck with which keys are equally loud, and the factor that keeps all below the highest peak.
+
+    They are `player.reference`, amplitudes by partial of a pluck of 1 m, and `player.limit`, from a few keys.
+    """
     share = plucks.reference_share(player)
     width = velocities.between(player.values[of.VALUE.pluck_width], player.values[of.VALUE.pluck_width_hard], share)
     partials = min(player.modes - of.MOST_PAIRS, of.MOST_MODES)
@@ -96,7 +100,7 @@ def _look_at_peaks(player: Player, table: Table) -> None:
 def gain_of(player: Player, table: Table, key: int, string: int) -> float:
     """The factor that makes a key as loud as others, on a string of a set or, -1, the one that the key chooses.
 
-    Beside it is kept how far that string swings.
+    Both this factor and how far that string swings, `player.swings_m`, are kept until a value changes.
     """
     if player.gains[key, 1 + string] == 0.0:
         if player.limit == 0.0:

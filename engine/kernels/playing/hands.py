@@ -7,6 +7,8 @@ instrument lets it ring.
 
 Harmonics: a finger touches the string at a node as it is plucked, and leaves after some periods. Tremolo: a key that
 is held plucks again and again. A footswitch turns each on where its parameter is off.
+
+`frame` is the mixer's frame at which something counts (0: at once), `now` the first frame of its next quantum.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ def _move(player: Player, table: Table, note: Note, key: int, frame: int, now: i
     modes, _ = keys.string_of(player, table, key, string, pitch_hz, False, player.own)
     if modes < 1:
         return False
-    if note.place % 256 != 0:  # a place for each key
+    if note.place % 256 != 0:  # no string is given: each key is a place
         note.place += key - note.key
         for other in player.notes:
             if other.number != note.number and slots.sounds(other) and other.place == note.place:
@@ -144,7 +146,7 @@ def _is_meant(event: Event, note: Note) -> bool:
 
 @kernel
 def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
-    """Bend single notes."""
+    """Bend the notes that an event is for by its value, in semitones."""
     semitones = min(max(event.value, -channels.WIDEST_SEMITONES), channels.WIDEST_SEMITONES)
     for note in player.notes:
         if _is_meant(event, note) and slots.sounds(note):

@@ -17,7 +17,7 @@ USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimat
 
 @kernel
 def value_of(player: Player, table: Table, which: int) -> float:
-    """The instrument's value of that number, as the modulation wheel turns it."""
+    """The instrument's value of a number, a field of VALUE, as far as the modulation wheel has turned it."""
     value, wheel = player.values[which], player.wheel
     if wheel != 0 and table.wheel == which:
         return value + wheel / 127 * (table.wheel_goal - value)
@@ -42,7 +42,10 @@ def body_of(player: Player, table: Table) -> tuple[np.ndarray, float]:
 
 @kernel
 def technique_of(player: Player, table: Table, channel: int, which: int, switch: int, usual: float) -> float:
-    """The value of a technique for a channel: the usual one where its footswitch is down and the value is off."""
+    """The value of a technique for a channel: the usual one where its footswitch is down and the value is off.
+
+    `which` is a field of VALUE, `switch` the number of the footswitch, HARMONICS … STRUMS.
+    """
     value, off = value_of(player, table, which), 1.0 if which == of.VALUE.technique_harmonic else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual

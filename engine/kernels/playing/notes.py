@@ -2,6 +2,10 @@
 
 Strings are known by their places: a key, or a channel of a guitar, which is one string. What plucks a place again
 stops its string first, or, where the instrument says so, adds to its motion.
+
+A note has one voice of each source, a model or a solver of the table; its voices are addresses, 0 for none. Strings
+of a course are notes of their own: their `member` is 0 for the first, which alone is reported. A *draft* is a note
+that is not yet among the player's.
 """
 
 from __future__ import annotations
@@ -30,13 +34,13 @@ HARMONIC_REACH = 0.4  # of the way to the first node, where harmonics are plucke
 
 VARIES_RELEASE, VARIES_ANGLE = 0.2, math.radians(8.0)  # a share, rad: at most, as those of `plucks.vary`
 
-MEMBERS_APART = 1 << 16  # places of the strings of a course
+MEMBERS_APART = 1 << 16  # from the place of one string of a course to that of the next
 COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 
 
 @kernel
 def report(player: Player, kind: int, id: int, channel: int, key: int, frame: int, velocity: float) -> Report:
-    """The next report, for the caller to complete. `reported` publishes it."""
+    """The player's next report, BEGAN, ENDED or REFUSED, for the caller to complete; `reported` publishes it."""
     made = player.reports[player.reported % of.REPORTS]
     made.kind = kind
     made.id = id
@@ -49,6 +53,7 @@ def report(player: Player, kind: int, id: int, channel: int, key: int, frame: in
 
 @kernel
 def reported(player: Player) -> None:
+    """Publish the report that `report` gave."""
     fence()
     player.reported += 1
 
@@ -62,7 +67,7 @@ def refuse(player: Player, event: Event) -> None:
 
 @kernel
 def _forget(player: Player, note: Note, frame: int) -> None:
-    """A note has ended: its place is free."""
+    """Free a note that has ended, and report its end, unless it is a further string of a course."""
     note.state = of.FREE
     if note.member != 0:
         return
@@ -81,8 +86,11 @@ def _begun(note: Note) -> bool:
 
 @kernel
 def free_note(player: Player, mixer: Mixer) -> Note:
-    """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
-    best, best_rank = player.notes[0], 3
+    """A free one of the player's notes; where there is none, one is cut.
+
+    That is first one that fades or has lost its place and has not begun, then one that has, else the oldest.
+    """
+    best, best_rank = player.notes[0], 3  # the lowest rank is cut: 0 is unheard, 1 fades, 2 is in its place
     for note in player.notes:
         if note.state != of.FREE and slots.over(note):
             _forget(player, note, mixer.frames)
@@ -103,7 +111,7 @@ def free_note(player: Player, mixer: Mixer) -> Note:
 
 @kernel
 def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
-    """A note has the string of the one before, which is stopped, or whose motion continues in it."""
+    """Let a note take over the string of the one before, which is stopped, or whose motion continues in it."""
     stops = slots.frames(player, PLUCK_STOPS_S)
     for source in range(of.MOST_SOURCES):
         address, other = note.voices[source], before.voices[source]
@@ -127,7 +135,10 @@ def _cost(note: Note) -> int:
 
 @kernel
 def _make_room(player: Player) -> None:
-    """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
+    """Release the oldest notes while more ring than may, by `_cost`; one is always left.
+
+    One that costs more than 1 and has not begun ends at once.
+    """
     while True:
         notes = cost = 0
         oldest = player.notes[0]
@@ -213,7 +224,7 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
 
 @kernel
 def _take_string(player: Player, table: Table, note: Note) -> bool:
-    """The string of a note's key with its modes and its gain; False: it is impossible."""
+    """Set a note's own string, its number of modes and its gain, by its key; return False if it is impossible."""
     pitch_hz, string_row = keys.pitch_of(table, note.key), note.own
     if not pitch_hz > 0.0:
         return False
@@ -231,10 +242,10 @@ def _take_string(player: Player, table: Table, note: Note) -> bool:
 
 @kernel
 def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
-    """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
+    """Set a note's pluck, by its velocity or by hand; write the amplitudes of its modes to `player.amplitudes`."""
     curve = keys.value_of(player, table, of.VALUE.pluck_curve)
     soft = keys.value_of(player, table, of.VALUE.pluck_softest_mm)
-    share = velocities.share(note.velocity, curve)
+    share = velocities.share(note.velocity, curve)  # of the way from the softest stroke to the hardest, 0 … 1
     harder = keys.value_of(player, table, of.VALUE.pluck_hardest_mm) / soft
     amplitude_mm = min(soft * harder**share * note.shortened, LARGEST_AMPLITUDE_MM)
     if note.by_hand != 0:
@@ -250,7 +261,7 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
         position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * slide / 127
-    turned, varies = 0.0, table.variation
+    turned, varies = 0.0, table.variation  # rad from the instrument's angle of plucks; 0 … 1
     softest_ms = keys.value_of(player, table, of.VALUE.pluck_release_ms)
     release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.VALUE.pluck_release_hard_ms), share)
     if varies > 0.0:
@@ -297,7 +308,7 @@ def _keep_of_table(player: Player, table: Table, note: Note) -> None:
 
 @kernel
 def _make_voices(player: Player, table: Table, event: Event, note: Note) -> None:
-    """The voices of a note, one of each source."""
+    """Make the voices of a note, one of each source, in the player's memory, with their gains."""
     for source in range(table.sources):
         address = slots.address_of_voice(player, note.number, source)
         if note.drum != 0:
@@ -315,7 +326,7 @@ def _make_voices(player: Player, table: Table, event: Event, note: Note) -> None
 
 @kernel
 def _take_place(player: Player, table: Table, note: Note) -> None:
-    """A note is the latest of its place, and follows the one before."""
+    """Make a note the latest of its place, and let it take over the string of the one before."""
     for before in player.notes:
         if before.state == of.RINGS and before.has_place != 0 and before.place == note.place:
             before.has_place = 0
@@ -343,7 +354,7 @@ def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> Non
 
 @kernel
 def report_began(player: Player, table: Table, event: Event, note: Note, string_row: np.ndarray) -> None:
-    """Report the note of an event, and the string of its key."""
+    """Report that an event's note began, with its pluck and its string; only for the first string of a course."""
     if note.member != 0:
         return
     made = report(player, of.BEGAN, note.id, note.channel, note.key, event.frame, event.value)

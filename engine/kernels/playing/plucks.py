@@ -26,9 +26,16 @@ VARIES_WIDTH = 0.12  # shares, dB
 
 @kernel
 def pull(player: Player, table: Table, shape: int, modes: int, position: float, peak_m: float, width: float) -> float:
-    """The amplitudes of the modes of a pluck, from its shape on the grid by sines, and its highest point in m.
+    """Write a pluck's amplitudes by partial into `player.amplitudes`, in m; return its highest point in m.
 
-    Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
+    They are the sines of its shape on a grid. Those of a blow are divided by its width, the shape's area over its
+    height; `release_pluck` does the rest.
+
+    Args:
+        shape: GAUSSIAN … ROUNDED.
+        modes: the number of partials.
+        position, width: shares of the string's length.
+        peak_m: height of the shape.
     """
     grid, highest = table.grid, 0.0
     sines = behind(table, table.sines, 2 * (grid - 1))
@@ -48,7 +55,7 @@ def pull(player: Player, table: Table, shape: int, modes: int, position: float, 
             height_m = peak_m * pulses.raised_cosine(distance)
         player.pulled[point] = height_m
         highest = max(highest, height_m)
-    turn = 2 * (grid - 1)
+    turn = 2 * (grid - 1)  # places of a whole turn of the tabulated sine
     for mode in range(modes):
         total, place = 0.0, 0
         for point in range(1, grid - 1):
@@ -68,7 +75,10 @@ def pull(player: Player, table: Table, shape: int, modes: int, position: float, 
 
 @kernel
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
-    """The amplitudes of the modes of a rounded triangle, which peaks where the force pulls; else it is straight."""
+    """Write the amplitudes in m of a rounded triangle's partials, scaled so that its highest point is `peak_m`.
+
+    That lies where the force pulls, within `width` about `position`; elsewhere the string is straight.
+    """
     turn = len(sines)
     grid = turn // 2 + 1
     low = max(int((position - width / 2) * (grid - 1)) - 1, 1)
@@ -90,9 +100,10 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
 @kernel
 def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials: int, release_s: float) -> None:
-    """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
+    """Multiply `player.amplitudes` by what a release, or a blow, of a duration leaves of each partial.
 
-    What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
+    See `engine.excitation.blow_factor`; `release_s` of 0 is at once. What touches a string leaves it within a period
+    of its lowest partial. So soft strokes of high keys are heard.
     """
     release_s = min(release_s, MOST_PERIODS * 2 * math.pi / math.sqrt(strings.omega_squared(string_row, 1)))
     for mode in range(partials if table.strikes != 0 else 0):
@@ -105,7 +116,7 @@ def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials
 
 @kernel
 def varied(stroke: int, key: int, which: int) -> float:
-    """A number in -1 … 1 for each stroke: the same for the same strokes."""
+    """A random number in -1 … 1, the same for the same stroke and key; `which`: one of several, from 0."""
     return float(np.uint64(mixed(stroke * 4096 + key * 16 + which + 1)) >> np.uint64(12)) / 2.0**51 - 1
 
 
@@ -123,7 +134,10 @@ def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, 
 def vary(
     position: float, amplitude_mm: float, width: float, varies: float, stroke: int, key: int
 ) -> tuple[float, float, float]:
-    """Position, amplitude and width of one stroke of a pluck, within their ranges."""
+    """Position, amplitude and width of one stroke of a pluck, varied, within their ranges.
+
+    `varies`: the instrument's variation, 0 … 1; `stroke` and `key` choose how.
+    """
     return nearest(
         position * (1 + varies * VARIES_PLACE * varied(stroke, key, 0)),
         amplitude_mm * 10.0 ** (varies * VARIES_DB / 20 * varied(stroke, key, 1)),
@@ -133,7 +147,9 @@ def vary(
 
 @kernel
 def split(player: Player, table: Table, string_row: np.ndarray, partials: int, turned: float) -> tuple[int, int]:
-    """Split a pluck's partials into modes of both polarisations; how many these are, and how many partials have two.
+    """Split a pluck's partials, `player.amplitudes`, into modes of both polarisations, in place.
+
+    Return how many modes these are, and how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.
@@ -148,7 +164,7 @@ def split(player: Player, table: Table, string_row: np.ndarray, partials: int, t
 
 @kernel
 def _polarise(player: Player, table: Table, partials: int, turned: float) -> int:
-    """Split partials of strings that were not recorded; how many have two modes."""
+    """Split the partials of a string that was not recorded, as `split`; return how many have two modes."""
     pairs = min(table.pairs, partials)
     if pairs == 0:
         return 0
@@ -166,5 +182,5 @@ def _polarise(player: Player, table: Table, partials: int, turned: float) -> int
 
 @kernel
 def reference_share(player: Player) -> float:
-    """The share of the velocities at which keys are equally loud."""
+    """The share, 0 … 1 from softest to hardest, of the velocity at which keys are equally loud."""
     return velocities.share(of.REFERENCE_VELOCITY, player.values[of.VALUE.pluck_curve])

@@ -1,4 +1,8 @@
-"""Times in frames; the voices of a player's notes, and whether they are over."""
+"""Times in frames; the voices of a player's notes, and whether they are over.
+
+A *source* is one of the models or solvers of an instrument's table, by its number: a note has one voice of each, in
+the player's memory, which is known by its address (0: none).
+"""
 
 from __future__ import annotations
 
@@ -17,11 +21,13 @@ voice_bytes = kernel(at.voice_bytes)
 
 @kernel
 def frames(player: Player, seconds: float) -> int:
+    """The nearest number of frames, 1 at least, in a time."""
     return max(1, round(seconds * player.rate_hz))
 
 
 @kernel
 def quanta(player: Player, seconds: float) -> int:
+    """The nearest number of quanta, 1 at least, in a time."""
     return max(1, round(seconds * player.rate_hz / of.QUANTUM))
 
 
@@ -48,7 +54,7 @@ def sounds(note: Note) -> bool:
 
 @kernel
 def address_of_voice(player: Player, number: int, source: int) -> int:
-    """The player's own voice for one of its notes and a source."""
+    """The address of the player's own voice for one of its notes, by its number, and a source."""
     return player.here + VOICES_AT + (number * of.MOST_SOURCES + source) * voice_bytes(player.modes)
 
 
@@ -61,7 +67,12 @@ def set_gain(address: int, gain: float) -> None:
 
 @kernel
 def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> at.Voice:
-    """A voice of a source at rest, with as many rows as are used set to zero."""
+    """Clear the voice at an address and set it up for a source; return it, at rest.
+
+    Args:
+        modes: that it has.
+        used: rows (modes,) behind its weights that are set to 0, as the weights are.
+    """
     voice, rate_hz = voice_at(address), player.rate_hz
     clear(voice)
     voice.kind = table.kinds[source]

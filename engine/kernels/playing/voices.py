@@ -1,4 +1,9 @@
-"""Voices of a note in the player's memory: made, heard from points, led to other modes, and faded out."""
+"""Voices of a note in the player's memory: made, heard from points, led to other modes, and faded out.
+
+A voice is known by its address. A *wish* is a block of modes that it is to have from a frame on; see WISH.
+
+`frame` is the mixer's frame at which something counts (0: at once), `now` the first frame of its next quantum.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +56,7 @@ def _weigh(player: Player, voice: at.Voice, which: int, note: Note) -> None:
 
 @kernel
 def fill(player: Player, table: Table, note: Note, string: np.ndarray, out: np.ndarray) -> None:
-    """ω², σ, k, η² and the bridge's part of a note's modes, of its string as it is now."""
+    """Write ω², σ, k, η² and the bridge's part of a note's modes, (5 modes,), of its string as it is now."""
     losses = keys.value_of(player, table, of.VALUE.knobs_decay)
     inside = keys.value_of(player, table, of.VALUE.knobs_brightness_decay)
     conductance = losses * note.conductance[0], losses * note.conductance[1]
@@ -69,7 +74,10 @@ def fill(player: Player, table: Table, note: Note, string: np.ndarray, out: np.n
 
 @kernel
 def make_voice(player: Player, table: Table, address: int, note: Note, source: int) -> None:
-    """A voice of the modes of a note's own string, that sets out with the amplitudes of a pluck."""
+    """Make a source's voice at an address, with the modes of a note's own string.
+
+    It sets out with the amplitudes in `player.amplitudes`; where strings are struck, with speeds instead.
+    """
     rate_hz, n = player.rate_hz, note.modes
     voice = slots.blank_voice(player, table, address, source, n, at.TRUTH_ROWS)
     voice.points = note.points
@@ -89,7 +97,7 @@ def make_voice(player: Player, table: Table, address: int, note: Note, source: i
         amplitudes[mode] = 0.0
     if table.javari[0] > 0.0:
         javari.fit(voice, note.own, note.pairs, table.javari, rate_hz)
-    behind = lag_of(player, table, note.member)
+    behind = lag_of(player, table, note.member)  # frames that it moves alone before it begins
     if behind > 0:
         run_up(voice, behind / rate_hz)
     _weigh(player, voice, 0, note)
@@ -102,7 +110,7 @@ def make_voice(player: Player, table: Table, address: int, note: Note, source: i
 
 @kernel
 def swing_m(note: Note) -> float:
-    """The swing of a note's string now: the root of its modes' summed squares. 0: it is over."""
+    """The swing of a note's string now in m: the root of its modes' summed squares. 0: it is over."""
     for address in note.voices:
         if slots.voice_over(address):
             continue
@@ -139,7 +147,7 @@ def release_note(player: Player, note: Note, seconds: float, frame: int) -> None
 
 @kernel
 def _due(address: int, now: int) -> int:
-    """The latest frame for which modes count with a voice's next quantum."""
+    """The mixer's latest frame at which a wish may count and still be followed in a voice's next quantum."""
     voice = voice_at(address)
     due, before = now + voice.late, voice.previous_voice
     if voice.state == at.WAITING:
@@ -214,7 +222,7 @@ def lag_of(player: Player, table: Table, member: int) -> int:
 
 @kernel
 def hear(player: Player) -> None:
-    """Let notes follow the gains of sources and the listening points."""
+    """Let notes follow the gains of sources, their channels' loudness, the javari's gap and the listening points."""
     if player.table == 0:
         return
     table = table_at(player.table)
@@ -233,8 +241,11 @@ def hear(player: Player) -> None:
 
 @kernel
 def _listen(player: Player, table: Table, note: Note) -> None:
-    """Let a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
-    moved = note.solo != table.solo
+    """Let a note fade to the instrument's present points and solo, where these have changed.
+
+    It stays as it is where the points are others in number or of another pick-up, or a fade is under way.
+    """
+    moved = note.solo != table.solo  # whether anything has changed
     for point in range(2):
         moved = moved or note.point[point] != player.values[of.VALUE.pickup_points_0 + point]
     if not moved or note.points != table.points:
