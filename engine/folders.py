@@ -33,6 +33,7 @@ def working_folder(variable: str, name: str) -> Path:
 
 
 def _data_folder() -> Path:
+    """The program's folder among the platform's for a user's data; it need not exist."""
     from platformdirs import user_data_path
 
     return user_data_path("learned-strings", appauthor=False)

@@ -123,13 +123,13 @@ class Parameter:
         return self.limits[1] / self.limits[0] if self.taper.logarithmic else self.taper.curve
 
     def share(self, value: float) -> float:
-        """The share of a value along the range, 0 … 1."""
+        """The share of the way along the range, 0 … 1, at which a knob shows the value."""
         (low, high), curve = self.limits, self.curve
         part = (value - low) / (high - low)
         return part if curve == 1.0 else math.log1p(part * (curve - 1)) / math.log(curve)
 
     def value(self, share: float) -> float:
-        """The inverse of `share`, which is limited to 0 … 1."""
+        """The value at a share of the way, which is limited to 0 … 1: the inverse of `share`."""
         low, high = self.limits
         curve = self.curve
         share = min(max(share, 0.0), 1.0)
@@ -185,6 +185,7 @@ def _knob(part: str, label: str, limits: tuple[float, float], unit: str, name: s
 
 
 def _width(part: str, label: str, default: float, velocity: str, **others: Any) -> Parameter:
+    """A width of plucks in lengths of the string; `velocity`: which of them it is for, "low" or "high"."""
     id, name = f"pluck.{part}", f"width ({velocity} velocity)"
     return Parameter(id, label, WIDTH_RANGE, default, WIDTH, PLUCK, name=name, wheel=0.02, **others)
 

@@ -226,4 +226,5 @@ def write(value: Any) -> Any:
 
 
 def _describe(data: object) -> str:
+    """The type of a value and the value, in a few words."""
     return f"{type(data).__name__} {bounds.brief(data)}"

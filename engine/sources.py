@@ -37,18 +37,21 @@ class Runaway(RuntimeError):
 
 @dataclass(frozen=True)
 class SourceState:
-    """The state of a source: its own, the frames done, and the largest displacement that is possible."""
+    """The state of a source, which it is given with each call and returns."""
 
-    inner: Any
-    frame: int
-    limit_m: float
+    inner: Any  # the model's or the solver's own
+    frame: int  # frames since the release
+    limit_m: float  # the largest displacement that is taken for a string's; beyond it is a `Runaway`
 
     def after(self, inner: Any, steps: int) -> SourceState:
         return SourceState(inner, self.frame + steps, self.limit_m)
 
 
 class TorchModel:
-    """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
+    """A model of torch that is given arrays and gives arrays, as `TensionArrays` does; methods as of `StringModel`.
+
+    Displacement is in normalised units, and no gradient is kept.
+    """
 
     def __init__(self, model: StringModel[Any]) -> None:
         self._model = model
@@ -69,6 +72,7 @@ class TorchModel:
 
     @staticmethod
     def _call(method: Callable[..., Any], *values: Any) -> Any:
+        """The results of a method for these values, arrays among them as tensors, without gradients."""
         import torch
 
         with torch.inference_mode():
@@ -83,7 +87,7 @@ def array_model(preset: Preset) -> TensionArrays | TorchModel:
 
 
 class ModelSource:
-    """A preset's model.
+    """A preset's model. Its start is given, and its frames come, in m; frame 0 is the release.
 
     Attributes:
         any_frame: whether `sample` takes much less time than `advance`, because it leaves the other frames or their
@@ -105,7 +109,10 @@ class ModelSource:
         return SourceState(inner, 0, RUNAWAY_FACTOR * peak_m)
 
     def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
-        """The next frames, (batch, steps, grid_points), or (…, points) where `readout` (grid_points, points) says.
+        """The next frames in m, (batch, steps, grid_points), and the state after them.
+
+        Args:
+            readout: (grid_points, points), applied to each frame, which then is (points,); None: it is on the grid.
 
         Raises:
             Runaway: see there.
@@ -129,7 +136,12 @@ class ModelSource:
         return self._checked(motion, frames, state), state.after(inner, steps)
 
     def _checked(self, displacement: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
-        """The displacement in m, checked. Raises Runaway."""
+        """The displacement in m, checked against the state's limit. Raises Runaway.
+
+        Args:
+            displacement: normalised, (batch, frames, points).
+            frames: numbers of the frames since the state's, (frames,).
+        """
         displacement = displacement * displacement.dtype.type(self._scale_m)
         possible = np.abs(displacement) <= state.limit_m  # False for a NaN
         if not possible.all():

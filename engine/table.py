@@ -72,6 +72,12 @@ def checked(records: Iterable[T | SchemaError]) -> Iterator[T]:
 
 
 def _rows(lines: io.StringIO, apart: bool) -> Iterator[list[str] | SchemaError]:
+    """The values of each line, the columns' names first, or an error in place of a line that is not CSV.
+
+    Args:
+        apart: read every line by itself, so that no value goes past its end.
+    """
+
     def values_of(line: str) -> list[str]:
         return next(csv.reader([line]), [])
 

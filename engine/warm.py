@@ -83,6 +83,7 @@ def responses() -> None:
 
 
 def _each() -> Iterator[Voice]:
+    """A voice of each kind that is computed as it sounds, by each of the pick-ups."""
     from engine.voices.banks import bank_program
 
     banks = [bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ) for sizes in BANKS]
@@ -136,12 +137,14 @@ def _loudness() -> None:
 
 
 def _sound(voice: Voice) -> None:
+    """Render a few quanta of a voice, so that what it needs is compiled."""
     mixer = Mixer(RATE_HZ)
     mixer.add(voice)
     mixer.render(FRAMES)
 
 
 def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
+    """A model of these sizes at its own start, in evaluation mode."""
     import torch
 
     from engine.models import build_model

@@ -58,9 +58,9 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to.
+    """A path beside `path` to write to: the file there becomes `path` when the block ends well.
 
-    It takes its place when the block ends well, and an error leaves nothing.
+    An error leaves nothing of it, and `path` as it was.
 
     What killed processes have left in its folder is removed first.
 
@@ -122,9 +122,9 @@ def lasting_folder(parent: Path, name: str) -> Path:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Name what was to be written in an OSError of the system's within.
+    """Put `path` into an OSError from within that names no file, or only an unfinished one.
 
-    Of a full disk it names no file at all.
+    The system names no file where the disk is full.
     """
     try:
         yield
@@ -153,6 +153,7 @@ def remove_left_over(folder: Path) -> None:
 
 
 def _is_own(entry: os.DirEntry[str]) -> bool:
+    """Return True if this user owns an entry of a folder; also where the system has no owners."""
     return not hasattr(os, "getuid") or entry.stat(follow_symlinks=False).st_uid == os.getuid()
 
 

@@ -101,13 +101,14 @@ def frame_length(rate_hz: int) -> int:
 
 
 def _spectra(sound: Array, rate_hz: int) -> Array:
-    """Power (frames, frequencies from LOWEST_HZ on)."""
+    """Power (frames, frequencies from LOWEST_HZ on) of a sound (samples,)."""
     length = frame_length(rate_hz)
     first = math.ceil(LOWEST_HZ * length / rate_hz)
     return np.square(magnitudes(sound, np.hanning(length), length // 2)[:, first:])
 
 
 def _distance(model: Array, true: Array) -> float:
+    """The `distance_db` of powers (frames, frequencies); 0 where both are silent."""
     floor = max(float(true.max()) * 10 ** (-FLOOR_DB / 10), np.finfo(np.float64).tiny)
     above_floor = (model > floor) | (true > floor)
     if not above_floor.any():
@@ -117,6 +118,7 @@ def _distance(model: Array, true: Array) -> float:
 
 
 def _level_change(model: Array, true: Array, rate_hz: int) -> float:
+    """The `level_db` of powers by frame, (frames,): the excess in the last quarter less that in the first EARLY_S."""
     early = max(1, round(EARLY_S / _hop_s(rate_hz)) - 1)
     late = -max(1, len(true) // 4)
     first, last = (
@@ -127,7 +129,10 @@ def _level_change(model: Array, true: Array, rate_hz: int) -> float:
 
 
 def _rise(power: Array, true: Array, rate_hz: int) -> float:
-    """The rise in level of means over RISE_S; what lies under the truth's floor does not count."""
+    """The largest rise in dB of a model's level, in means over RISE_S of its powers by frame, (frames,).
+
+    What lies FLOOR_DB below the loudest frame of the truth does not count.
+    """
     length = max(1, round(RISE_S / _hop_s(rate_hz)))
     count = max(1, len(power) // length)
     means = np.array([part.mean() for part in np.array_split(power, count)])
@@ -136,6 +141,7 @@ def _rise(power: Array, true: Array, rate_hz: int) -> float:
 
 
 def _within_floor(decibels: float) -> float:
+    """The decibels, held within ±FLOOR_DB."""
     return min(max(decibels, -FLOOR_DB), FLOOR_DB)
 
 
@@ -146,8 +152,12 @@ def _hop_s(rate_hz: int) -> float:
 def _pitch(
     model: Array, truth: Array, rate_hz: int, partials_hz: Sequence[float]
 ) -> tuple[float | None, float | None]:
-    """The error in cents, and the distance of a second pitch."""
-    size = 4 * 2 ** math.ceil(math.log2(len(truth)))
+    """The error in cents, and the distance of a second pitch, as in `AudibleErrors`.
+
+    Args:
+        model, truth: sounds (samples,) past the glide.
+    """
+    size = 4 * 2 ** math.ceil(math.log2(len(truth)))  # samples of the transform, padded with zeros
     window = np.hanning(len(truth))
     ours, theirs = (np.square(np.abs(np.fft.rfft(sound * window, size))) for sound in (model, truth))
     bands = [
@@ -173,7 +183,11 @@ def _bands(partials_hz: Sequence[float], rate_hz: int) -> list[tuple[float, floa
 
 
 def _peaks(power: Array) -> list[tuple[float, float]]:
-    """(place, power) of the highest, and of the next that is nearly as high and that a dip parts from it."""
+    """The (place, power) of the highest peak, and of the next that is nearly as high and that a dip parts from it.
+
+    Args:
+        power: by frequency, (bins,), in which places are counted; no or one peak may be there.
+    """
     if len(power) < 3 or power.max() <= 0:
         return []
     inner = power[1:-1]

@@ -277,13 +277,13 @@ class _Motion:
     """The segments of trajectories; arrays (batch, segments, modes)."""
 
     time_s: NDArray[np.floating[Any]]  # (segments,), of the middles
-    segment_s: float
-    there: NDArray[np.bool_]
-    phased: NDArray[np.bool_]
-    power: Array
-    level: Array
-    phase: Array
-    frequency_hz: Array
+    segment_s: float  # length of one
+    there: NDArray[np.bool_]  # whether the truth is loud enough, and resolved
+    phased: NDArray[np.bool_]  # whether the prediction is loud enough for a phase, too
+    power: Array  # Σ|z|² of the truth
+    level: Array  # |c|, prediction over truth; 1 where not there
+    phase: Array  # cycles of c, without jumps
+    frequency_hz: Array  # of the truth
 
     def window(self, start_s: float, stop_s: float) -> list[Array]:
         """The fields of `PartialErrors` for one window, (batch, modes) each."""
@@ -344,6 +344,7 @@ def _outer_thirds(there: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[
 
 
 def _mean(values: Array, there: NDArray[np.bool_]) -> Array:
+    """The means (batch, modes) over the segments that are there, NaN for none."""
     return np.where(there, values, 0.0).sum(1) / there.sum(1)
 
 

@@ -47,14 +47,16 @@ class ErrorSums:
     A prediction that is not a number is an infinite error.
 
     Args:
+        steps: frames of each trajectory.
         edges: frames between which trajectories are also summed apart, for `standard_error`.
     """
 
     def __init__(self, steps: int, edges: Iterable[int] = ()) -> None:
+        # four sums: Σ(û - u)², Σu², Σ|û - u| and Σ|u|; here of all trajectories by frame
         self._frames = np.zeros((4, steps))
         self._edges = sorted({0, steps, *(edge for edge in edges if 0 < edge < steps)})
-        self._spans = np.zeros((4, 0, len(self._edges) - 1))  # of trajectories, between edges
-        self._row = 0  # of the last block
+        self._spans = np.zeros((4, 0, len(self._edges) - 1))  # the same by trajectory and stretch between two edges
+        self._row = 0  # number of the first trajectory of the last block
 
     def add(self, predicted: Motion, truth: Motion, first: int = 0, row: int | None = None) -> None:
         """Add trajectories (batch, steps, points) of equal shape; frame 0 (the input) is not among them.
@@ -70,7 +72,7 @@ class ErrorSums:
         error: Any = predicted - truth
         with np.errstate(over="ignore", invalid="ignore"):
             sums = np.stack([_over_points(term) for term in (error**2, truth**2, abs(error), abs(truth))])
-        sums[::2][np.isnan(sums[::2])] = math.inf
+        sums[::2][np.isnan(sums[::2])] = math.inf  # of the errors alone
         self._frames[:, first : first + truth.shape[1]] += sums.sum(1)
         if row is None:
             row = self._row if first else self._spans.shape[1]
@@ -177,14 +179,15 @@ class ErrorWindows:
     def __init__(
         self, frames: int, window_s: float, rate_hz: float, curves: Sequence[str] = ("rmse", "mae", "level_db")
     ) -> None:
-        self._window_frames = max(round(window_s * rate_hz), 1)
+        self._window_frames = max(round(window_s * rate_hz), 1)  # frames of a window
         self.windows = frames // self._window_frames
         self.ready = 0
-        self._done = 0
+        self._done = 0  # frames so far
         self.window_s = self._window_frames / rate_hz
         self.middle_s = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s + 1 / rate_hz
         self.curves = {name: np.full(self.windows, np.nan) for name in curves}
-        self._sums = np.zeros((5, self.windows + 1))  # of (û - u)², u², û², |û - u| and |u|
+        # of (û - u)², u², û², |û - u| and |u|, by window; the last is what follows the last whole window
+        self._sums = np.zeros((5, self.windows + 1))
 
     @property
     def rel_mse(self) -> float:
@@ -246,13 +249,16 @@ def _over_points(terms: Any) -> NDArray[np.float64]:
 
 
 def _totals(sums: NDArray[np.float64]) -> tuple[float, float]:
-    """The ratios of all sums (4, n) together."""
+    """Relative MSE and MAE of the sums (4, n) of `_ratios`, added up over n."""
     mse, mae = _ratios(sums.sum(1, keepdims=True))
     return float(mse[0]), float(mae[0])
 
 
 def _ratios(sums: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The ratios of sums (4, n); a silent truth matched by silence is no error, unmatched an infinite one."""
+    """Relative MSE and MAE, (n,) each, of sums (4, n): Σ(û - u)², Σu², Σ|û - u| and Σ|u|.
+
+    A silent truth matched by silence is no error, unmatched an infinite one.
+    """
     error, truth = sums[::2], sums[1::2]
     with np.errstate(divide="ignore", invalid="ignore"):
         mse, mae = np.where(truth == 0, np.where(error == 0, 0.0, math.inf), error / truth)

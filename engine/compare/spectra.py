@@ -53,7 +53,10 @@ def spectral_distances(
 
 
 def _at_resolution(predicted: NDArray[np.floating], truth: NDArray[np.floating], size: int) -> Array:
-    """(2, batch)."""
+    """Spectral convergence and mean difference in dB, (2, batch), of sounds (batch, samples), in windows of `size`.
+
+    Both are infinite where they are not a number.
+    """
     model, true = (magnitudes(sounds, _hann(size), max(1, size // 4)) for sounds in (predicted, truth))
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = np.sqrt(np.square(model - true).sum((1, 2)))
@@ -85,5 +88,6 @@ def _hann(size: int) -> Array:
 
 
 def _floor(true: Array, axes: tuple[int, int]) -> Array:
+    """The magnitude FLOOR_DB below the strongest over these axes, which are kept with size 1."""
     strongest = true.max(axes, keepdims=True) * 10 ** (FLOOR_DB / 20)
     return np.asarray(np.maximum(strongest, np.finfo(np.float64).tiny))

@@ -96,6 +96,7 @@ class Body:
 
 @lru_cache(maxsize=8)
 def _response(name: str, impulse: Impulse | None, size: float, rate_hz: int) -> NDArray[np.float64]:
+    """The response (frames, 2) of a body by its name, or of an impulse instead; remembered, not to be written."""
     from engine.effects.responses import of_given, of_modes  # brings the compiler
 
     if impulse is None:
@@ -128,7 +129,7 @@ def subsonic_hz(wood: Wood) -> float:
 @lru_cache(maxsize=8)
 def modes_of(wood: Wood) -> NDArray[np.float64]:
     """All modes at a size of 1, the lowest first, (4, modes): Hz, decay in 1/s, amplitudes left and right."""
-    draw, low = np.random.default_rng(wood.seed), len(wood.lowest)
+    draw, low = np.random.default_rng(wood.seed), len(wood.lowest)  # low: modes that are measured, one by one
     higher_hz = _higher_hz(wood, draw)
     frequency_hz = np.concatenate([[mode.frequency_hz for mode in wood.lowest], higher_hz])
     quality = np.concatenate([[mode.quality for mode in wood.lowest], np.full(len(higher_hz), wood.quality)])
@@ -148,13 +149,13 @@ def modes_of(wood: Wood) -> NDArray[np.float64]:
 
 
 def _density(wood: Wood, frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Modes a hertz."""
+    """Modes a hertz at frequencies (frequencies,), MOST_PER_HZ at most."""
     places, densities = zip(*wood.density, strict=True)
     return np.minimum(np.interp(frequency_hz, places, densities), MOST_PER_HZ)
 
 
 def _higher_hz(wood: Wood, draw: np.random.Generator) -> NDArray[np.float64]:
-    """Frequencies of the modes above the lowest, the same at any rate and size."""
+    """Frequencies in Hz, (modes,), of the modes above the lowest, the same at any rate and size."""
     first_hz, last_hz = wood.lowest[-1].frequency_hz, BODY_HIGHEST_HZ * bounds.BODY_SIZE[1]
     grid_hz = np.arange(first_hz, last_hz, 1.0)
     counted = np.cumsum(_density(wood, grid_hz))  # modes from the first one up to a frequency

@@ -59,7 +59,8 @@ class Wood:
         bright_hz: from here on their mean level falls by `fall_db` an octave: at 6 dB the bridge's mass, and
             radiation of a plate above coincidence (Cremer and Heckl, chapter 6).
         half_width_m: with it the directions to two ears differ from about c/2π half widths on.
-        seed: of 40 that with the most even response in third octaves, left, right and both.
+        seconds: length of the response at a size of 1.
+        seed: of the draws; of 40 tried, that with the most even response in third octaves, left, right and both.
         sources: of the figures.
     """
 

@@ -47,6 +47,7 @@ class Effects:
 
 @lru_cache(maxsize=4)
 def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
+    """The response (frames, 1 or 2) of `Effects.impulse`: one frame of 1 where there is neither body nor room."""
     body = effects.body if effects.body and effects.body.mix > 0 else None
     room = effects.room if effects.room and effects.room.mix > 0 else None
     impulse = np.ones((1, 1))
@@ -68,7 +69,10 @@ def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
 def _parts(
     body: Body | None, room: Room | None, rate_hz: int
 ) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64]]:
-    """The responses of body, room, and both in series, without frames where they are not there, and their powers."""
+    """The responses (frames, 2) of body, room, and both in series, and their powers (4, 4, 4).
+
+    What is not there has no frames.
+    """
     from engine.effects.responses import in_series, powers_of
 
     nothing = np.zeros((0, 2))

@@ -15,7 +15,7 @@ LONGEST_S = 2 * bounds.LONGEST_IMPULSE_S  # a body's and a room's
 
 
 def work_space(size: int) -> NDArray[np.float64]:
-    """A work space for transforms of up to so many numbers."""
+    """A work space for transforms of up to so many numbers: (rows, a power of two), two of them cosines and sines."""
     work = np.empty((fourier.ROWS, fourier.power_of_two(max(size, 4))))
     fourier.fill_circle(work[fourier.COSINES], work[fourier.SINES])
     return work
@@ -55,7 +55,13 @@ def as_loud(samples: NDArray[np.float64], rate_hz: float) -> Response:
 
 
 def of_modes(modes: NDArray[np.float64], seconds: float, subsonic_hz: float, size: float, rate_hz: float) -> Response:
-    """The response of a body of modes, see `engine.kernels.bodies`."""
+    """The response of a body of modes, see `engine.kernels.bodies`.
+
+    Args:
+        modes: (4, modes) at a size of 1: Hz, decay in 1/s, amplitudes left and right.
+        seconds: the length at a size of 1.
+        subsonic_hz: below it the body radiates next to nothing, at a size of 1.
+    """
     size, rate_hz = float(size), float(rate_hz)
     response = np.empty((bodies.rung_frames(seconds, size, rate_hz), 2))
     bodies.respond(_work_at(len(response), rate_hz), modes, subsonic_hz, size, rate_hz, response)

@@ -20,22 +20,28 @@ def stiffening(energies: Tensor, omega: Tensor, coupling: Tensor) -> Tensor:
     """ω√(1 + 2κ/ω) - ω - Im K E of actions E, (..., n), where κ = Im K q² of the amplitudes' squares q².
 
     Args:
+        energies: E, (..., n): the squares of the actions' roots.
         omega: ω in rad/sample, (n,).
         coupling: Im K in rad/sample, transposed: (n, n).
     """
     shares = coupling / omega
     linear = energies @ shares
-    share = linear
+    share = linear  # κ/ω of each mode, (..., n)
     for _ in range(FIXED_POINT_STEPS):
         share = (energies / (1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt()) @ shares
     return omega * ((1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt() - 1 - linear)
 
 
 def adiabatic_change(squares: Tensor, weight: Tensor) -> Tensor:
-    """The nepers of a mode's amplitude below its action's root, or above: ± log(1 + 4|A q²|)/4.
+    """The nepers from an amplitude to its action's root (A positive), or back (A negative): ± log(1 + 4|A q²|)/4.
 
     Args:
-        squares: of the amplitudes where A is positive (an encoder's), of the actions' roots where it is negative.
+        squares: (..., n): of the amplitudes where A is positive (an encoder's), of the actions' roots where it is
+            negative.
+        weight: A, (n, n).
+
+    Returns:
+        (..., n).
     """
     change = nn.functional.linear(squares, weight)
     falls = (change < 0).to(change.dtype)

@@ -21,9 +21,9 @@ def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Ten
     left = samples[:, :-1:2]
     middle = samples[:, 1::2]
     right = samples[:, 2::2]
-    whole = torch.cumsum((left + 4 * middle + right) / 6, dim=1)
+    whole = torch.cumsum((left + 4 * middle + right) / 6, dim=1)  # from 0 to the end of each segment
     segment = positions.floor().long().clamp(0, left.shape[1] - 1)
-    u = (positions - segment)[:, None]
+    u = (positions - segment)[:, None]  # 0 … 1 within the segment, (times, 1)
     left = left[:, segment]
     middle = middle[:, segment]
     right = right[:, segment]
@@ -34,7 +34,10 @@ def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Ten
 
 
 def hermite(count: int, like: Tensor) -> Tensor:
-    """Weights (count, 4) of the values and of the slopes at both ends of a unit segment, at 0, 1/count, …"""
+    """Weights (count, 4) of a unit segment's left and right value, left and right slope, at 0, 1/count, …
+
+    Their type and device are those of the tensor `like`.
+    """
     share = torch.arange(count, device=like.device).double() / count
     square, cube = share**2, share**3
     right = 3 * square - 2 * cube

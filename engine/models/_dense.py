@@ -17,12 +17,15 @@ from torch.nn import functional
 
 FEWEST_ROWS = 2048  # below, the calls cost as much
 PARTED_ON = ("cuda",)  # kinds of device
-PARTS = range(32, 1, -1)  # of the rows, on a GPU
-WIDTHS = range(128, 31, -1)  # rows of an image: all in one image is slower than a product
+PARTS = range(32, 1, -1)  # numbers of parts of the rows on a GPU, the best first
+WIDTHS = range(128, 31, -1)  # numbers of rows of an image, the best first: all in one image is slower than a product
 
 
 def linear(inputs: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
-    """`torch.nn.functional.linear`: (..., in) to (..., out)."""
+    """The product of `torch.nn.functional.linear`: inputs (..., in) by weight (out, in) to (..., out).
+
+    Few rows, other types and calls without gradients take that function itself.
+    """
     rows = inputs.numel() // weight.shape[1]
     plain = inputs.device.type in ("cpu", "cuda") and inputs.dtype == torch.float32
     if not plain or rows < FEWEST_ROWS or not torch.is_grad_enabled():

@@ -21,7 +21,7 @@ from engine.models.base import LINEAR_STRING, Physics, StringModel
 from engine.models.eigenvalues import StoredEigenvalues
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
-SEGMENT = 64  # frames of the fine table of powers
+SEGMENT = 64  # frames of the fine table of powers in `successive_latents`
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class DiagonalModel(StringModel[KoopmanState]):
         """Displacement (..., points) of latents (..., state_size)."""
 
     def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
-        first, last = state.step + 1, state.step + steps
+        """The next `steps` frames (batch, steps, points), decoded in blocks, and the state after them."""
+        first, last = state.step + 1, state.step + steps  # numbers of frames since the release
         blocks = [
             self.decode(self.successive_latents(state.origin, done, min(FRAMES_AT_ONCE, last + 1 - done)), readout)
             for done in range(first, last + 1, FRAMES_AT_ONCE)
@@ -68,7 +69,7 @@ class DiagonalModel(StringModel[KoopmanState]):
         instead of a sine and a cosine.
         """
         starts = self.powers(torch.arange(first, first + count, SEGMENT, device=origin.device))
-        coarse = (origin[:, None] * starts).to(origin.dtype)
+        coarse = (origin[:, None] * starts).to(origin.dtype)  # every SEGMENT-th frame, (batch, starts, state_size)
         fine = self.powers(torch.arange(min(SEGMENT, count), device=origin.device)).to(origin.dtype)
         return (coarse[:, :, None] * fine).flatten(1, 2)[:, :count]
 
@@ -156,6 +157,7 @@ def linear_string_eigenvalues(
     if size < modes:
         raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {size}")
     linear = physics.log_eigenvalues[torch.arange(size) % modes]
+    # a factor of each decay rate, 1/3 … 3; 1 for the modes themselves
     stretch = 3.0 ** (2 * torch.rand(size, generator=generator, dtype=torch.float64) - 1)
     stretch[:modes] = 1
     repetition = torch.arange(size) // modes
@@ -187,6 +189,7 @@ def dense_layers(model: nn.Module) -> list[nn.Linear]:
 
 
 def draw_orthogonal(layers: Iterable[nn.Linear], generator: torch.Generator) -> None:
+    """Draw orthogonal weights; biases are set to zero."""
     for layer in layers:
         nn.init.orthogonal_(layer.weight, generator=generator)
         nn.init.zeros_(layer.bias)

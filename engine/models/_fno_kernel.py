@@ -31,10 +31,14 @@ def advance_fgru(
     convolutions: Pair,
     out: Pair,
 ) -> None:
-    """Advance `hidden` (points, width) in place; write frames (steps, points).
+    """Advance an FGRU's `hidden` (points, width) in place, by a step for each of the frames that it writes.
 
-    Each pair is weights and biases. convolutions, of z, r and the candidate: (3, frequencies, width in, 2, width
-    out) and, as fields, (3, points, width). out: (1, width, 1) and (1, 1).
+    Args:
+        frames: written: displacement after each step, (steps, points).
+        transforms: the folded transform and its inverse, as `transform_matrices` gives them.
+        convolutions: weights (3, frequencies, width in, 2, width out) of z, r and the candidate, and their biases as
+            fields, (3, points, width).
+        out: weights (1, width, 1) and bias (1, 1) of the map to displacement.
     """
     points, width = hidden.shape
     forward, inverse = transforms
@@ -99,7 +103,12 @@ def advance_frnn(
 
 @kernel
 def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> None:
-    """The spectrum of a field, by its symmetric and its antisymmetric half."""
+    """Write the spectrum (2, frequencies, width) of a field (points, width), by its symmetric and antisymmetric half.
+
+    Args:
+        forward: the folded transform, (2, frequencies, half) with half = points // 2 + 1.
+        folded: work space, (2, half, width).
+    """
     points, width = field.shape
     folded[:] = field[: points // 2 + 1]
     for t in range(1, (points + 1) // 2):  # the first point and a middle one stand alone
@@ -114,7 +123,13 @@ def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> No
 def _convolve(
     spectrum: Array, weights: Array, bias: Array, inverse: Array, product: Array, folded: Array, field: Array
 ) -> None:
-    """The field whose spectrum is weights × spectrum, plus the bias, which is already a field."""
+    """Write the field (points, width) whose spectrum is weights × spectrum, plus the bias, which is already a field.
+
+    Args:
+        weights: (frequencies, width in, 2, width out).
+        inverse: the inverse of the folded transform, (2, half, frequencies).
+        product, folded: work space, as a spectrum (2, frequencies, width) and (2, half, width).
+    """
     points, width = field.shape
     for k in range(points):
         re, im = product[0, k], product[1, k]
@@ -140,7 +155,7 @@ def _convolve(
 
 @kernel
 def _read(hidden: Array, out: Pair, frame: Array) -> None:
-    """The displacement of every point."""
+    """Write the displacement of every point to `frame` (points,); `out` as in `advance_fgru`."""
     weights, biases = out
     for t in range(hidden.shape[0]):
         total = biases[0, 0]

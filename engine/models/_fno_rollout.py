@@ -5,7 +5,8 @@ single frequencies, and call. Here it is some ten matrix products: the folded tr
 (`_fno_transform`) of all strings together, and at each frequency one real matrix for real and imaginary parts of all
 channels; the gates z and r, which see the same field, in one.
 
-Fields are (points, batch, width), spectra (frequencies, batch, 2·width) with the real parts first.
+Fields are (points, batch, width), width being the number of channels. Spectra are (frequencies, batch, 2·width) with
+the real parts of all channels first, and as many frequencies as points. Below, half = points // 2 + 1.
 """
 
 from __future__ import annotations
@@ -26,22 +27,33 @@ def channel_matrices(weight: Tensor) -> Tensor:
 
 
 def joined(first: Tensor, second: Tensor) -> Tensor:
-    """Two convolutions of one field in one: matrices (frequency, 2·in, 2·out) to (frequency, 2·in, 4·out)."""
+    """Two convolutions of one field in one: matrices (frequency, 2·in, 2·out) to (frequency, 2·in, 4·out).
+
+    Outputs are the real parts of the first and of the second, then the imaginary parts of both.
+    """
     pairs = zip(first.chunk(2, 2), second.chunk(2, 2), strict=True)  # of real, then of imaginary parts
     return torch.cat([part for pair in pairs for part in pair], 2)
 
 
 @cache
 def _matrices(points: int, dtype: torch.dtype, device: torch.device) -> tuple[Tensor, Tensor]:
-    """The folded transform and its inverse."""
+    """The folded transform (2, frequencies, half) and its inverse (2, half, frequencies), see `exact_matrices`."""
     forward, inverse = (torch.from_numpy(matrix).to(device, dtype) for matrix in exact_matrices(points))
     return forward, inverse
 
 
 def _analyse(field: Tensor, matrix: Tensor) -> Tensor:
+    """The spectrum (frequencies, batch, 2·width) of a field (points, batch, width), real parts first.
+
+    The field is folded in its middle: sums of mirrored points give the real parts, differences the imaginary ones.
+
+    Args:
+        matrix: the folded transform, (2, frequencies, half).
+    """
     points, batch, width = field.shape
     half = points // 2 + 1
-    # the first point and a middle one stand alone
+    # the second half of the points, backwards, (half, batch, width): 0 for the first point and a middle one, which
+    # have no mirror image
     mirrored = functional.pad(field[half:].flip(0), (0, 0, 0, 0, 1, 2 * half - 1 - points))
     folded = torch.stack([field[:half] + mirrored, field[:half] - mirrored])
     parts = torch.bmm(matrix, folded.view(2, half, batch * width)).view(2, points, batch, width)
@@ -49,9 +61,13 @@ def _analyse(field: Tensor, matrix: Tensor) -> Tensor:
 
 
 def _synthesise(spectrum: Tensor, matrix: Tensor) -> Tensor:
-    """The field (points, batch, width / 2) of a spectrum (points, batch, width): width is real, then imaginary parts.
+    """The field (points, batch, channels) of a spectrum (frequencies, batch, 2·channels), real parts first.
 
-    The cosines and sines of `matrix` give half of the points; the other half mirrors them.
+    Cosines give the symmetric part of the field and sines the antisymmetric one, on half of the points; the other
+    half is their difference, mirrored.
+
+    Args:
+        matrix: the inverse of the folded transform, (2, half, frequencies).
     """
     points, batch, width = spectrum.shape
     parts = torch.stack(spectrum.chunk(2, dim=2)).view(2, points, batch * width // 2)
@@ -63,11 +79,12 @@ def _synthesise(spectrum: Tensor, matrix: Tensor) -> Tensor:
 def fgru_rollout(
     hidden: Tensor, gates: Tensor, gates_bias: Tensor, candidate: Tensor, bias: Tensor, steps: int
 ) -> Tensor:
-    """The hidden fields after each step, (steps, points, batch, width).
+    """The hidden fields of an FGRU after each of `steps` steps, (steps, points, batch, width).
 
     Args:
-        gates, gates_bias: of z and r, (frequency, 2·width, 4·width) and (points, 2·width).
-        candidate, bias: the same, half as wide.
+        hidden: the field before the first step, (points, batch, width).
+        gates, gates_bias: of z and r, `joined`: (frequency, 2·width, 4·width) and, in space, (points, 2·width).
+        candidate, bias: of tanh's argument, (frequency, 2·width, 2·width) and (points, width).
     """
     forward, inverse = _matrices(len(hidden), hidden.dtype, hidden.device)
     fields = []
@@ -83,11 +100,12 @@ def fgru_rollout(
 def frnn_rollout(
     hidden: Tensor, matrices: Tensor, biases: Tensor, pointwise: Tensor, offsets: Tensor, steps: int
 ) -> Tensor:
-    """The hidden fields after each step, (steps, points, batch, width).
+    """The hidden fields of an FRNN after each of `steps` steps, (steps, points, batch, width).
 
     Args:
-        matrices, biases: (depth, frequency, 2·width, 2·width) and (depth, points, width).
-        pointwise, offsets: (depth, width out, width in) and (depth, width).
+        hidden: the field before the first step, (points, batch, width).
+        matrices, biases: of the Fourier layers, (depth, frequency, 2·width, 2·width) and (depth, points, width).
+        pointwise, offsets: of the layers at each point, (depth, width out, width in) and (depth, width).
     """
     forward, inverse = _matrices(len(hidden), hidden.dtype, hidden.device)
     fields = []

@@ -14,9 +14,10 @@ def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> No
     """x_k = λ x_{k-1} + v_k step by step in float64, in place.
 
     Args:
-        inputs: (steps, batch, 2, n), apart in real and imaginary parts, so that the loop becomes vector instructions.
-        eigenvalues: float64 (n, 2).
-        state: float64 (batch, n, 2).
+        inputs: v, overwritten by x: (steps, batch, 2, n), apart in real and imaginary parts, so that the loop becomes
+            vector instructions.
+        eigenvalues: λ, float64 (n, 2), real and imaginary parts.
+        state: x before the first step, overwritten by the last x: float64 (batch, n, 2).
     """
     steps, batch, _, n = inputs.shape
     a, b = eigenvalues[:, 0].copy(), eigenvalues[:, 1].copy()

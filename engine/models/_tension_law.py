@@ -31,12 +31,14 @@ LEAST_GROWTH = 1e-9  # of A in a quotient: gradients stay finite
 class KoopmanTensionState:
     """The state of the latents.
 
+    *Nodes* divide each frame evenly; at each of them the tension kicks the latents, see `koopman_tension`.
+
     Attributes:
         x, y: z before the kick at the present node, float64 (batch, modes); before the first frame, the mode itself:
             q and -(v + σq)/ω.
-        largest_energy: of Σ ω² |z|², at the present, (batch,).
-        largest_stretch: of S, (batch,).
-        nodes: of a frame, (batch,); None before the first.
+        largest_energy: bound of Σ ω² |z|² at the present, (batch,).
+        largest_stretch: bound of S, (batch,).
+        nodes: how many there are in a frame, (batch,); None before the first frame.
         begun: whether a frame was asked for: before it x and y are the mode itself.
     """
 
@@ -48,17 +50,20 @@ class KoopmanTensionState:
     begun: bool = False
 
     def rows(self, index: NDArray[np.int64]) -> KoopmanTensionState:
-        """The state of some of the strings."""
+        """The state of the strings with these numbers, int64 (strings,)."""
         x, y, energy, stretch = (getattr(self, name)[index] for name in OF_STRINGS)
         nodes = None if self.nodes is None else self.nodes[index]
         return KoopmanTensionState(x, y, energy, stretch, nodes, self.begun)
 
 
-OF_STRINGS = ("x", "y", "largest_energy", "largest_stretch")
+OF_STRINGS = ("x", "y", "largest_energy", "largest_stretch")  # fields with a row for each string
 
 
 class Step(NamedTuple):
-    """The factors of a step from node to node, `nodes` of them to a frame; float64 (modes,) each."""
+    """The factors of a step from node to node, `nodes` of them to a frame; float64 (modes,) each.
+
+    The length of a step is h = 1/nodes frames; A, r and p are the learned curves at the phase hω, and κ = h² k.
+    """
 
     nodes: int
     decay: float  # of the largest energy, a frame
@@ -66,7 +71,7 @@ class Step(NamedTuple):
     sine: Values  # Im λ
     kick: Values  # h k A/ω
     stretch: Values  # η² A
-    ratio: Values  # κ r/A; 0 where A is
+    ratio: Values  # κ r/A; 0 where A is 0
     seen: Values  # κ p
     squares: Values  # ω²
 
@@ -88,6 +93,7 @@ class TensionLaw:
         theta_log: of ω, rad/sample.
         coupling: k in 1/samples².
         stretch: η² in 1/(normalised displacement)².
+        shapes, analysis: amplitudes to displacement, (modes, grid_points), and back, (grid_points, modes).
     """
 
     configuration: KoopmanTensionConfiguration
@@ -142,9 +148,12 @@ class TensionLaw:
         return self._by_nodes(state, lambda part, step: self._compiled(part, step, steps))
 
     def _by_nodes(self, state: KoopmanTensionState, run: Run) -> tuple[Values, KoopmanTensionState]:
-        """Strings with the same number of nodes go together."""
+        """The motion of all strings, (batch, …), and the state after it: `run` takes those with equal nodes together.
+
+        Before the first frame, nodes are chosen and the strings set out.
+        """
         nodes = self._nodes(state) if state.nodes is None else state.nodes
-        state, ran = replace(state, nodes=nodes), []
+        state, ran = replace(state, nodes=nodes), []  # ran: motion and state of each group
         counts = np.unique(nodes).tolist() or [1]  # of no string, any
         groups = [np.flatnonzero(nodes == count) for count in counts]
         for count, rows in zip(counts, groups, strict=True):
@@ -152,6 +161,7 @@ class TensionLaw:
             ran.append(run(part if state.begun else self._set_out(part, step), step))
         if len(ran) == 1:
             return ran[0]
+        # place: where each string of the batch is in the groups, one behind the other
         place, join = np.concatenate(groups).argsort(), library_of(state.x).concatenate
         x, y, energy, stretch = (join([getattr(part, name) for _, part in ran])[place] for name in OF_STRINGS)
         state = KoopmanTensionState(x, y, energy, stretch, nodes, begun=True)
@@ -192,7 +202,7 @@ class TensionLaw:
         return np.where(closest > 1, closest, 1).astype(np.int64)  # 1 where it is not a number
 
     def step(self, nodes: int) -> Step:
-        """The step from node to node."""
+        """The factors of a step where a frame has so many nodes."""
         library, (sigma, omega) = library_of(self.A), self._rates()
         h = 1 / nodes
         phase = h * omega
@@ -212,7 +222,7 @@ class TensionLaw:
         )
 
     def _curves(self, phase: Values) -> tuple[Values, Values, Values]:
-        """A, r and p of phases hω."""
+        """A, r and p, (modes,) each and within their bounds, at phases hω (modes,) in rad."""
         library = library_of(phase)
         argument = library.clip(2 * (phase / self.configuration.highest_phase) ** 2 - 1, -1, 1)
         orders = library.arange(len(self.A), dtype=library.float64)
@@ -231,7 +241,11 @@ class TensionLaw:
         return -state.y - sigma * state.x / omega
 
     def _set_out(self, state: KoopmanTensionState, step: Step) -> KoopmanTensionState:
-        """The coordinates in which kicks act, half a kick before the first node."""
+        """The state in the coordinates in which kicks act, half a kick before the first node.
+
+        Args:
+            state: before the first frame, as `encode_modes` gives it.
+        """
         q = state.x
         swing = self._swing(state)
         (_, omega) = self._rates()
@@ -247,6 +261,7 @@ class TensionLaw:
         return replace(state, x=x, y=state.y + (swing - lifted) - 0.5 * kick * x, begun=True)
 
     def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Values, KoopmanTensionState]:
+        """The amplitudes of the next frames, (batch, steps, modes), and the state after them, without gradients."""
         from engine.kernels.tension import advance  # Numba only when it is needed
 
         x, y, largest = (as_array(part).copy() for part in (state.x, state.y, state.largest_energy))
@@ -257,7 +272,7 @@ class TensionLaw:
         return restore(out), replace(state, x=restore(x), y=restore(y), largest_energy=restore(largest))
 
     def _plain(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Values, KoopmanTensionState]:
-        """The definition, which gradients pass through."""
+        """The results of `_compiled`, in operations that gradients pass through: the definition."""
         library = library_of(state.x)
         x = state.x
         y = state.y
@@ -278,7 +293,7 @@ class TensionLaw:
         return library.stack(frames, 1), replace(state, x=x, y=y, largest_energy=largest)
 
     def _rates(self) -> tuple[Values, Values]:
-        """σ and ω a sample."""
+        """σ in 1/samples and ω in rad a sample, (modes,) each, held where exponentials are finite."""
         library = library_of(self.nu_log)
         return library.exp(library.clip(self.nu_log, -30, 5)), library.exp(library.clip(self.theta_log, -16, 6))
 
@@ -320,6 +335,9 @@ def resonator_arrays(
     c: KoopmanTensionConfiguration, resonator: Resonator, rate_hz: float, scale_m: float
 ) -> dict[str, Array]:
     """The arrays of a resonator, its modes first; latents to spare rest: no shape, and no share in the tension.
+
+    Args:
+        scale_m: the model's unit of displacement.
 
     Raises:
         ValueError: it has more modes than the model, or another grid.

@@ -88,7 +88,7 @@ class StringModes:
 
     @property
     def drift(self) -> Tensor:
-        """The typical Σ κ_m q_m², (modes,)."""
+        """The typical rise of each mode's frequency, Σ_m κ_nm q_m² in rad/sample, (modes,): a mean over strings."""
         return self.coupling @ self.squares.mean(0)
 
 
@@ -179,7 +179,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
 @runtime_checkable
 class KoopmanModel(Protocol):
-    """A model whose latents can be had at any frame."""
+    """A model whose latents z can be had at any frame: from z(0), (batch, n), to z, (batch, frames, n)."""
 
     def encode(self, displacement: Tensor) -> Any: ...
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...

@@ -112,7 +112,7 @@ class KoopmanTensionConfiguration(_Sizes):
     """Sizes.
 
     Attributes:
-        modes: of the resonator, or more: those to spare rest.
+        modes: number of latents: as many as the resonator has modes, or more, which then rest.
         degree: of each curve's polynomial in (hω)².
         node_phase: the largest phase in rad that the first mode turns between nodes.
         highest_phase: the same of the highest mode; below π/2 no two modes are pumped.

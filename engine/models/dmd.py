@@ -39,11 +39,11 @@ class DMD(DiagonalModel):
     def __init__(self, configuration: DMDConfiguration) -> None:
         super().__init__(configuration)
         r = configuration.rank
-        self.magnitude_log = nn.Parameter(torch.full((r,), _VANISHED, dtype=torch.float64))
-        self.angle = nn.Parameter(torch.zeros(r, dtype=torch.float64))
+        self.magnitude_log = nn.Parameter(torch.full((r,), _VANISHED, dtype=torch.float64))  # log |λ| a sample
+        self.angle = nn.Parameter(torch.zeros(r, dtype=torch.float64))  # of λ, in rad a sample
         self.modes = nn.Parameter(torch.zeros(self.grid_points, 2 * r))  # Φ of one frame, real parts first
         self.encoder: Tensor
-        self.register_buffer("encoder", torch.zeros(self.grid_points, 2 * r))  # real parts first
+        self.register_buffer("encoder", torch.zeros(self.grid_points, 2 * r))  # b = u₀ @ encoder, real parts first
 
     @classmethod
     def fit(cls, trajectories: Tensor, configuration: DMDConfiguration) -> DMD:
@@ -119,12 +119,12 @@ class DMD(DiagonalModel):
 
 
 def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tensor]:
-    """Eigenvalues and modes of the embedding, in float64, the slowest decay first.
+    """Eigenvalues (n,) and modes (lags · grid_points, n), complex128, the slowest decay first; n is at most the rank.
 
     With the Hankel matrix H = QR of `lags + 1` frames a row, both snapshot matrices are columns of H. The SVD of
     R's columns is theirs: Q is never needed, R can be gathered block by block, and nothing is squared.
     """
-    r = torch.empty(0, (c.lags + 1) * c.grid_points, dtype=torch.float64)
+    r = torch.empty(0, (c.lags + 1) * c.grid_points, dtype=torch.float64)  # R so far
     for rows in _hankel_rows(trajectories, c.lags + 1):
         r = torch.linalg.qr(torch.cat([r, rows]), mode="r").R
     after, before = r[:, : -c.grid_points].T, r[:, c.grid_points :].T
@@ -137,7 +137,7 @@ def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tenso
     u = u[:, :kept]
     s = s[:kept]
     v = v[:kept].T
-    carried = after @ v / s
+    carried = after @ v / s  # A times the kept singular vectors
     eigenvalues, w = torch.linalg.eig(u.T @ carried)
     order = eigenvalues.abs().argsort(descending=True)
     eigenvalues, w = eigenvalues[order], w[:, order]
@@ -154,7 +154,12 @@ def _hankel_rows(trajectories: Tensor, frames: int) -> Iterator[Tensor]:
 
 
 def _encoder(c: DMDConfiguration, magnitude_log: Tensor, angle: Tensor, modes: Tensor) -> Tensor:
-    """b of a displacement: complex128 (n, grid_points). See `DMD.encode`."""
+    """The matrix, complex128 (n, grid_points), from a displacement to its amplitudes b; see `DMD.encode`.
+
+    Args:
+        magnitude_log, angle: of the eigenvalues, (n,).
+        modes: of the embedding, (lags · grid_points, n).
+    """
     frame = modes[: c.grid_points]
     if c.lags == 1:
         return torch.linalg.pinv(frame)

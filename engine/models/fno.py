@@ -74,16 +74,16 @@ class _FourierRecurrent(StringModel[FieldState]):
 
     initialisations: ClassVar = {"paper": ""}
     mapped: ClassVar = False  # its training calls compiled code
-    kept_fields: int  # of a step, for its gradient
+    kept_fields: int  # hidden fields that a step keeps for its gradient, an estimate of its memory
 
     def __init__(self, configuration: FGRUConfiguration | FRNNConfiguration) -> None:
         super().__init__(configuration)
-        self.in_mapping = nn.Linear(1, configuration.width)
-        self.out_mapping = nn.Linear(configuration.width, 1)
+        self.in_mapping = nn.Linear(1, configuration.width)  # displacement of a point to its channels
+        self.out_mapping = nn.Linear(configuration.width, 1)  # and back
 
     @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
-        """(grid_points, batch, width) to the fields after each step (steps, …)."""
+        """The fields after each step, (steps, grid_points, batch, width), of one (grid_points, batch, width)."""
 
     @abstractmethod
     def compiled(self) -> tuple[Callable[..., None], tuple[kernel.Pair, ...]]:
@@ -93,6 +93,10 @@ class _FourierRecurrent(StringModel[FieldState]):
         return FieldState(self.in_mapping(displacement[..., None]))
 
     def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
+        """The next `steps` frames (batch, steps, points) and the state after them, by the kernel where it serves.
+
+        A `readout` (grid_points, points) is applied to the frames of the whole grid.
+        """
         hidden = state.hidden
         learning = torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters()))
         paired = hidden.shape[-1] % 2 == 0  # the kernel takes channels two at a time
@@ -103,13 +107,18 @@ class _FourierRecurrent(StringModel[FieldState]):
         return frames, FieldState(hidden)
 
     def _advance_plain(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        """Displacement (batch, steps, grid_points), with gradients, and the last hidden field, as `hidden`.
+
+        Args:
+            hidden: (batch, grid_points, width).
+        """
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
         step_bytes = max(1, self.kept_fields * fields.numel() * fields.element_size())
         kept_bytes = KEPT_BYTES
         if hidden.device.type == "cuda":
             kept_bytes = int(KEPT_SHARE * torch.cuda.get_device_properties(hidden.device).total_memory)
-        length = min(steps, max(1, kept_bytes // step_bytes))
+        length = min(steps, max(1, kept_bytes // step_bytes))  # steps of a stretch
         for first in range(0, steps, length):
             count = min(length, steps - first)
             if length == steps:
@@ -121,6 +130,7 @@ class _FourierRecurrent(StringModel[FieldState]):
         return torch.cat(parts).permute(2, 0, 1), fields.transpose(0, 1)
 
     def _advance_compiled(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        """Compute the results of `_advance_plain`, without gradients, by the kernel, string by string."""
         fields = hidden.detach().clone(memory_format=torch.contiguous_format)
         frames = fields.new_empty(len(fields), steps, self.grid_points)
         advance, weights = self.compiled()
@@ -159,6 +169,7 @@ class FGRU(_FourierRecurrent):
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         z, r, candidate = (channel_matrices(layer.weight) for layer in (self.z_layer, self.r_layer, self.h_layer))
         gates_bias = torch.cat([self.z_layer.bias_field(), self.r_layer.bias_field()], dim=1)
+        # both gates see the same field: one convolution
         weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
         return fgru_rollout(hidden, *weights, steps)
 

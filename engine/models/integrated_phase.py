@@ -74,8 +74,9 @@ from engine.models.eigenvalues import StoredEigenvalues
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase again
-# Node spacings h after which the segments of a voice may be as long as those: of the energies' decay at any rate σ at
-# most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and between two nodes the network's integral is a cubic itself.
+# Node spacings h since the release, after which a voice's segments may be as long as such a spacing. Of the energies'
+# decay at any rate σ at most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and between two nodes the network's integral
+# is a cubic itself.
 SETTLED = 16
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
@@ -100,9 +101,9 @@ class IntegratedPhaseState:
 class _Rates(NamedTuple):
     """The parameters of the motion in float64, once for all blocks."""
 
-    sigma: Tensor  # 1/samples, (state_size,)
-    omega: Tensor
-    coupling: Tensor  # K in radians and nepers a sample, transposed: (state_size, 2 state_size)
+    sigma: Tensor  # σ, decay in 1/samples, (state_size,)
+    omega: Tensor  # ω in rad a sample, (state_size,)
+    coupling: Tensor  # K transposed: E @ coupling is in nepers, then in rad a sample, (state_size, 2 state_size)
 
 
 class _Motion(NamedTuple):
@@ -110,12 +111,17 @@ class _Motion(NamedTuple):
 
     gain: Tensor  # b tanh(Re I / b), in nepers
     phase: Tensor  # ωt + Im I
-    gain_rate: Tensor  # their slopes, a sample
-    phase_rate: Tensor
+    gain_rate: Tensor  # slope of `gain`, nepers a sample
+    phase_rate: Tensor  # slope of `phase`, rad a sample
 
 
 class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
-    """See the module."""
+    """The model of the module: an encoder, latents z that move by closed form and quadrature, and a decoder.
+
+    Frames are samples at the trained rate, frame 0 is the release. Where z is real numbers, the real parts of all
+    latents come before the imaginary parts. *Nodes* are the frames `node_spacing` apart from frame 0 on at which g is
+    evaluated; *segments* are the stretches that a render interpolates.
+    """
 
     any_frame: ClassVar = True
     initialisations: ClassVar = {
@@ -130,23 +136,24 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         super().__init__(configuration)
         c, n = configuration, configuration.state_size
         self.encoder = nn.Linear(c.grid_points, 2 * n)
-        self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)
+        self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)  # added to the encoder; None: none
         # float64: of frequencies rounded to 1e-7 the phase has within seconds a larger error than all else
-        self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
-        self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
-        self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
+        self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))  # log σ, σ in 1/samples
+        self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))  # log ω, ω in rad a sample
+        self.K = nn.Parameter(torch.zeros(2 * n, n))  # (f of each latent, by each latent's energy), in these units:
         self.energy_units: Tensor  # 1/(normalised displacement)²
         self.rate_units: Tensor  # 1/samples
         for name, unit in (("energy_units", 1.0), ("rate_units", RATE_UNIT)):
             self.register_buffer(name, torch.full((n,), unit, dtype=torch.float64))
         self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
         self.decoder = nn.Linear(2 * n, c.grid_points)
-        self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n))  # real parts first
-        self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n))
-        self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
+        self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n))  # (log gain then phase, by Re z² then Im z²)
+        self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n))  # likewise, before the decoder
+        self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None  # None: no adiabatic change
         self.A_out = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
 
     def encode(self, displacement: Tensor) -> IntegratedPhaseState:
+        """The state at frame 0 of displacements (batch, grid_points): y of the encoders, changed by M_in and A_in."""
         z = self.encoder(displacement)
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(displacement)
@@ -156,8 +163,13 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     def advance(
         self, state: IntegratedPhaseState, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, IntegratedPhaseState]:
+        """The next `steps` frames (batch, steps, points), rendered in blocks, and the state after them.
+
+        Args:
+            readout: (grid_points, points), applied to every frame; None: frames are on the grid.
+        """
         rates = self._rates()
-        most = max(1, NUMBERS_AT_ONCE // self.configuration.state_size)
+        most = max(1, NUMBERS_AT_ONCE // self.configuration.state_size)  # frames of a block
         blocks = []
         for done in range(0, steps, most):
             block, state = self._render(state, rates, min(most, steps - done), readout)
@@ -165,6 +177,10 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         return torch.cat(blocks, dim=1), state
 
     def sample(self, state: IntegratedPhaseState, frames: Tensor, steps: int) -> tuple[Tensor, IntegratedPhaseState]:
+        """The frames (batch, frames, grid_points) of these numbers, 1 … steps, counted from the state's time.
+
+        The state that is returned is that after all `steps`.
+        """
         rates = self._rates()
         times = (state.time + frames).double()
         end = state.time + steps
@@ -183,7 +199,8 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         return self._displacement(latents.real, latents.imag, None, slice(None))
 
     def _rates(self) -> _Rates:
-        # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample
+        """σ, ω and K of the parameters, with K's units multiplied in."""
+        # below 1e-9, σ is as good as none, and 0 would be divided by; above 1e3, all is over within a sample
         sigma = self.nu_log.exp().clamp(1e-9, 1e3)
         coupling = self.K.double().T * self.energy_units[:, None] * self._rate_units
         return _Rates(sigma, self.theta_log.exp(), coupling)
@@ -196,15 +213,22 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         Level and phase are computed at the ends of short segments, in float64, and are cubics with the right slopes
         in between (Hermite). This leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
         costs a sine, a cosine and an exponential a latent.
+
+        Args:
+            readout: (grid_points, points), folded into the decoder; None: frames are on the grid.
+
+        Returns:
+            displacement (batch, count, points or grid_points) in normalised units, and the later state.
         """
-        length = min(SEGMENT, self.configuration.node_spacing)
+        length = min(SEGMENT, self.configuration.node_spacing)  # frames of a segment
         ends, alive, later = self._segments(state, rates, count, length)
-        ends = ends[..., alive].to(self.decoder.weight.dtype)
-        # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
+        ends = ends[..., alive].to(self.decoder.weight.dtype)  # (4, 2, batch, segments, latents alive)
+        # log |z| and phase, (length, batch, segments, latents alive) each: all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
         radius = torch.exp(log_radius)
         frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
-        begin = (state.time + 1) % length
+        begin = (state.time + 1) % length  # frames of the first segment before the next frame
+        # (length, batch, segments, points) to (batch, segments · length, points), of which `count` frames are kept
         return frames.permute(1, 2, 0, 3).flatten(1, 2)[:, begin : begin + count], later
 
     def _segments(
@@ -212,27 +236,31 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     ) -> tuple[Tensor, Tensor, IntegratedPhaseState]:
         """Cubics of log |z| and of its phase in the segments of `length` frames that hold the next `count` frames.
 
-        Segments lie at fixed frames, so a frame is the same in whichever block it is rendered. A gain that would
-        change by more than b in a segment, which no string does, has its slope held there: so within a segment no
-        gain exceeds b by more than 8/27 of it.
+        Segments begin at multiples of `length`, so a frame is the same in whichever block it is rendered. A gain that
+        would change by more than b in a segment, which no string does, has its slope held there: so within a segment
+        no gain exceeds b by more than 8/27 of it.
 
         Returns:
-            left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases; the
-            latents that are loud enough to count; and the state after those frames.
+            ends: values at the left and right end, then slopes there, per segment; float64
+                (4, 2, batch, segments, state_size), log |z| in nepers before phases in rad.
+            alive: numbers of the latents with log |z| above `SILENCE` at an end, in any string, int64 (latents,).
+            state: after those frames.
         """
-        first, last = (state.time + 1) // length, (state.time + count) // length
+        first, last = (state.time + 1) // length, (state.time + count) // length  # numbers of segments
+        # their ends, in samples since frame 0, (segments + 1,)
         times = torch.arange(first, last + 2, device=state.origin.device).double() * length
         end = state.time + count
         motion, integral = self._move(state, rates, times, end)
 
         start = state.origin.to(torch.complex128)[:, None]
         angle = torch.where(start == 0, 1, start).angle()  # at zero it has no gradient
+        # log |z|, (batch, segments + 1, state_size)
         level = motion.gain - rates.sigma * times[:, None] + start.abs().clamp(min=1e-300).log()
         # a string's high modes are over long before it is, and numbers too small for float32 are slow
         alive = (level.detach() > SILENCE).flatten(0, 1).any(0).nonzero()[:, 0]
         left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
         right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
-        held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)
+        held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)  # nepers a segment
         slopes = torch.stack([held - rates.sigma * length, motion.phase_rate * length])
         ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])
         return ends, alive, IntegratedPhaseState(state.origin, end, integral)
@@ -240,12 +268,14 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     def _move(self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: int) -> tuple[_Motion, Tensor]:
         """Gain and phase at `times` (times,) since frame 0, and the `integral` of a state at the time `end`.
 
-        Everything is float64: what adds up over millions of samples keeps its last digits.
+        Everything is float64: what adds up over millions of samples keeps its last digits. All times are in samples;
+        none of `times` lies before the node at which the integral of `state` ends. The second result has the shape
+        (batch, 2 state_size).
         """
         start = state.origin.to(torch.complex128)
-        energy = (start.real.square() + start.imag.square())[:, None]
-        fading = torch.exp(-2 * rates.sigma * times[:, None])
-        f = (energy * fading) @ rates.coupling
+        energy = (start.real.square() + start.imag.square())[:, None]  # E(0), (batch, 1, state_size)
+        fading = torch.exp(-2 * rates.sigma * times[:, None])  # (times, state_size)
+        f = (energy * fading) @ rates.coupling  # as the integral: (batch, times, 2 state_size), Re before Im
         integral = (energy * ((1 - fading) / (2 * rates.sigma))) @ rates.coupling
         integral_at_end = state.integral
         if self.g is not None or self.configuration.adiabatic:
@@ -267,16 +297,22 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     def _integrate_higher_orders(
         self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: int
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Integrate what f has beside K E, from where the state's integral ends.
+        """Integrate f(E) - K E over time, from the node at which the state's integral ends.
+
+        Args:
+            energy: E(0), (batch, 1, state_size).
+            times: in samples since frame 0, (times,).
+            end: the time of the later state.
 
         Returns:
-            to each of `times`, and the slopes there, float64 (batch, times, 2 state_size); to where the integral of a
-            state at the time `end` ends, (batch, 2 state_size).
+            the integrals to each of `times`, and f(E) - K E there, float64 (batch, times, 2 state_size); the integral
+            to the node at which that of the later state ends, (batch, 2 state_size).
         """
         spacing = self.configuration.node_spacing
         first, last = _integrated_nodes(state.time, spacing), _integrated_nodes(end, spacing)
         latest = max(times.tolist(), default=0.0)
         segments = max(1, math.ceil(latest / spacing) - first, last - first)
+        # the times of nodes and of the middles between them, (2 segments + 1,)
         nodes = torch.arange(2 * segments + 1, device=times.device).double() * (spacing / 2) + first * spacing
         f = self._higher_orders(energy * torch.exp(-2 * rates.sigma * nodes[:, None]), rates)
         positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
@@ -305,7 +341,13 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         return self.rate_units.repeat(2)
 
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
-        """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
+        """The displacement (..., points or grid_points) that the decoder gives for z.
+
+        Args:
+            real, imag: the parts of z, (..., latents), of the latents `alive` alone; the others count as 0.
+            readout: (grid_points, points), folded into the decoder; None: displacement is on the grid.
+            alive: numbers of latents, or a slice of all.
+        """
         real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
         weight, bias = read_layer(self.decoder, readout)
         of_real, of_imag = weight.chunk(2, dim=-1)
@@ -315,7 +357,14 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
     def _modulate(
         self, matrix: Tensor, adiabatic: Tensor | None, real: Tensor, imag: Tensor, alive: Tensor | slice
     ) -> tuple[Tensor, Tensor]:
-        """z ⊙ exp(M z²), and what A changes, on both parts of z, of the latents `alive`."""
+        """The real and imaginary parts of z ⊙ exp(M z² + change by A), (..., latents) as those given.
+
+        Args:
+            matrix: M, (2 state_size, 2 state_size).
+            adiabatic: A, (state_size, state_size); None: no change.
+            real, imag: the parts of z, of the latents `alive` alone.
+            alive: numbers of latents, or a slice of all.
+        """
         squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
         n = self.configuration.state_size
         weight = (matrix * self._modulation_units).view(2, n, 2, n)[:, alive][..., alive]
@@ -398,6 +447,10 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
         self.K[n : n + count, :count] = coupling.to(self.K.dtype)
 
     def _set_averaging(self, physics: Physics) -> None:
+        """Write averaging's closed form into K, M and A, as `set_weights` describes.
+
+        Latent n stands for mode n modulo the number of modes; only the first `modes` latents act on others.
+        """
         n, modes = self.configuration.state_size, physics.modes
         mode = torch.arange(n) % modes
         averaged = torch.zeros(2 * n, n, dtype=torch.float64)
@@ -413,6 +466,10 @@ class IntegratedPhase(StoredEigenvalues, StringModel[IntegratedPhaseState]):
             self.A_out.copy_(-self.A_in)
 
     def _set_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        """Write the linear string into eigenvalues, units, encoder and decoder, as "physics" of `set_weights`.
+
+        Latent n is encoded as mode n modulo the number of modes; only the first `modes` latents are decoded.
+        """
         n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         self.store_eigenvalues(log_eigenvalues)
@@ -436,6 +493,7 @@ def _integrated_nodes(time: int, spacing: int) -> int:
 
 
 def _at_rest(origin: Tensor) -> IntegratedPhaseState:
+    """The state at frame 0 of z(0), complex (batch, state_size)."""
     batch, n = origin.shape
     return IntegratedPhaseState(origin, 0, origin.real.new_zeros(batch, 2 * n, dtype=torch.float64))
 
@@ -447,6 +505,7 @@ def _latents(origin: Tensor, rates: _Rates, times: Tensor, motion: _Motion) -> T
 
 
 def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = True) -> nn.Sequential | None:
+    """Dense layers with SiLU between, from `values` inputs by the hidden `widths` to `outputs`; None: no widths."""
     if not widths:
         return None
     layers: list[nn.Module] = []

@@ -48,6 +48,7 @@ class Koopman(LearnedEigenvalues):
         self.decoder = perceptron(2 * n, *configuration.decoder_widths, configuration.grid_points)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
+        """Displacement (..., points) by the decoder of states, complex (..., n); `readout` joins its last layer."""
         first, *others = dense_layers(self.decoder)
         if not others:
             return dense(states, *read_layer(first, readout))
@@ -84,6 +85,7 @@ class Koopman(LearnedEigenvalues):
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, held_at=HELD_AT_EXACT, spare=False)
 
     def _set_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        """Write the start "physics" of `set_weights` into eigenvalues, encoder and decoder."""
         c = self.configuration
         sharpest = SHARPEST if physics.resonator.tension_modulated else 0.0
         self.store_eigenvalues(linear_string_eigenvalues(c.state_size, physics, generator, sharpest))
@@ -120,7 +122,7 @@ def _store_linear_map(
     """
     *hidden, last = layers
     matrix = matrix.double()
-    through = torch.eye(matrix.shape[1], dtype=torch.float64)
+    through = torch.eye(matrix.shape[1], dtype=torch.float64)  # the linear map so far, (units, inputs)
     silent = torch.zeros(matrix.shape[1], dtype=torch.float64)  # what a layer is given where the input is zero
     for layer in hidden:
         weight = (

@@ -99,6 +99,7 @@ class KoopmanTension(TensionLaw, StringModel[KoopmanTensionState]):
         return other.train(self.training)
 
     def _take(self, physics: Physics) -> None:
+        """Write the resonator's arrays, in the units of its rate and scale, into the buffers."""
         arrays = resonator_arrays(self.configuration, physics.resonator, physics.rate_hz, physics.scale_m)
         for name, array in arrays.items():
             getattr(self, name).copy_(torch.from_numpy(array))

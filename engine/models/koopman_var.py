@@ -38,6 +38,7 @@ class KoopmanVar(LearnedEigenvalues):
         self.encoder = Dense(configuration.grid_points, 2 * n)
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
+        # m: |z|² of all latents to a complex factor for each, real parts first
         self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
@@ -78,4 +79,5 @@ class KoopmanVar(LearnedEigenvalues):
 
 
 def _squared_radius(latents: Tensor) -> Tensor:
+    """|z|² of each latent, real, in the shape of `latents`."""
     return latents.real.square() + latents.imag.square()

@@ -24,7 +24,7 @@ class LRULayer(StoredEigenvalues, DiagonalSSM):
         super().__init__(states, points)
         self.nu_log = nn.Parameter(torch.zeros(states))
         self.theta_log = nn.Parameter(torch.zeros(states))
-        self.gamma_log = nn.Parameter(torch.zeros(states))
+        self.gamma_log = nn.Parameter(torch.zeros(states))  # log of the factor of each row of B
 
     def log_eigenvalues(self) -> Tensor:
         return self.eigenvalue_logs()

@@ -41,9 +41,9 @@ class S5Layer(DiagonalSSM):
     def __init__(self, states: int, points: int, hippo_blocks: int) -> None:
         super().__init__(states, points)
         self.hippo_blocks = hippo_blocks
-        self.Lambda_re = nn.Parameter(torch.full((states,), -0.5))
+        self.Lambda_re = nn.Parameter(torch.full((states,), -0.5))  # of Λ, per the source's unit of time
         self.Lambda_im = nn.Parameter(torch.zeros(states))
-        self.log_step = nn.Parameter(torch.zeros(states, 1))
+        self.log_step = nn.Parameter(torch.zeros(states, 1))  # log Δ: the length of a sample in that unit
 
     def log_eigenvalues(self) -> Tensor:
         return self._rates() * self.log_step[:, 0].double().exp()

@@ -74,13 +74,16 @@ def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tenso
 
 
 class _Recurrence(torch.autograd.Function):
-    """`recur`; the gradients u of the inputs are u_k = λ* u_{k+1} + g_k of those of the states, g."""
+    """`recur`; the gradients u of the inputs are u_k = λ* u_{k+1} + g_k of those of the states, g.
+
+    Arguments are v (steps, batch, n), log λ (n,), x before the first step (batch, n) and λ¹, λ² … (length, n).
+    """
 
     @staticmethod
     def vmap(
         info: Any, in_dims: tuple[int | None, ...], *arguments: Tensor
     ) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
-        """Seeds that are trained together are more states."""
+        """Compute the recurrences of several seeds, trained together, with states side by side on the last axis."""
         seeds = info.batch_size
 
         def joined(tensor: Tensor, seed_dim: int | None) -> Tensor:
@@ -101,6 +104,7 @@ class _Recurrence(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *of_outputs: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
+        """The gradients of v, log λ and the first x, from those of all states and of the last one."""
         state, power, states = ctx.saved_tensors
         of_states, of_last = of_outputs
         power = power.conj().resolve_conj()
@@ -117,20 +121,25 @@ def _scan(inputs: Tensor, power: Tensor, state: Tensor, backwards: bool = False)
     collects, however long the layer remembers and wherever a caller splits the time.
 
     Args:
+        inputs: v, complex (steps, batch, n).
         power: λ, λ² … as many as a chunk has steps, complex128 (length, n).
+        state: x before the first step, or behind the last, complex128 (batch, n).
+
+    Returns:
+        all states, like `inputs`, and the one that is reached last, complex128 (batch, n).
     """
     steps, *row = inputs.shape
     length = len(power)
     missing = -steps % length
     padding = inputs.new_zeros(missing, *row)
     padded = torch.cat([padding, inputs] if backwards else [inputs, padding])
-    states = padded.unflatten(0, (-1, length))  # a copy, which is overwritten
+    states = padded.unflatten(0, (-1, length))  # (chunks, length, batch, n): a copy, which is overwritten
     order = -1 if backwards else 1
     rows = states.unbind(1)[::order]  # (chunks, batch, n) each
     eigenvalue = power[0].to(inputs.dtype)
     for before, later in pairwise(rows):
         later.addcmul_(eigenvalue, before)
-    carries = [state]
+    carries = [state]  # x before each chunk, (batch, n), in the order of the recurrence
     for end in rows[-1].to(state.dtype).unbind(0)[::order][:-1]:
         carries.append(torch.addcmul(end, power[-1], carries[-1]))
     final = length - 1 - missing
@@ -166,9 +175,9 @@ class DiagonalSSM(nn.Module, ABC):
 
     def __init__(self, states: int, points: int) -> None:
         super().__init__()
-        self.B = nn.Parameter(torch.zeros(states, 2, points))
+        self.B = nn.Parameter(torch.zeros(states, 2, points))  # from which B̄ follows
         self.C = nn.Parameter(torch.zeros(points, states, 2))
-        self.D = nn.Parameter(torch.zeros(points))
+        self.D = nn.Parameter(torch.zeros(points))  # the way past the states
 
     @abstractmethod
     def log_eigenvalues(self) -> Tensor:
@@ -275,7 +284,12 @@ class FoldedBlock:
     gate: nn.Linear
 
     def __call__(self, frames: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Compute the block's output and state; `frames` may be overwritten."""
+        """The block's outputs, like `frames`, and its state after them.
+
+        Args:
+            frames: (steps, batch, features), which may be overwritten.
+            state: of the state-space layer before them, complex128 (batch, states).
+        """
         from engine.models import _ssm_kernel as kernel  # Numba only when it is needed
 
         last = state.clone()
@@ -323,6 +337,7 @@ class SSMString(StringModel[SSMState], ABC):
         """A layer of the model's kind and sizes."""
 
     def encode(self, displacement: Tensor) -> SSMState:
+        """The state at frame 0: the first layer's from displacements (batch, grid_points), the blocks' at zero."""
         origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
         of_blocks = (ssm.B.shape[0] for ssm in self._ssms()[1:])
         return SSMState((origin, *(origin.new_zeros(len(origin), states) for states in of_blocks)))
@@ -347,6 +362,11 @@ class SSMString(StringModel[SSMState], ABC):
             self._set_linear_string(physics)
 
     def _set_linear_string(self, physics: Physics) -> None:
+        """Write the linear string into the first layer, and let the blocks add nothing.
+
+        Raises:
+            ValueError: the first layer has fewer stored states than there are modes.
+        """
         modes, first = physics.modes, self.first_layer
         if first.B.shape[0] < modes:
             raise ValueError(
@@ -368,6 +388,7 @@ class SSMString(StringModel[SSMState], ABC):
         return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first
 
     def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
+        """The next `steps` frames (batch, steps, points), in stretches of bounded size, and the state after them."""
         # batch statistics need the whole time at once
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // max(1, len(state.latents[0])))
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
@@ -382,7 +403,7 @@ class SSMString(StringModel[SSMState], ABC):
     def _stretch(
         self, blocks: Sequence[GatedBlock | FoldedBlock], state: SSMState, steps: int
     ) -> tuple[Tensor, SSMState]:
-        """Frames, time-major, and the state after them."""
+        """The next frames, time-major (steps, batch, grid_points), by the first layer and `blocks`, and the state."""
         first = self.first_layer
         states, last = evolve(first.log_eigenvalues(), state.latents[0], steps, first.B.dtype.to_complex())
         frames, latents = first.output(states), [last]

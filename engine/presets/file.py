@@ -163,6 +163,7 @@ def preset_digest(path: Path) -> str:
 
 @functools.lru_cache(maxsize=512)
 def _digest(path: Path, changed_ns: int, size_bytes: int) -> str:
+    """SHA-256 of a file in hexadecimal, remembered by its path, time of change and size."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -205,6 +206,7 @@ def check_header(path: Path) -> None:
 
 
 def _info_of(path: Path, file: Any) -> PresetInfo:
+    """The checked metadata of an open safetensors file; `path` names it in messages. Raises PresetError."""
     text = (file.metadata() or {}).get(METADATA_KEY)
     if text is None:
         raise PresetError(f"{path}: has no {METADATA_KEY!r} metadata; it is not a preset of this program")
@@ -263,6 +265,7 @@ def _forms(path: Path, info: PresetInfo) -> dict[str, Form]:
 
 
 def _check_form(path: Path, name: str, expected: Form, tensor: Any) -> None:
+    """Raise PresetError where a tensor of a file, not yet read, has another shape or type than expected."""
     shape, kind = tuple(tensor.get_shape()), tensor.get_dtype()
     if shape != expected[0]:
         raise PresetError(f"{path}: tensor {name!r} has shape {shape}, expected {expected[0]}; get the preset again")

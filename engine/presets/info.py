@@ -165,6 +165,7 @@ class PresetInfo:
 
 
 def _middle(low: float, high: float, logarithmic: bool = False) -> float:
+    """The middle of a range, or its geometric mean where it is logarithmic, to four places."""
     return round(math.sqrt(low * high) if logarithmic else (low + high) / 2, 4)
 
 
@@ -194,6 +195,7 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
 
 
 def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
+    """The reason, in words, why a pluck raises the tension further than in training; empty where it does not."""
     limit = info.trained_range.tension_rise
     if limit is None or (rise := info.tension_rise(pluck)) <= limit:
         return []
@@ -201,6 +203,7 @@ def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
 
 
 def _beyond(name: str, value: float, trained: Bounds | None, unit: str = "") -> list[str]:
+    """The reason, in words, why a value lies outside its trained range; empty where it does not, or there is none."""
     if trained is None or trained[0] <= value <= trained[1]:
         return []
     return [f"{name} {value:.4g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]

@@ -56,7 +56,14 @@ def bending_nm(drum: DrumParameters) -> float:
 
 
 def around(drum: DrumParameters, highest_hz: float, most: int = MOST_MODES) -> kernel.Around:
-    """The kernels' input for modes: the surface's list, the air's table, and ka up to which it goes."""
+    """The kernels' input for modes: the surface's list, the air's table, and ka up to which that goes.
+
+    Args:
+        most: modes that are needed at most.
+
+    Returns:
+        rows of `surface.modes_below`, (4, modes); the table of `surface.air_below`, empty without air; and ka.
+    """
     numbers = numbers_of(drum)
     size_m = kernel.size(numbers)
     low = 1.2 * kernel.LOW_HZ * kernel.lowest(numbers) * size_m  # for its pitch
@@ -75,7 +82,7 @@ def modes_of(drum: DrumParameters, highest_hz: float, most: int = MOST_MODES) ->
     Raises:
         ValueError: there is none, or far too many; the message names the remedy.
     """
-    known, rows = around(drum, highest_hz, most), np.empty((kernel.ROWS, most))
+    known, rows = around(drum, highest_hz, most), np.empty((kernel.ROWS, most))  # rows: written by the kernel
     count = kernel.modes(numbers_of(drum), known, highest_hz, most, _work(known[0]), rows)
     if count == 0:
         raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
@@ -95,12 +102,13 @@ def tune(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumParameter
 
 
 def _work(rows: Array) -> Array:
+    """The kernels' work space for a surface's list of modes, (4, modes)."""
     return np.empty(4 * rows.shape[1] + kernel.ORDERS)
 
 
 @dataclass(frozen=True, eq=False)
 class DrumModes:
-    """Modes of a drum by rising frequency; see the module.
+    """Modes of a drum by rising frequency; see the module. Places are (x, y) from the centre, in half-lengths.
 
     Attributes:
         rows: (7, modes): those of a surface, then ω, mass in kg/m², and what is radiated of σ.

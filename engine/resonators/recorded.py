@@ -29,16 +29,18 @@ from engine.values.string import StringParameters
 if TYPE_CHECKING:
     from engine.kernels.recorded import Additions
 
-MOST_CENTS = 60.0
-RATIOS = (0.05, 20.0)
-ATTACK_PEAK = 32_767
+MOST_CENTS = 60.0  # of a partial from the law, or of the second polarisation from the first
+RATIOS = (0.05, 20.0)  # of decays
+ATTACK_PEAK = 32_767  # full scale of a recorded attack's samples
 LONGEST_ATTACK_S = 0.2
 OF_PARTIALS = ("cents", "ratio", "second_cents", "second_ratio", "second_share")
 
 
 @dataclass(frozen=True)
 class RecordedNote:
-    """The note as it was recorded: Re Σ a exp(s τ(t)), t in s after `begins`, free poles in t instead of τ.
+    """The note as it was recorded: Re Σ a exp(s τ(t)), summed over poles s = -σ + iω, t in s after `begins`.
+
+    Poles of partials glide with the string, in the time τ; free poles, which belong to none, have t in its place.
 
     Attributes:
         frames, onset, begins: of the recording, in its frames; what comes before the onset is silent.
@@ -72,14 +74,18 @@ class RecordedNote:
             raise ValueError("decay must not be below 0")
 
     def tau(self, t: Array) -> Array:
-        """The time in which the string does not glide."""
+        """The times τ in s, in which the string does not glide, at times t (frames,) in s after `begins`."""
         tau = t.copy()
         for time, share in zip(self.glide_s, self.glide, strict=True):
             tau -= share * time * np.expm1(-t / time)
         return tau
 
     def sound(self, rate_hz: int | None = None) -> Array:
-        """The samples of the whole recording, ±1 being full scale, float64."""
+        """The samples (frames,) of the whole recording, ±1 being full scale, float64.
+
+        Args:
+            rate_hz: None: the recording's.
+        """
         rate = rate_hz or self.rate_hz
         count = round(self.frames * rate / self.rate_hz)
         first = math.ceil(self.onset * rate / self.rate_hz)
@@ -197,12 +203,12 @@ class RecordedString:
         """
         partials = (modes + 1) // 2
         law = resonator_of(string, partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        partial, shares = np.arange(modes) // 2, [1.0] * modes
+        partial, shares = np.arange(modes) // 2, [1.0] * modes  # each mode's partial, from 0, and part of a pluck
         squares_and_sigma = np.concatenate([law.omega[partial] ** 2, law.sigma[partial]]).tolist()
         pitch_hz, *parts = self.additions
         additions: Any = pitch_hz, *(part.tolist() for part in parts)  # lists are faster, number by number
-        correct(additions, string.row, modes, squares_and_sigma)
-        split(additions, string.row, modes, shares)
+        correct(additions, string.row, modes, squares_and_sigma)  # in place
+        split(additions, string.row, modes, shares)  # in place
         rows = np.array(squares_and_sigma)
         return Resonator(
             omega=np.sqrt(rows[:modes]),
@@ -217,7 +223,12 @@ class RecordedString:
 
     @property
     def additions(self) -> Additions:
-        """The same as the laws of `engine.kernels.recorded` take it."""
+        """The same as the laws of `engine.kernels.recorded` take it.
+
+        Returns:
+            pitch in Hz; what each row fades to with the distance in pitch, (5,); logarithms of `smooth_hz` and of
+            `smooth_ratio`, (points,) each; rows (5, partials) in the order of `OF_PARTIALS`.
+        """
         rows = np.array([getattr(self, name) for name in OF_PARTIALS], float)
         rest = np.median(rows, axis=1)
         rest[:2] = 0.0, 1.0  # cents and ratio, if the note has no such frequency; the others fade to its median

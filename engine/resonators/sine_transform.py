@@ -38,6 +38,7 @@ def synthesis_matrix(grid_points: int, modes: int) -> Array:
 
 @lru_cache(maxsize=128)  # strings of many pitches have many numbers of modes, on one grid
 def _sines(grid_points: int, modes: int) -> Array:
+    """The matrix of `synthesis_matrix`, remembered: not to be written."""
     shapes = mode_shapes(grid_positions(grid_points), modes)
     shapes[:, 0] = shapes[:, -1] = 0
     return shapes

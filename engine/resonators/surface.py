@@ -71,12 +71,12 @@ class Surface:
 
 
 def tools() -> kernel.Tools:
-    """The kernels' tools without a table of Bessel functions."""
+    """The kernels' tools: an empty table of Bessel functions, so that they are computed, and work space (ORDERS,)."""
     return np.zeros((0, 0)), np.empty(kernel.ORDERS)
 
 
 def at_size_1(shape: str, aspect: float) -> Array:
-    """Number of a shape, length and width."""
+    """The number of a shape, its length and its width (3,), at the area π of a circle of radius 1."""
     round = shape == "circle"
     length = 2.0 if round else math.sqrt(math.pi * aspect)
     return np.array([SHAPES.index(shape), length, length if round else length / aspect])
@@ -84,7 +84,7 @@ def at_size_1(shape: str, aspect: float) -> Array:
 
 @lru_cache(maxsize=64)
 def modes_below(shape: str, aspect: float, reach: float) -> Array:
-    """All modes (4, modes) up to κ at a size of 1; see `Surface`."""
+    """All modes, rows (4, modes) of `Surface`, with κ up to `reach` at the size of `at_size_1`, by rising κ."""
     if shape == "circle":
         rows = np.empty((int(reach * reach / 4 + reach) + 10, kernel.SURFACE))
         rows = rows[: kernel.zeros(reach, rows, *np.empty((2, int(reach) + 2)), np.empty(kernel.ORDERS))]

@@ -41,6 +41,7 @@ def solve_dop853(
     reported = 0.0
 
     def right_side(time_s: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The time derivative of y, (2 modes,): amplitudes in m, then velocities; it also reports the progress."""
         nonlocal reported
         share = (len(trajectories) + time_s / span_s[1]) / len(starts)
         if share >= reported + REPORT_EVERY / len(starts):

@@ -93,13 +93,14 @@ class SplittingSolver:
         self.rate_hz = rate_hz
         self.tension_modulated = tension_modulated = resonator.tension_modulated
         self.substeps = (substeps or default_substeps(resonator, rate_hz)) if tension_modulated else 1
-        self._silence = silence
+        self._silence = silence  # 0: every mode moves for ever
         omega, eigenvalues = resonator.omega, resonator.eigenvalues()
         # sub-steps by how many modes move, and what depends on them, once for each number that there is
         wanted = np.ceil(self.substeps * omega / omega[-1]) if silence else np.full(modes, self.substeps)
         substeps_of, levels = np.unique(wanted.astype(np.int64), return_inverse=True)
-        steps_s = 1 / (rate_hz * substeps_of)[:, None]
+        steps_s = 1 / (rate_hz * substeps_of)[:, None]  # of a sub-step, (levels, 1)
         times_s = (np.array(ROTATIONS if tension_modulated else (1.0,)) * steps_s)[..., None]
+        # exact rotations, (levels, stages, 4, modes): a level is a number of sub-steps
         flows = np.stack(rotation(-eigenvalues.real, eigenvalues.imag, times_s), axis=-2)
         kicks = np.array(KICKS if tension_modulated else ()) * steps_s
         # flows, kicks, coupling, η², sub-steps, levels and ω², see `_splitting_kernel`
@@ -129,6 +130,7 @@ class SplittingSolver:
         return library_of(frames).concatenate([state.amplitude[:, None], frames], 1)
 
     def _advance_compiled(self, q: Array, v: Array, steps: int, frames: NDArray[np.int64], out: Array) -> None:
+        """Advance q and v (batch, modes) in place and write `out` (batch, frames, modes), on several threads."""
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.truth._splitting_kernel import advance
 

@@ -18,6 +18,11 @@ from engine.values.number import Number
 class StringParameters:
     """Physical parameters of a simply supported stiff string. Default: the paper's Table 1, nylon, B3.
 
+    Attributes:
+        area_m2, second_moment_m4: of the cross-section, A and I.
+        damping_d1_kg_m_s, damping_d3_kg_m_s: σ = (d₁ + d₃η²)/2ρA in 1/s of a mode with wavenumber η in rad/m.
+        tension_n: at rest, T₀.
+
     Raises:
         ValueError: a parameter is out of its bounds; the message names it.
     """

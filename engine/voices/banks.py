@@ -33,24 +33,27 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
 @bank_program.register
 @torch.no_grad()
 def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz: int) -> Program | None:
-    """The program of an integrated-phase model; None: it has more latents or layers than the kernel holds."""
+    """The program of an integrated-phase model; None: it has more latents or layers than the kernel holds.
+
+    The parts are what the kernel reads of it, in the order of `BANK_PARTS`; a part that a model lacks is empty.
+    """
     c, n = model.configuration, model.configuration.state_size
     widths = (n, *c.eigenvalue_widths)
     if max(widths) > MOST_LATENTS or len(widths) >= MOST_WIDTHS:
         return None
     rates = model._rates()
     network = np.zeros(0, np.float32)
-    at_zero = torch.zeros(2 * n)
-    sizes = [0]
+    at_zero = torch.zeros(2 * n)  # g(0)
+    sizes = [0]  # widths of g from the input on; [0]: there is no g
     if model.g is not None:
         at_zero = model.g(torch.zeros(n))
         layers = [layer for layer in model.g if isinstance(layer, nn.Linear)]
         sizes = [n, *(layer.out_features for layer in layers)]
         network = np.concatenate([_flat(layer) for layer in layers])
-    turn = rates.coupling[:, n:]
+    turn = rates.coupling[:, n:]  # Im K transposed, rad a sample, (n, n)
     matrix = (model.M_out * model._modulation_units).double().view(2, n, 2, n)
     modulation = matrix.permute(1, 3, 0, 2).contiguous()  # (of, by, gain or turn, of Re z² or of Im z²)
-    change = torch.zeros(0, dtype=torch.float64)
+    change = torch.zeros(0, dtype=torch.float64)  # A transposed
     if model.A_out is not None:
         change = (model.A_out * model._modulation_units[:n]).double().T.contiguous()
     values = {
@@ -115,12 +118,14 @@ def _bank(
     """The program of latents by their `BANK_PARTS`, which are σ, ω …, all in the model's units.
 
     Args:
+        rate_hz: the device's.
+        values: of the fields of `BANK_PROGRAM` that are the model's own.
         encode: a displacement's (grid_points,) latents (n,).
         decoder, offset: (grid_points, 2 n), real parts first, and (grid_points,).
     """
     omega = parts[1]
-    ratio = info.rate_hz / rate_hz
-    scale = info.scale_m / FULL_SCALE_M
+    ratio = info.rate_hz / rate_hz  # trained samples in a frame of the device
+    scale = info.scale_m / FULL_SCALE_M  # of full scale, for a normalised displacement of 1
     values = {**values, "modes": len(omega), "ratio": ratio, "loudness": math.log(scale)}
     memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
     if rate_hz != info.rate_hz:
@@ -146,6 +151,6 @@ def _origin(model: IntegratedPhase | DMD, displacement: Array) -> NDArray[np.com
 
 
 def _flat(layer: nn.Linear) -> NDArray[np.float32]:
-    """Bias, then weights by input, float32."""
+    """Bias (outputs,), then for each input its weights (outputs,), float32, in one row."""
     bias = torch.zeros(layer.out_features) if layer.bias is None else layer.bias
     return torch.cat([bias.detach(), layer.weight.detach().T.flatten()]).numpy().astype(np.float32)

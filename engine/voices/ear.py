@@ -14,7 +14,7 @@ from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
 from engine.values.ear import Ear
 
-KAISER_BETA = 8.0
+KAISER_BETA = 8.0  # shape of the differentiator's window
 
 
 def weights_of(ear: Ear, grid_points: int, force: Array | None = None) -> Array:
@@ -57,6 +57,7 @@ def largest(ear: Ear, displacement_m: Array, force: Array | None = None) -> floa
 
 @lru_cache(maxsize=16)  # asked for with every block
 def _weights(listening_points: tuple[float, ...], solo: int, grid_points: int) -> Array:
+    """Weights (grid_points, points) of the displacement at the points; above 0, mode `solo` alone is heard."""
     points = np.array(listening_points)
     if solo == 0:
         return listening_weights(points, grid_points)

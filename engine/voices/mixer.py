@@ -22,10 +22,10 @@ from engine.voices.memory import KernelMemory, Reading
 from engine.voices.player import CompiledPlayer
 from engine.voices.voice import Voice, possible_s
 
-LIMITER_RELEASE_S = 0.08
-VOLUME_SMOOTHING_S = 0.015
+LIMITER_RELEASE_S = 0.08  # time constant with which its level falls
+VOLUME_SMOOTHING_S = 0.015  # time constant of a change of volume
 LEFT_S = 0.03  # of the fade of a player's notes when two others have taken its place
-LEFT_FRAMES = 16_384  # after which no quantum can hold it: more than a device takes at once
+LEFT_FRAMES = 16_384  # after a player was set aside, no quantum plays it: more than a device takes at once
 CAUSES = {CAUSE_DEVICE: "device", CAUSE_STARVED: "rendering", CAUSE_RUNAWAY: "runaway"}
 
 
@@ -70,16 +70,18 @@ class Mixer(KernelMemory):
         self.record = record = record_of(self.memory, MIXER)
         self._lock = threading.Lock()
         self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
-        self._gaps_read = 0
+        self._gaps_read = 0  # gaps that `new_gaps` has been through
         self._effects_lock = threading.Lock()  # not the voices': a key never waits for a room
         self.effects = Effects()
-        self._convolver: NDArray[np.float64] | None = None
+        self._convolver: NDArray[np.float64] | None = None  # its memory; None: no body or room so far
         self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
-        self._players: list[tuple[CompiledPlayer, int]] = []  # whose memory may be in use, from which frame on
+        # whose memory may be in use, each with the mixer's frame at which it was last set, or set aside
+        self._players: list[tuple[CompiledPlayer, int]] = []
         record["rate_hz"] = rate_hz
         record["channels"], record["limiting"] = channels, limited
         record["wanted_volume"] = record["volume"] = record["reduction"] = 1.0
         record["gains"][:AHEAD] = 1.0
+        # what is left, after a frame, of the limiter's level and of a change of volume
         record["release"] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
         record["smoothing"] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
         record["taps"] = differentiator_taps(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
@@ -107,7 +109,10 @@ class Mixer(KernelMemory):
             self.publish("pushed", pushed + min(len(voices), room))
 
     def skip(self, voice: Voice, seconds: float) -> None:
-        """Let a voice ring unheard for so long before it is handed over, in this mixer's rooms."""
+        """Let a voice ring unheard for so long before it is handed over, in the work space of this mixer.
+
+        Handed over, it fades in from a gain of 0 as after any change of gain.
+        """
         from engine.kernels.voice import forward
 
         forward(voice.record, self.record, round(seconds * self.rate_hz))
@@ -115,9 +120,9 @@ class Mixer(KernelMemory):
         voice.record["gain"] = voice.record["gain_from"] = 0.0
 
     def set_player(self, player: CompiledPlayer) -> None:
-        """The events of this player are played from the next quantum on; what the one before has struck rings on.
+        """Set the player whose events are played from the next quantum on; the present one's notes ring on.
 
-        The notes of one before that fade out.
+        The notes of the player before the present one fade out.
 
         Raises:
             ValueError: it is of another rate.
@@ -125,7 +130,7 @@ class Mixer(KernelMemory):
         if player.rate_hz != self.rate_hz:
             raise ValueError(f"the player has {player.rate_hz} Hz, the mixer {self.rate_hz} Hz")
         with self._lock:
-            present, before = (int(self.record[name]) for name in ("player", "player_before"))
+            present, before = (int(self.record[name]) for name in ("player", "player_before"))  # addresses; 0: none
             if present == player.address:
                 return
             self._players = [(other, self.frames) for other, _ in self._players if other is not player]
@@ -137,7 +142,7 @@ class Mixer(KernelMemory):
             self._players.append((player, self.frames))
 
     def _forget_players(self) -> None:
-        """Free those that play nothing any more. Under the lock."""
+        """Free the players that play nothing any more. The caller holds the lock."""
         for player, _ in self._players:
             if player.address == int(self.record["player_before"]) and player.rests:
                 self.publish("player_before", 0)
@@ -177,13 +182,16 @@ class Mixer(KernelMemory):
             self._forget_impulses()
 
     def _forget_impulses(self) -> None:
-        """Free those that the kernels use no more; in the order in which none that moves up is missed."""
+        """Free the impulse responses that the kernels use no more.
+
+        The kernel moves a response from "effects" to "effects_next" to "effects_now": in this order none is missed.
+        """
         in_use = [int(self.record[name]) for name in ("effects", "effects_next", "effects_now")]
         # one that the kernel has just turned away from may be reported once more, after it was freed
         self._impulses = {address: self._impulses[address] for address in in_use if address in self._impulses}
 
     def forget_ended(self) -> None:
-        """Free what is over. Any thread, now and then."""
+        """Free voices that are over, and players and impulse responses out of use. Any thread, now and then."""
         with self._lock:
             self._voices = [voice for voice in self._voices if not voice.over]
             self._forget_players()
@@ -200,6 +208,7 @@ class Mixer(KernelMemory):
         """The next frames, (frames, channels), where no device takes them."""
         from engine.kernels.mixer import call
 
+        # the times of the callback are those of the sound itself
         out, times_s = np.zeros(frames * self.channels, np.float32), np.full(3, self.seconds)
         call.ctypes(None, out.ctypes.data, frames, times_s.ctypes.data, 0, self.address)
         return out.reshape(frames, self.channels)
@@ -230,7 +239,7 @@ class Mixer(KernelMemory):
         return delay_s + (possible_s(self.record["dac_s"] - self.record["now_s"]) or 0.0)
 
     def take_peak(self) -> float:
-        """The highest sample since it was asked for the last time."""
+        """The highest sample, 1 being full scale, since it was asked for the last time."""
         peak = float(self.record["peak"])
         self.record["peak"] = 0.0
         return peak

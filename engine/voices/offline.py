@@ -54,12 +54,12 @@ class ModelFrames:
     """The frames of a model, block by block from the release on: the same for pictures, ears and files."""
 
     def __init__(self, source: ModelSource, initial_m: Array) -> None:
-        self._source, self._initial_m = source, initial_m
-        self._state: SourceState | None = None
-        self._done = 0
+        self._source, self._initial_m = source, initial_m  # (grid_points,)
+        self._state: SourceState | None = None  # None: before the first block
+        self._done = 0  # frames so far
 
     def advance(self, most: int) -> NDArray[np.float32]:
-        """The next frames, `most` at most, (frames, grid_points) in m.
+        """The next frames, `most` at most, (frames, grid_points) in m; the first call gives frame 0 alone.
 
         Two short blocks let a voice begin soon: the first prepares the model, the second shows its speed.
 
@@ -107,9 +107,10 @@ def voice_blocks(
 
     Args:
         source: what renders the samples of a program that is not compiled.
-        advanced: receives the share that is done now and then; may raise, to end it.
-        until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
-            voice is over.
+        seconds: the length at most.
+        advanced: receives the share that is done, 0 … 1, now and then; may raise, to end it.
+        until_db: ends, with a little silence, where all of the string has fallen so far below its loudest, or where
+            the voice is over; None: only after `seconds`.
 
     Raises:
         Runaway: the output stopped being a string's.

@@ -25,15 +25,15 @@ from engine.voices.memory import KernelMemory
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
-PAGE_SLOTS = 512  # of 4 kB
-LOG_DB = 20 / math.log(10)
+PAGE_SLOTS = 512  # slots of 8 bytes in a page of 4 kB
+LOG_DB = 20 / math.log(10)  # dB of a neper
 
 REPORTED = tuple(name for name in REPORT.names or () if name != "own")
 
 
 @dataclass(frozen=True, eq=False)
 class Table(KernelMemory):
-    """An instrument as the kernels read it, with the memory that it points to.
+    """An instrument as the kernels read it, with the memory that it points to; a later one has a higher `serial`.
 
     Attributes:
         memory: `records.TABLE`, and what it points to.
@@ -62,9 +62,10 @@ class NoteReport:
         frame: of the mixer.
         string: on which of a set it is played, from the highest, 0; -1: the key chooses.
         table: serial of its instrument's table.
-        position, amplitude_mm, width: of the pluck.
+        position, amplitude_mm, width: of the pluck; place and width in lengths of the string.
+        gain: a factor, of the note.
         parameters: of its string as its key had it; None for drums, and for a string beyond the bounds.
-        note: which of the player's notes it is.
+        note: its place among the player's notes, 0 … MOST_NOTES - 1.
     """
 
     kind: int
@@ -109,6 +110,7 @@ class Playing:
     """The progress of a note that was begun.
 
     Attributes:
+        seconds: how long it has been ringing, as far as the device was given it.
         began_frame: of the mixer; 0 until its voices have begun.
         struck_to_began_s: from the gesture to the callback that gave its first samples; None: not known.
     """
@@ -120,9 +122,15 @@ class Playing:
 
 @dataclass(frozen=True)
 class Channel:
-    """The wheels and pedals of a channel; `slide` and `range_semitones`: None where never moved.
+    """The wheels, pedals and footswitches of a MIDI channel.
 
-    Tuning is in semitones and in 1/8192 of one.
+    Attributes:
+        bend: of the pitch wheel, -1 … 1.
+        pedal: whether the pedal that sustains is down; the other truth values are footswitches.
+        slide: 0 … 127; None: never moved.
+        range_semitones: of the bend; None: never set, the instrument's own counts.
+        mute, slide_time, volume, expression: 0 … 127.
+        coarse_tuning, fine_tuning: in semitones, and in 1/8192 of one.
     """
 
     bend: float
@@ -147,9 +155,16 @@ CHANNEL_VALUES = tuple(field.name for field in fields(Channel) if field.name not
 
 
 class CompiledPlayer(KernelMemory):
-    """Plays the instrument of its latest table in the mixer that it is given to.
+    """The player of the instrument of its latest table, in the mixer that it is given to.
+
+    An *event* is a gesture, such as a key, a wheel or another table. Events go through the *ring*, a part of the
+    memory with room for `EVENTS` of them, to the mixer's thread. That thread renders *quanta* of 64 frames. A *note*
+    is a key that was struck. It has a *voice* for each *source* of its table, such as the model and the truth. Its
+    *place* is the string that it is played on, which the latest note there has. A *course* is strings of one key that
+    sound together: each is a note, and the first, of `member` 0, stands for all in reports.
 
     Args:
+        rate_hz: the mixer's.
         modes: partials that a voice has at most.
         most_notes: that ring at once; the oldest makes room.
 
@@ -164,19 +179,20 @@ class CompiledPlayer(KernelMemory):
 
         self.rate_hz = rate_hz
         self.memory = memory = np.zeros(player_slots(modes + of.MOST_PAIRS))
-        self._voice_slots = voice_bytes(modes + of.MOST_PAIRS) // 8
+        self._voice_slots = voice_bytes(modes + of.MOST_PAIRS) // 8  # size of a voice's memory, in numbers of 8 bytes
+        # slots up to the end of the first AT_HAND notes' voices
         at_hand = slots(PLAYER) + AT_HAND * of.MOST_SOURCES * self._voice_slots
         memory[slots(PLAYER) : at_hand : PAGE_SLOTS] = 0.0  # else the audio thread would wait for pages of memory
         self.record = record = record_of(memory, PLAYER)
-        self._lock = threading.Lock()
-        self._ids = itertools.count(1)
-        self._backlog: deque[NDArray[np.void]] = deque()  # for which the ring has no room
-        self._tables: deque[Table] = deque()  # which the kernel may be reading, or will
-        self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
-        self._read = 0
+        self._lock = threading.Lock()  # of what hands events over, or frees what they point to
+        self._ids = itertools.count(1)  # numbers of events
+        self._backlog: deque[NDArray[np.void]] = deque()  # events for which the ring has no room yet
+        self._tables: deque[Table] = deque()  # which the kernel may be reading, or will; the oldest first
+        self._struck: dict[int, NDArray[np.float64]] = {}  # speeds of drums' modes, by event, until it is reported
+        self._read = 0  # reports that `reports` has been through
         self.missed = False
         record["rate_hz"] = rate_hz
-        record["modes"] = modes + of.MOST_PAIRS
+        record["modes"] = modes + of.MOST_PAIRS  # some partials have a second mode, of the other polarisation
         record["most"] = most_notes
         record["source_gains"] = 1.0
         begin(self.address)
@@ -196,13 +212,17 @@ class CompiledPlayer(KernelMemory):
         struck: NDArray[np.float64] | None = None,
         string: int | None = None,
     ) -> int:
-        """Hand an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
+        """Hand an event over; return its number, which reports of a note carry. Any thread, at once; none is lost.
 
         Args:
-            kind: one of `constants`, as all that follows.
+            kind: NOTE_ON, NOTE_OFF, BEND or another kind of event of `constants`.
+            channel: 0 … 16, of which 16 is the keys of the computer and the screen.
+            key: of a note; else the number of a controller, or of one of the instrument's values.
+            value: by kind: velocity, bend in -1 … 1, a controller's or a value's, semitones, or seconds of a fade.
             frame: of the mixer, at which it counts; 0: at once.
+            struck_s: time of the gesture on the device's clock; 0: not known.
             by_hand: the pluck of a note; None: as the instrument and the velocity have it.
-            note: the number of the note that is tuned, choked or cancelled; 0: all.
+            note: the event's number of the note that is tuned, choked or cancelled; 0: any.
             struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
             string: of a note: on which of a set it is played, from the highest, 0; None: channel or key choose.
         """
@@ -218,21 +238,22 @@ class CompiledPlayer(KernelMemory):
             if struck is not None:
                 event |= {"struck": struck.ctypes.data, "struck_modes": len(struck)}
                 self._struck[number] = struck
-                while len(self._struck) > of.EVENTS + of.QUEUED:
+                while len(self._struck) > of.EVENTS + of.QUEUED:  # more events do not wait to be played
                     del self._struck[next(iter(self._struck))]
             self._push(event)
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
-        """Play another table from a frame on; strings that ring glide to it. Any thread."""
+        """Play another table from a frame of the mixer on, 0: at once; strings that ring glide to it. Any thread."""
         with self._lock:
             self._tables.append(table)
+            # tables before the one that the kernel plays are read no more
             while self._tables[0].serial < int(self.record["serial"]):
                 self._tables.popleft()
             self._push({"kind": of.TABLE, "table": table.address, "frame": frame})
 
     def _push(self, values: Mapping[str, float]) -> None:
-        """Hand over an event with these values, the others 0. Under the lock."""
+        """Hand over an event whose fields have these values, the others 0. The caller holds the lock."""
         event = np.zeros((), EVENT)
         for name, value in values.items():
             event[name] = value
@@ -240,7 +261,7 @@ class CompiledPlayer(KernelMemory):
         self._flush()
 
     def _flush(self) -> None:
-        """Hand over what waits, as far as the ring has room. Under the lock."""
+        """Move events from the backlog to the ring, as far as it has room. The caller holds the lock."""
         pushed = int(self.record["pushed"])
         room = of.EVENTS - (pushed - int(self.record["taken"]))
         for number in range(min(room, len(self._backlog))):
@@ -249,7 +270,7 @@ class CompiledPlayer(KernelMemory):
 
     @property
     def waiting(self) -> int:
-        """Events that are still to be played."""
+        """The number of events still to be played: in the backlog, in the ring, and taken for a later frame."""
         with self._lock:
             self._flush()
             ring = int(self.record["pushed"] - self.record["taken"])
@@ -267,12 +288,12 @@ class CompiledPlayer(KernelMemory):
                     return
 
     def set_source_gains(self, gains: Iterable[float]) -> None:
-        """The factor of each source, of notes whose voices are the player's own; those that ring fade to it."""
+        """Set the gain, a factor, of each source of the player's notes, source 0 first; what rings fades to it."""
         for source, gain in enumerate(gains):
             self.record["source_gains"][source] = gain
 
     def set_spares(self, spares: bool) -> None:
-        """Set whether notes begin without voices of sources that are unheard: these cost nothing, and stay silent."""
+        """Set whether notes begin without voices of sources whose gain is 0: these cost nothing, and stay silent."""
         self.record["spares"] = spares
 
     def source_gain(self, source: int) -> float:
@@ -302,7 +323,10 @@ class CompiledPlayer(KernelMemory):
         return new_reports
 
     def ringing(self) -> list[Ringing]:
-        """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
+        """The notes that ring, each the latest of its place; a course is one of them, by its first string.
+
+        Any thread may ask; the levels are those of the latest quantum.
+        """
         notes = []
         for number, note in enumerate(self._notes()):
             if note["state"] != of.RINGS or not note["has_place"] or note["member"]:
@@ -317,20 +341,24 @@ class CompiledPlayer(KernelMemory):
         return notes
 
     def _length_m(self, note: np.void, rows: NDArray[np.float64]) -> float | None:
-        """The length of a note's string in m.
+        """The present length of a note's string in m; None: it is a drum's, or a string beyond the bounds.
 
-        It is its goal, times how far the first mode of a voice, of these rows, has still to go.
+        While a string slides, `string_now` is where it leads. Its length there is scaled by its first mode's
+        frequency there over the present one.
+
+        Args:
+            rows: (rows, modes) of one of the note's voices.
         """
         if note["drum"]:
             return None
         string = _string(note["string_now"])
         if string is None:
             return None
-        present = float(rows[OMEGA_SQUARED, 0])
+        present = float(rows[OMEGA_SQUARED, 0])  # ω² of the first mode in (rad/s)²
         return string.length_m * (string.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
 
     def missing(self, ids: Iterable[int]) -> list[int]:
-        """The notes of these that have ended, where reports were missed.
+        """The numbers, of these numbers of notes' events, whose notes have ended, where reports were missed.
 
         Empty while events wait, or where none were missed.
         """
@@ -364,7 +392,10 @@ class CompiledPlayer(KernelMemory):
         return not any(self._alive(number, note) for number, note in enumerate(self._notes()))
 
     def release(self, seconds: float) -> None:
-        """Let all voices fade out, where no mixer plays its events any more; one of them may still have them."""
+        """Fade all voices out within `seconds`, of a player whose events no mixer plays any more.
+
+        A mixer may still be sounding these voices. A fade that is under way continues.
+        """
         for number, note in enumerate(self._notes()):
             for voice in self._alive(number, note).values():
                 if voice["release"] == 0:
@@ -375,7 +406,12 @@ class CompiledPlayer(KernelMemory):
         return self.record["notes"].copy()
 
     def _voices(self, number: int, note: np.void) -> dict[int, np.void]:
-        """The records of a note's voices by their sources; none where it is free."""
+        """The records of a note's voices by their sources; none where it is free.
+
+        Args:
+            number: the note's place among the player's notes.
+            note: its record.
+        """
         sources = of.MOST_SOURCES if note["state"] == of.RINGS else 0
         return {source: self.voice(number, source) for source in range(sources) if note["voices"][source]}
 
@@ -385,11 +421,12 @@ class CompiledPlayer(KernelMemory):
         return {source: voice for source, voice in voices if voice["state"] in (WAITING, SOUNDING)}
 
     def _memory_of(self, number: int, source: int) -> NDArray[np.float64]:
+        """The memory (slots,) of the voice that note `number` has of a source; voices follow the player's record."""
         first = slots(PLAYER) + (number * of.MOST_SOURCES + source) * self._voice_slots
         return self.memory[first : first + self._voice_slots]
 
     def voice(self, number: int, source: int) -> np.void:
-        """The record of a note's voice of a source."""
+        """The record of the voice that note `number`, a place among the player's notes, has of a source."""
         return record_of(self._memory_of(number, source), VOICE)
 
     def rows_of(self, number: int, source: int) -> NDArray[np.float64]:
@@ -416,7 +453,7 @@ class CompiledPlayer(KernelMemory):
 
 
 def _string(row: NDArray[np.float64]) -> StringParameters | None:
-    """A string of the player's memory; None: it is bent beyond the bounds."""
+    """The string of a row (8,) of the player's memory, `StringParameters`' fields; None: bent beyond the bounds."""
     try:
         return StringParameters(*row.tolist())
     except ValueError:

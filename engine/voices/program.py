@@ -22,7 +22,7 @@ from engine.voices.memory import KernelMemory
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 KEPT_WEIGHTS = 32  # listening points of a program
 
-Strike = Callable[[Array], tuple[Array, Array]]
+Strike = Callable[[Array], tuple[Array, Array]]  # displacement to the two rows that a voice sets out from
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,8 @@ class Program(KernelMemory):
     """See the module; the kernels read `memory`.
 
     Attributes:
+        kind: BANK, TRUTH, RENDERED or TENSION of `voice_records`.
+        memory: the kind's record, and the arrays to which it points.
         modes: latents of a bank, modes of a solver, 0 where samples are rendered.
         start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
@@ -49,7 +51,7 @@ class Program(KernelMemory):
     resonator: Resonator | None = None
     ends_s: float = math.inf
     force: Array | None = None
-    _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
+    _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)  # results of `weights`
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
         """The weights of a pair of listening points, as `read`; remembered. Any thread may ask."""
@@ -91,10 +93,11 @@ def fits(omega: Array) -> Array:
 def packed(
     kind: np.dtype[np.void], values: Mapping[str, Any], *parts: NDArray[np.generic], names: Sequence[str] = ()
 ) -> Array:
-    """A program's record with these values, and the parts that follow it, in one array.
+    """A program's record with these values, and the parts that follow it, in one array of float64.
 
     Args:
-        names: the fields that are to have the slots of the parts.
+        kind: type of the record.
+        names: the fields that are to have the slots of the parts, in their order; a slot is a place in that array.
     """
     arrays = [np.asarray(part, np.float64).ravel() for part in parts]
     memory = np.concatenate([np.zeros(slots(kind)), *arrays])

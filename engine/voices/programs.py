@@ -37,9 +37,9 @@ DRUM_SILENCE = 2e-7
 # amplitudes, below which it is laid to rest for good.
 DRUM_UNHEARD, DRUM_STILL = 1e-7, 1e-8
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
-FILTER_TAPS = 32
-FILTER_PHASES = 512
-FILTER_BETA = 10.0
+FILTER_TAPS = 32  # samples to either side of a frame that its value is taken from
+FILTER_PHASES = 512  # places between two samples for which taps are kept
+FILTER_BETA = 10.0  # shape of the Kaiser window
 
 
 def tension_program(
@@ -95,7 +95,12 @@ def solver_program(
 
 
 def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = HEARD_SILENCE) -> Array:
-    """The memory that the kernels read of the solver, as `tension_memory`."""
+    """The memory that the kernels read of the solver, whatever the resonator.
+
+    Args:
+        coarser: how many times fewer sub-steps than `default_substeps`.
+        silence: share of all amplitudes, below which the highest modes are laid to rest.
+    """
     values = {
         "substeps": SUBSTEPS_IN_A_PERIOD / coarser,
         "silence": silence,
@@ -108,7 +113,12 @@ def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = H
 
 
 def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, aliased: bool = False) -> Program:
-    """The program of a kind whose voices move amplitudes of the resonator's modes."""
+    """The program of a kind whose voices move amplitudes of the resonator's modes.
+
+    Args:
+        memory: the kind's record with what it points to.
+        aliased: whether modes that are too high for the rate are heard, as others; else they are silent.
+    """
     omega = resonator.eigenvalues().imag  # it swings
     shapes, n = resonator.shapes, resonator.modes
     if not aliased:
@@ -155,6 +165,7 @@ def _samples_program(
     ratio = source_rate_hz / rate_hz
     cutoff = min(1.0, 1 / ratio)
     phase = np.arange(FILTER_PHASES + 1)[:, None] / FILTER_PHASES
+    # distance of a sample from the frame, in samples, (phases + 1, taps of both sides)
     place = np.arange(-FILTER_TAPS + 1, FILTER_TAPS + 1)[None] - phase
     window = np.i0(FILTER_BETA * np.sqrt(np.clip(1 - (place / FILTER_TAPS) ** 2, 0, 1))) / np.i0(FILTER_BETA)
     sinc = np.sinc(cutoff * place)

@@ -39,10 +39,14 @@ def possible_s(seconds: float) -> float | None:
 class Voice(KernelMemory):
     """A voice, made and commanded by one thread, rendered by another: a command is heard within a quantum.
 
+    A quantum is the 64 frames that a mixer renders at a time. A *rendered* voice plays samples that are appended to
+    it, which another thread makes ahead of time; the others are computed as they sound.
+
     Args:
         displacement_m: at its release, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
         seconds: of a rendered voice: how much room there is for its samples, of which none is needed after its end.
+        source_rate_hz: of a rendered voice: the rate of its samples.
     """
 
     layout = VOICE
@@ -57,6 +61,7 @@ class Voice(KernelMemory):
         source_rate_hz: int = 0,
     ) -> None:
         n = program.modes
+        # rows (n,) of the kind; a rendered voice has none
         rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
         self.program, self.ear = program, ear
         self.memory = np.zeros(slots(VOICE) + (WEIGHT_ROWS + rows) * n)
@@ -71,12 +76,13 @@ class Voice(KernelMemory):
         record["attack"] = round(ATTACK_S * program.rate_hz)
         record["ends_at"] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
         record["ends_in"] = round(END_FADE_S * program.rate_hz)
-        record["silent"] = SILENT_DB * math.log(10) / 20
+        record["silent"] = SILENT_DB * math.log(10) / 20  # in nepers
         record["peak"] = max(float(np.abs(displacement_m).max()), LEAST_PEAK_M)
+        # the largest believable output, of full scale: beyond it the voice has run away
         record["limit"] = RUNAWAY_FACTOR * largest(ear, displacement_m, program.force) / FULL_SCALE_M
         if n:
             self.rows[0], self.rows[1] = program.start(displacement_m)
-        self._samples: NDArray[np.float32] | None = None
+        self._samples: NDArray[np.float32] | None = None  # (frames, points); None: the voice is not a rendered one
         if program.resonator is not None:
             record["moving"] = n
             self.rows[at.OMEGA_SQUARED : at.FOLLOWING] = resonator_rows(program.resonator)
@@ -89,6 +95,7 @@ class Voice(KernelMemory):
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
             if program.grid_points:
+                # (grid_points, points): displacement in m @ senses is of full scale
                 self._senses = (program.grid_weights(ear) / FULL_SCALE_M).astype(np.float32)
             record["samples"], record["length"] = self._samples.ctypes.data, length
         if program.grid_points:
@@ -148,7 +155,7 @@ class Voice(KernelMemory):
 
     @property
     def level_db(self) -> float:
-        """The level of the loudest latent, or of all of the string, in dB of full scale."""
+        """The present level of the loudest latent (of a bank), or of all of the string, in dB of full scale."""
         return float(self.record["loudness"]) * 20 / math.log(10)
 
     def set_struck(self, time_s: float) -> None:
@@ -176,7 +183,10 @@ class Voice(KernelMemory):
         self.record["release_at"] = frame
 
     def fade_out_by(self, seconds: float) -> None:
-        """Fade it to silence by then, where it does not end earlier; call this before it is handed over."""
+        """Fade it to silence by `seconds` after the pluck, where it does not end earlier.
+
+        Call this before it is handed over.
+        """
         end, fade = (round(time_s * self.program.rate_hz) for time_s in (seconds, FADE_S))
         if self.record["ends_at"] + self.record["ends_in"] > end:
             self.record["ends_at"] = max(0, min(int(self.record["ends_at"]), end - fade))
@@ -188,14 +198,14 @@ class Voice(KernelMemory):
         return max(0, int(self.record["began_frame"]))
 
     def release(self, seconds: float) -> None:
-        """Fade to silence and end; a release under way continues."""
+        """Fade to silence within `seconds` and end; a release under way continues."""
         if self.record["release"] == 0:
             self.record["release"] = max(1, round(seconds * self.program.rate_hz))
 
     def listen(self, ear: Ear) -> bool:
-        """Fade to other points. False where it cannot now: a fade is under way; ask again.
+        """Fade to other listening points. False where it cannot now: a fade is under way; ask again.
 
-        One that is rendered ahead, and one that is picked up otherwise, stay as they are: True.
+        A rendered voice stays as it is, and so does one whose number of points or pick-up is not the ear's: True.
         """
         same = (len(ear.points), ear.pickup) == (len(self.ear.points), self.ear.pickup)
         if self.program.kind == at.RENDERED or not same or ear == self.ear:
@@ -226,7 +236,7 @@ class Voice(KernelMemory):
         return 0 if self._samples is None else len(self._samples) - int(self.record["ready"])
 
     def loop(self) -> None:
-        """A rendered voice of the device's own rate begins again after its last sample."""
+        """Let a rendered voice of the device's own rate begin again after its last sample."""
         self.record["looped"] = 1
 
     def begin_at_once(self) -> None:
@@ -242,10 +252,11 @@ class Voice(KernelMemory):
         self.record["silent"] = -math.inf
 
     def end_here(self) -> None:
-        """A rendered voice has no more samples than it was given."""
+        """End a rendered voice after the samples that it was given so far."""
         self.record["length"] = max(1, self.record["ready"])
 
     def _set_weights(self, which: int, ear: Ear) -> None:
+        """Write a set of weights and biases of an ear: 0, the one that is heard, or 1, the one that is faded to."""
         n = self.program.modes
         weights, bias = self.program.weights(ear)
         rows = self.memory[slots(VOICE) : slots(VOICE) + WEIGHT_ROWS * n].reshape(2, 2, 2 * n)
@@ -254,6 +265,6 @@ class Voice(KernelMemory):
 
 
 def resonator_rows(resonator: Resonator) -> NDArray[np.float64]:
-    """ω², σ, k, η² and no part in a bridge of others, (5, modes)."""
+    """The rows (5, modes) ω², σ, k, η² and, all 0, what it loses to a bridge that it shares with other strings."""
     nothing = np.zeros(resonator.modes)
     return np.stack([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch, nothing])
