@@ -57,7 +57,15 @@ _NAME = re.compile(
 
 @dataclass(frozen=True, order=True)
 class Cell:
-    """See the module."""
+    """A place in the paper's tables, and which run of ours fills it; see the module.
+
+    Attributes:
+        model: a name of `engine.models.MODELS`.
+        tension_modulated: False: the linear string.
+        initial: the random shape that the string is released from.
+        horizon: frames that are trained and measured.
+        recipe: a file of `recipes/`, without its ending.
+    """
 
     model: str
     tension_modulated: bool
@@ -154,6 +162,7 @@ class RecipeCase:
             bounds.check_choice("model", model, MODELS)
 
     def matches(self, cell: Cell) -> bool:
+        """Return True if a cell has one of the choices in every field that is given."""
         for name in ("model", "initial", "rate_hz", "horizon"):
             choice = getattr(self, name)
             if choice and getattr(cell, name) not in choice:
@@ -172,6 +181,7 @@ class RecipeBook:
 
 @cache
 def _recipe_book(path: Path) -> RecipeBook:
+    """A recipe's file, read once. Raises SchemaError."""
     return read(RecipeBook, read_toml(path), str(path))
 
 

@@ -22,6 +22,7 @@ DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change wh
 
 
 def _check_least(value: object, least: int, *names: str) -> None:
+    """Raise ValueError: one of these fields of a dataclass is below `least`."""
     for name in names:
         if getattr(value, name) < least:
             raise ValueError(f"{name} must be at least {least}, not {getattr(value, name)}")

@@ -57,7 +57,7 @@ def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps:
 
 
 def _predicted(model: StringModel[Any], initial: Tensor, kept: int, stride: int) -> Tensor:
-    """Frames stride, 2 stride, …, (batch, kept, grid_points)."""
+    """The prediction at frames stride, 2 stride, …, `kept` in all: (batch, kept, grid_points) in normalised units."""
     if stride > 1 and isinstance(model, KoopmanModel):
         frames = stride * torch.arange(1, kept + 1, device=initial.device)
         return model.decode(model.latents(model.encode(initial).origin, frames))
@@ -120,6 +120,7 @@ def evaluate_past_horizon(
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
     synthesis = dataset.synthesis
+    # (grid_points, 1): from displacement to that at the listening point
     ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     edges = [edge for span in spans for edge in (span.start, span.stop)]
@@ -232,6 +233,7 @@ def errors_by_rise(sums: ErrorSums, configuration: DatasetConfiguration, split: 
 
 @contextmanager
 def _in_evaluation(model: StringModel[Any]) -> Iterator[None]:
+    """Keep a model in its evaluation mode within the block, and give it its own mode back."""
     was_training = model.training
     model.eval()
     try:
@@ -252,13 +254,16 @@ def held_out(configuration: DatasetConfiguration, scale_m: float, count: int, se
 
 
 def _parts(c: DatasetConfiguration, split: str, trajectories: slice) -> list[slice]:
-    """The rows of a split's trajectories, some at a time."""
+    """The rows of a split's chosen trajectories in the data set, at most `TRAJECTORIES_AT_ONCE` in each slice."""
     rows = range(c.count)[split_rows(c.count, split)][trajectories]
     return [slice(first, min(first + TRAJECTORIES_AT_ONCE, rows.stop)) for first in rows[::TRAJECTORIES_AT_ONCE]]
 
 
 def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple[Tensor, Iterator[Tensor]]:
-    """Modal amplitudes in m, float64: of frame 0, and of blocks of the frames after it."""
+    """Modal amplitudes in m, float64: of frame 0, (rows, modes), and of blocks of frames, (rows, frames, modes).
+
+    Blocks begin with frame 1 and end with frame `steps`; each has `block` frames, the last one perhaps fewer.
+    """
     c = dataset.configuration
     if len(dataset.amplitudes) and steps <= c.steps and c.stride == 1:
         stored = dataset.amplitudes[rows, : steps + 1]
@@ -268,6 +273,7 @@ def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple
 
 
 def _simulated(c: DatasetConfiguration, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
+    """The blocks of `_true_motion` by the solver, from amplitudes (rows, modes) at rest."""
     solver, state = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps), ModalState.at_rest(initial)
     for first in range(0, steps, block):
         frames, state = solver.advance(state, min(block, steps - first))

@@ -21,10 +21,10 @@ from training.heard_file import Heard, add_heard
 
 RATE_HZ = 48_000  # of the device: what is above half the preset's rate is heard of the truth
 AMPLITUDES_MM = (1.5, 4.0, 8.0)  # soft, normal, hard
-LEAST_S, MOST_S = 4.0, 12.0
-UNTIL_DB = 60.0  # or the truth has fallen so far
-HUM_S = 0.5  # before a voice ends
-LONGEST_HUM_S = 300.0  # one that ends later is not listened to so long
+LEAST_S, MOST_S = 4.0, 12.0  # that a pluck is listened to
+UNTIL_DB = 60.0  # … or until the truth has fallen so far
+HUM_S = 0.5  # before a voice ends: there its hum, what a model still sounds then, is measured
+LONGEST_HUM_S = 300.0  # a voice that ends later is not measured so
 EAR = Ear((DEFAULT_LISTEN,))
 GLIDE_S = 0.25  # pitch is listened to from here on, and past the training
 
@@ -45,7 +45,9 @@ def listen_to(
 
     Args:
         report: receives the share that is done, 0 … 1.
-        seconds: how long they are listened to, unless they have decayed before.
+        plucks: empty: `standard_plucks`.
+        ear: where and how they are listened to.
+        seconds: how long, unless they have decayed before; None: twice the training, 4 s to 12 s.
 
     Raises:
         ValueError: its model cannot be released from rest, or a pluck is shorter than a frame of a spectrum.
@@ -110,7 +112,13 @@ def measure(path: Path, write: bool, report: Callable[[float], None] = lambda sh
 def _hum_db(
     program: Program, source: ModelSource, info: PresetInfo, pluck: Pluck, ear: Ear, advanced: Callable[[float], None]
 ) -> float | None:
-    """The level of a model at the end of its voice, in dB of full scale; None: it is silent by then."""
+    """The level of a model at the end of its voice, in dB of full scale.
+
+    None: it is silent by then, runs away before, or ends too late to be measured.
+
+    Args:
+        advanced: receives the share that is rendered, 0 … 1.
+    """
     if program.ends_s > LONGEST_HUM_S:
         return None
     frames, last = round(program.ends_s * program.rate_hz), round(HUM_S * program.rate_hz)
@@ -131,4 +139,5 @@ def _bearable(info: PresetInfo, amplitude_mm: float) -> float:
 
 
 def _median(values: Sequence[float]) -> float | None:
+    """The median; None: there are no values."""
     return statistics.median(values) if values else None

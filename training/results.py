@@ -149,4 +149,5 @@ def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
 
 
 def _rank(row: Row) -> tuple[bool, str]:
+    """The rank of a row among those of its run: done before others, then the later one."""
     return row.status == "done", row.finished

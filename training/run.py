@@ -35,7 +35,8 @@ from training.fitting.fit import Diverged, FitProgress, FitResult, Report, fit_s
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, SHORT_HORIZON, Row
 
-PREFIXES = {"validation": "", "test": "test_"}
+PREFIXES = {"validation": "", "test": "test_"}  # of a row's columns, by split
+# columns of a row that a preset repeats
 REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
 
 
@@ -183,6 +184,7 @@ def _made_by(run: Run, preset: Path) -> bool:
 
 
 def _held(path: Path, waits: Callable[[], None]) -> AbstractContextManager[object]:
+    """The lock of a file, held; `waits` is called once where another process has it, whose end is awaited."""
     lock = FileLock(path)
     try:
         return lock.acquire(timeout=0)
@@ -212,6 +214,7 @@ def row_errors(
 
 
 def _columns(form: str, sums: ErrorSums) -> dict[str, float | None]:
+    """The total errors and their standard errors by column; `form`: see `figures`, None: it is not finite."""
     values = figures(sums.total(), form) | figures(sums.standard_error(), f"{form}_se")
     return {name: value if math.isfinite(value) else None for name, value in values.items()}
 

@@ -29,8 +29,8 @@ class Shares:
 
     def __init__(self, report: ProgressReport, pieces: int) -> None:
         self._report = report
-        self._pieces = pieces
-        self._begun = 0
+        self._pieces = pieces  # in all
+        self._begun = 0  # pieces
 
     def next(self) -> Callable[[float], None]:
         """Begin the next piece; return a function that is called with the share of it that is done, 0 … 1."""
@@ -121,8 +121,8 @@ class _Lines:
     """Progress for a log: a line now and then, none for work that takes less."""
 
     def __init__(self, what: str, every_s: float) -> None:
-        self._what, self._every_s = what, every_s
-        self._started = self._last = time.monotonic()
+        self._what, self._every_s = what, every_s  # the work's name, and the least time between two lines
+        self._started = self._last = time.monotonic()  # when work began, and the last line was printed
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
         now = time.monotonic()

@@ -200,7 +200,14 @@ def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: boo
 
 @dataclass(frozen=True)
 class _Measurement:
-    """Measures a preset on a data set, as the options of `evaluate` ask for."""
+    """Measures a preset on a data set, as the options of `evaluate` ask for.
+
+    Attributes:
+        past_s: that are measured past the training horizon; 0: none.
+        partials: measure each mode, too.
+        trajectories: only the first so many of a split; None: all.
+        report: of the progress; each split takes one piece of it, or two with partials.
+    """
 
     preset: Preset
     data: Dataset
@@ -264,6 +271,7 @@ class _Measurement:
         return facts
 
     def _stored(self, split: str) -> dict[str, float | None]:
+        """The errors on a split that the preset itself states; none of new plucks."""
         info = self.preset.info
         if split == "all":
             return {}
@@ -271,7 +279,7 @@ class _Measurement:
         return {"stored_rel_mse": mse, "stored_rel_mae": mae}
 
     def _partials(self, split: str, windows: list[tuple[float, float]]) -> list[dict[str, Any]]:
-        """The whole horizon, all past it, then every window."""
+        """The errors of each mode over the whole horizon, over all past it, then in every window: a dict each."""
         from training.evaluate import evaluate_partials
 
         horizon_s, end_s = self.preset.info.horizon_s, windows[-1][1]
@@ -296,7 +304,7 @@ class _Measurement:
         ]
 
     def _windows(self) -> list[tuple[float, float]]:
-        """Parts of the horizon, then every second past it; edges lie on frames, and none is empty."""
+        """Windows (start, stop) in s: parts of the horizon, then every second past it; on frames, none empty."""
         info = self.preset.info
         last = info.horizon_steps + round(self.past_s * info.rate_hz)
         inside = {round(info.horizon_steps * part / WINDOWS) for part in range(WINDOWS + 1)}
@@ -351,6 +359,8 @@ def _data_of(preset: Preset) -> DatasetConfiguration:
 
 
 def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: Known) -> None:
+    """Print the figures of a split, as `_Measurement.of` gives them, with those known from elsewhere."""
+
     def pair(form: str) -> list[Any]:
         return [errors[form.format(name)] for name in ("rel_mse", "rel_mae")]
 
@@ -388,11 +398,13 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: K
 
 
 def _by_rise(group: dict[str, Any]) -> list[object]:
+    """The row of a group of plucks, a `RiseErrors` as a dict, with shares in %."""
     low, high, share, largest = (100 * group[name] for name in ("from_rise", "to_rise", "share", "largest"))
     return [group["trajectories"], low, high, group["rel_mse"], group["rel_mae"], share, largest]
 
 
 def _print_partials(split: str, partials: dict[str, Any]) -> None:
+    """Print a row for each mode of one window, as `_Measurement` measured them, and the means by energy."""
     past = ", past the training horizon" if partials["past_horizon"] else ""
     print(f"{split}, partials of {partials['start_s']:g} … {partials['stop_s']:g} s{past}: medians of the magnitudes")
     figures = ("Hz", "level dB", "phase cycles", "cents", "T60 s", "T60 error %", "glide cents", "glide error")

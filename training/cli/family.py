@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 FIGURES = ("geometric_mean", "worst", "share_large", "processor_s")
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
-TENTH = 9  # the place of the tenth second
-RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
+TENTH = 9  # the place of the tenth second among all, from 0
+RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)  # ΔT/T₀: edges of the ranges that are printed
 Strings = Annotated[
     int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
 ]
@@ -154,6 +154,7 @@ def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any
 def _evaluate_drums(
     preset: str, drums: int, tenth: int, runs: Path | None, rate_hz: int, seed: int, keep: bool, json: bool
 ) -> None:
+    """Measure a preset and untrained players on drums, and print the errors; see `evaluate` for the options."""
     from dataclasses import asdict
 
     from training.family import drums as of_drums
@@ -194,6 +195,7 @@ def _evaluate_drums(
 
 
 def _open_preset_of_many(name_or_path: str) -> Preset:
+    """Load a preset of many strings. Raises Failure: it is of one."""
     loaded = open_preset(name_or_path)
     if loaded.info.family is None:
         raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
@@ -201,7 +203,11 @@ def _open_preset_of_many(name_or_path: str) -> Preset:
 
 
 def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) -> dict[str, Any]:
-    """The errors in the tenth second, of those strings that still sound then."""
+    """The errors in the tenth second, of those strings that still sound then, by name.
+
+    Args:
+        first, tenth: the same strings in the first and in the tenth second.
+    """
     from training.family.errors import FamilyErrors
 
     pairs = [(early, late) for early, late in zip(first, tenth, strict=True) if late.sounds]
@@ -212,6 +218,7 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
 
 
 def _facts(errors: FamilyErrors) -> dict[str, Any]:
+    """The main figures of many strings by name, see `FIGURES`, and the worst string in words."""
     worst = errors.worst
     return {
         "geometric_mean": errors.geometric_mean,

@@ -143,6 +143,7 @@ def merge(
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:
+    """Print the runs of a plan in their order, with status and error where `known` rows have them."""
     errors = {row.digest: (row.status, row.rel_mae) for row in known}
     facts = []
     for run in plan.runs:
@@ -181,14 +182,15 @@ class Shown:
     """Shows a sweep: the progress of each run, and a line for what is worth one."""
 
     def __init__(self, begin: Callable[[str], ProgressReport], left: int, at_once: int) -> None:
-        """`left`: runs that have not ended; `at_once`: how many run at a time."""
+        """`begin`: see `bars`; `left`: runs that have not ended; `at_once`: how many run at a time."""
         self._begin = begin
         self._left = left
         self._at_once = at_once
+        # by name, of each run that is under way: its report, and the same for the progress of a training
         self._reports: dict[str, tuple[ProgressReport, Callable[[FitProgress], None]]] = {}
-        self._last: dict[str, FitProgress] = {}  # of each run that is under way
+        self._last: dict[str, FitProgress] = {}  # by name, of each run under way that has reported
         self._seconds: list[float] = []  # that finished runs took
-        self._ended: Counter[str] = Counter(done=0)
+        self._ended: Counter[str] = Counter(done=0)  # runs by status
 
     def started(self, run: Run) -> None:
         report = self._begin(run.name)
@@ -202,6 +204,7 @@ class Shown:
         say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:
+        """End the progress of a run, and print a line with its result and the sweep's state."""
         self._reports.pop(row.name)[0](1.0)
         self._last.pop(row.name, None)
         self._left -= 1
@@ -222,6 +225,7 @@ class Shown:
         return work / max(1, min(self._at_once, self._left))
 
     def summary(self) -> str:
+        """The numbers of runs that ended, run and wait, and the time left, in words."""
         running, seconds = len(self._reports), self.seconds_left()
         parts = [f"{count} {status}" for status, count in self._ended.items()]
         parts += [f"{running} running", f"{self._left - running} waiting"]

@@ -153,6 +153,7 @@ def _changed(configuration: TrainingConfiguration, words: str, **recipe: Any) ->
 
 
 def _tell_row(file: Path, row: Row) -> None:
+    """Print a preset's file, the errors of its run, and how long it was trained."""
     print(file)
     _print_errors("validation", row.rel_mse, row.rel_mae)
     _print_errors("test", row.test_rel_mse, row.test_rel_mae)
@@ -195,6 +196,7 @@ def print_known(known: Known) -> None:
 
 
 def _print_errors(what: str, mse: float | None, mae: float | None, note: str = "") -> None:
+    """Print a line of relative errors; `what`: the split, or whose they are; None: "-"."""
     print(f"{what:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}{note}")
 
 
@@ -224,8 +226,8 @@ def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Datase
 
 
 def training_report(report: ProgressReport) -> Callable[[FitProgress], None]:
-    """Step, epoch, horizon, loss and the last validation as progress."""
-    last = ""
+    """A function that reports a training's progress: step, epoch, horizon, loss and the last validation error."""
+    last = ""  # validation error, in words
 
     def reported(p: FitProgress) -> None:
         nonlocal last

@@ -44,25 +44,35 @@ class Batch:
 
 
 class TrainingData:
-    """The training split on a device, and random batches of it."""
+    """The training split on a device, and random batches of it.
+
+    Attributes:
+        count: trajectories in it.
+    """
 
     def __init__(self, dataset: Dataset, device: torch.device) -> None:
         c = dataset.configuration
         self._stride = c.stride
-        self._amplitudes = dataset.split("train").to(device)
-        self._synthesis = dataset.synthesis.float().to(device)
+        self._amplitudes = dataset.split("train").to(device)  # m, (trajectories, kept frames, modes)
+        self._synthesis = dataset.synthesis.float().to(device)  # (modes, grid_points)
         mirror = c.resonator.mirror
+        # sign that each mode takes where the string is turned end to end, (modes,)
         self._mirror = (torch.ones(c.modes) if mirror is None else torch.from_numpy(mirror).float()).to(device)
         self.count = len(self._amplitudes)
 
     def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:
-        """A batch of the trajectories `rows`, on the data's device, over at most `horizon` frames.
+        """A batch of trajectories, on the data's device.
 
         All frames without flips need nothing from the host.
+
+        Args:
+            rows: of the training split, int64 (batch,).
+            horizon: frames within which those of the batch are chosen.
+            iteration: step of the run, which with the seed determines all random choices.
         """
         device = self._amplitudes.device
         generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
-        kept = max(1, horizon // self._stride)
+        kept = max(1, horizon // self._stride)  # frames that the data have within the horizon
         every = keeps_every_frame(recipe, kept)
         if every:
             frames = torch.arange(1, kept + 1, device=device)

@@ -173,7 +173,13 @@ def _simulate(c: DatasetConfiguration, file: Path, report: Callable[[float], Non
 
 
 def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Array) -> float:
-    """The standard deviation of displacement over trajectories, frames and grid points, for (…, modes)."""
+    """The standard deviation of displacement in m over trajectories, frames and grid points.
+
+    Args:
+        amplitudes: of modes in m, (…, modes).
+        shapes: (modes, grid_points).
+    """
+    # products of shapes over the grid's points, (modes, modes), and each one's mean, (modes,)
     gram, column = shapes @ shapes.T / shapes.shape[1], shapes.mean(1)
     total = squared = 0.0
     frames = amplitudes.reshape(-1, amplitudes.shape[-1])

@@ -20,8 +20,8 @@ from engine.resonators.sine_transform import grid_positions
 CENTRE_RANGE = (0.3, 0.7)  # of a random Gaussian, in lengths
 WIDTH_RANGE = (0.02, 0.1)  # of a random Gaussian, in lengths
 PEAK_RANGE_M = (1e-3, 1e-2)  # of both random kinds
-PLUCK_POSITION_RANGE = (0.05, 0.95)  # of a random pluck, which may have any shape
-PLUCK_WIDTH_RANGE = (0.03, 0.3)
+PLUCK_POSITION_RANGE = (0.05, 0.95)  # of a random pluck of any shape, in lengths
+PLUCK_WIDTH_RANGE = (0.03, 0.3)  # in lengths
 PLUCK_PEAK_RANGE_M = (5e-4, 1e-2)
 
 
@@ -58,4 +58,5 @@ DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}
 
 
 def _uniform(count: int, low: float, high: float, generator: torch.Generator) -> Array:
+    """Uniform draws between two numbers, float64 (count, 1)."""
     return low + (high - low) * torch.rand(count, 1, generator=generator, dtype=torch.float64).numpy()

@@ -31,12 +31,12 @@ from training.provenance import now
 T = TypeVar("T")
 Kind = Literal["tom", "frame drum", "small head", "rectangular membrane", "steel plate", "narrow plate"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-DRUMS_VERSION = 1  # of what a seed means
-HIGHEST_HZ = 4_000.0
-BRIGHT_HZ = 3_000.0
-LEAST_MODES = 10
-SLOWER = 8.0  # decays of drums that are measured in the tenth second
-LARGEST_BYTES = 2**21
+DRUMS_VERSION = 1  # of the draws: with another one the same seed and number give another drum
+HIGHEST_HZ = 4_000.0  # of a mode
+BRIGHT_HZ = 3_000.0  # where a mode decays in `BRIGHT_T60_S`
+LEAST_MODES = 10  # of a drum; one with fewer is drawn again
+SLOWER = 8.0  # times as slowly decay drums that are measured in the tenth second
+LARGEST_BYTES = 2**21  # of a table of errors
 ROWS = Path(__file__).parents[1] / "drums.csv"
 
 # of a kind: length in m, width in lengths, thickness in m, pitch in Hz (of the first mode in a vacuum)
@@ -49,12 +49,12 @@ RANGES: Mapping[Kind, Ranges] = {
     "steel plate": ((0.15, 0.50), (0.4, 0.95), (3e-4, 1.2e-3), (0, 0)),
     "narrow plate": ((0.15, 0.40), (0.05, 0.15), (5e-4, 2e-3), (0, 0)),
 }
-T60_S = (0.4, 2.5)
+T60_S = (0.4, 2.5)  # decay by 60 dB of the lowest mode
 BRIGHT_T60_S = (0.08, 0.35)
-RISE = (0.02, 0.5)
-RADIUS_M = (0.005, 0.04)
-CONTACT_S = (1e-3, 5e-3)
-SCATTER = 0.2
+RISE = (0.02, 0.5)  # ΔT/T₀, see `Released.tension_rise`
+RADIUS_M = (0.005, 0.04)  # of the disc that is struck or pressed
+CONTACT_S = (1e-3, 5e-3)  # of a mallet
+SCATTER = 0.2  # of the decay rates from mode to mode, a share to either side
 NOWHERE = np.zeros((1, 2))  # a place, where none counts
 AIRLESS: tuple[Kind, ...] = ("steel plate", "narrow plate")
 
@@ -70,14 +70,18 @@ class StruckDrum(Released):
 
     @classmethod
     def by(cls, strike: Strike, modes: DrumModes, tension_modulated: bool = True) -> StruckDrum:
-        """A drum of an instrument, by a blow on it."""
+        """A drum of an instrument with the speeds from a blow on it; its kind is "tom", whatever it is."""
+        # speeds (modes,) in m/s, from the amplitude 0
         speeds, resonator = strike.speeds(modes), modes.resonator(NOWHERE, tension_modulated=tension_modulated)
         rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
         return cls(resonator, np.zeros_like(speeds), speeds, modes.scale**2, rise, "tom", modes.drum)
 
 
 def draw_drum(number: int, seed: int = 0) -> StruckDrum:
-    """The drum of a number; the same for ever, however many are drawn."""
+    """The drum of a number with its start, always the same.
+
+    Kinds take turns. In the first round of all kinds the drums are struck, in the next one pressed, and so on.
+    """
     random = np.random.default_rng((DRUMS_VERSION, seed, number))
     kind = KINDS[number % len(KINDS)]
     while True:
@@ -95,11 +99,13 @@ def draw_drum(number: int, seed: int = 0) -> StruckDrum:
     resonator = replace(resonator, sigma=np.minimum(resonator.sigma * scatter, 0.9 * resonator.omega))
     q, v = _start(random, modes, place, number // len(KINDS) % 2 == 0)
     rise = _between(random, RISE)
+    # the start is scaled so that it reaches the rise that was drawn
     share = math.sqrt(rise / float(resonator.relative_tension_rise(np.hypot(q, v / resonator.omega))))
     return StruckDrum(resonator, q * share, v * share, modes.scale**2, rise, kind, drum)
 
 
 def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
+    """Draw the parameters of a drum within the ranges of its kind; damping follows from two times of decay."""
     length, ratio, thickness, pitch = (_between(random, ends) for ends in RANGES[kind])
     circle = kind in ("tom", "frame drum", "small head")
     metal = kind in AIRLESS
@@ -115,9 +121,11 @@ def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
         uneven=float(random.uniform(0, 0.01)) if circle else 0.0,
         air_kg_m3=AIR_KG_M3 if not metal and random.random() < 0.5 else 0.0,
     )
+    # wavenumber of the lowest mode in 1/m; 2.4048: first zero of the Bessel function J₀
     kappa = 2 * 2.4048 / length if circle else math.hypot(math.pi / length, math.pi / (length * ratio))
     if not metal:
         drum = replace(drum, tension_n_m=drum.mass_kg_m2 * (2 * math.pi * pitch / kappa) ** 2)
+    # decay rates σ in 1/s of the lowest mode, and of one at BRIGHT_HZ with the wavenumber `bright`
     slow, fast = (math.log(1000) / _between(random, ends) for ends in (T60_S, BRIGHT_T60_S))
     fast = max(fast, 1.5 * slow)
     stiff = drum.tension_n_m + bending_nm(drum) * kappa**2
@@ -130,6 +138,12 @@ def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
 def _start(
     random: np.random.Generator, modes: DrumModes, place: tuple[float, float], blow: bool
 ) -> tuple[Array, Array]:
+    """Draw a start: amplitudes and speeds (modes,), one of them 0, up to a common factor.
+
+    Args:
+        place: of `_place`.
+        blow: True: struck at rest, so speeds alone; False: pressed and released, so amplitudes alone.
+    """
     radius_m, contact_s = _between(random, RADIUS_M), _between(random, CONTACT_S)
     still, pressed = np.zeros(len(modes)), modes.struck(place, radius_m)
     if blow:
@@ -138,6 +152,7 @@ def _start(
 
 
 def _place(random: np.random.Generator, circle: bool) -> tuple[float, float]:
+    """A random place (x, y), evenly over the surface up to 0.9 of the way from the centre to the edge."""
     if circle:
         r, angle = 0.9 * math.sqrt(random.random()), random.uniform(0, 2 * math.pi)
         return r * math.cos(angle), r * math.sin(angle)
@@ -145,6 +160,7 @@ def _place(random: np.random.Generator, circle: bool) -> tuple[float, float]:
 
 
 def _between(random: np.random.Generator, ends: tuple[float, float]) -> float:
+    """A draw that is uniform in the logarithm; equal ends, which may be 0, are the value itself."""
     return ends[0] if ends[0] == ends[1] else log_uniform(random, ends)
 
 
@@ -153,8 +169,10 @@ class DrumError:
     """The errors of one drum and player over the surface: relative squared, in the first second and in the tenth.
 
     Attributes:
+        number: of the drum, see `draw_drum`.
+        blow: "blow" or "pressed": how it starts.
         tenth: None: not measured, or the drum is silent by then.
-        processor_s: for the first second of all modes.
+        processor_s: the processor's time for the first second of all modes.
         slower: how many times as slowly the drum decays, to be there in the tenth second.
     """
 
@@ -177,10 +195,16 @@ class DrumError:
 
 @torch.inference_mode()
 def measure_drum(number: int, players: Mapping[str, Player], rate_hz: int, tenth: bool, seed: int) -> list[DrumError]:
-    """The errors of players on the drum of a number; in the tenth second, too, where it decays `SLOWER` times."""
+    """The errors of players on the drum of a number, one `DrumError` each.
+
+    Args:
+        players: by name.
+        tenth: measure the tenth second, too, on the same drum with decays `SLOWER` times as long.
+    """
     struck = draw_drum(number, seed)
     if tenth:
         struck = replace(struck, resonator=replace(struck.resonator, sigma=struck.resonator.sigma / SLOWER))
+    # over all, in the first second, in each further one
     _, first, *others = motion_errors(struck, players, rate_hz, (10 if tenth else 1) * rate_hz)
     last = others[-1] if tenth and others[-1].energy > struck.unheard * rate_hz else None
     blow = "blow" if struck.speeds_m_s.any() else "pressed"
@@ -204,6 +228,13 @@ def measure_drums(
 ) -> list[DrumError]:
     """The errors of players on so many drums; those that a checkpoint holds are not measured again.
 
+    Args:
+        players: by name, which the checkpoint keeps.
+        count: drums, numbered from 0, that are measured over the first second.
+        tenth: drums, numbered from 0, that are measured over ten seconds, too; 0: none.
+        checkpoint: a CSV file, written after each drum.
+        report: receives the share that is done, 0 … 1.
+
     Raises:
         SchemaError: the checkpoint is no table of errors.
     """
@@ -221,12 +252,24 @@ def measure_drums(
 
 
 def checkpoint_file(runs: Path, preset: str, rate_hz: int, seed: int) -> Path:
+    """The table of a preset's errors on drums in the folder of runs, for `measure_drums`."""
     return runs / f"drums_{preset}_{rate_hz}_seed{seed}_v{DRUMS_VERSION}.csv"
 
 
 @dataclass(frozen=True)
 class DrumsRow:
-    """The errors of one player on many drums; see `DrumError`. `tenth_drums` still sound in the tenth second."""
+    """The errors of one player on many drums: relative squared ones in the first second, see `DrumError`.
+
+    Attributes:
+        drums: how many.
+        modes: the fewest and the most of a drum, in words.
+        geometric_mean, worst: over all drums; `worst_at` describes the drum of the worst.
+        blows, pressed: geometric means of the drums that start so.
+        tenth_drums: how many still sound in the tenth second; `tenth_…`: their errors then.
+        tenth_first: geometric mean of the same drums in the first second.
+        processor_s: median of the processor's time for a second.
+        finished: UTC, ISO 8601.
+    """
 
     player: str
     drums: int
@@ -252,6 +295,7 @@ def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -
     `tenth_first` is the first second's mean of the drums that sound in the tenth.
     """
     of_player = [one for one in errors if one.player == player]
+    # drums with their own decays, and those `SLOWER` times as slow
     of_kind, slow = ([one for one in of_player if one.slow == kind] for kind in (False, True))
     worst = max(of_kind, key=lambda one: one.first)
     late = [one for one in slow if one.tenth is not None]
@@ -277,6 +321,7 @@ def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -
 
 
 def _mean(errors: Iterable[float | None]) -> float | None:
+    """The geometric mean of the errors that are known; None: none is."""
     known = [error for error in errors if error is not None]
     return geometric_mean(known) if known else None
 
@@ -289,4 +334,5 @@ def store(rows: Iterable[DrumsRow], path: Path = ROWS) -> None:
 
 
 def _read(kind: type[T], path: Path) -> list[T]:
+    """The rows of a table, as instances of a dataclass; none where there is no file. Raises SchemaError."""
     return list(checked(read_table(kind, path, "table of drums", LARGEST_BYTES))) if path.exists() else []

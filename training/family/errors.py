@@ -18,7 +18,7 @@ from engine.resonators.family import inharmonicity
 from training.family.motion import SCALE_M, Blocks, Player, linear_motion, motion_errors, of_many, untrained
 from training.family.strings import Column, PluckedString, displacement_m, draw_string
 
-LARGE = 1e-2  # an error that is heard as another string
+LARGE = 1e-2  # relative squared error: above it one hears another string
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,10 @@ class StringError:
     """The error of one string and pluck.
 
     Attributes:
+        inharmonicity: B, see `StringFamily`.
+        tension_rise: ΔT/T₀ of the pluck.
         rel_mse: relative squared error over the grid.
-        processor_s: for a second of the whole string's motion.
+        processor_s: the processor's time for a second of the whole string's motion.
         sounds: whether the string still moves, by the limit `UNHEARD`.
     """
 
@@ -81,13 +83,22 @@ def measure(
     seed: int = 0,
     report: Callable[[float], None] = lambda share: None,
 ) -> dict[str, FamilyErrors]:
-    """The errors of each player on test strings, in one of the windows after the pluck: that at `place`."""
+    """The errors of each player, by its name, on test strings within one window of time.
+
+    Args:
+        column: inside the family or beyond it.
+        count: strings.
+        place: of the window after the pluck, 0 for the first, 9 for the tenth.
+        window_s: length of a window.
+        report: receives the share that is done, 0 … 1.
+    """
     window = round(window_s * rate_hz)
     errors_by_player: dict[str, list[StringError]] = {name: [] for name in players}
     for number in range(count):
         plucked = draw_string(column, "test", number, seed)
         whole, *windows = motion_errors(plucked, players, rate_hz, (place + 1) * window, window=window)
         sounds = windows[place].energy > plucked.unheard * window
+        # the first fields of `StringError`
         facts = plucked.pitch_hz, inharmonicity(plucked.string), plucked.tension_rise, plucked.resonator.modes
         for name, of_player in errors_by_player.items():
             processor_s = whole.processor_s[name] / whole.stop_s
@@ -112,7 +123,7 @@ def averaging(plucked: PluckedString, rate_hz: int) -> Blocks:
         "state_size": plucked.resonator.modes,
         "encoder_widths": (),
         "eigenvalue_widths": (),
-        "node_spacing": 160,
+        "node_spacing": 160,  # samples
         "adiabatic": True,
         "second_order": True,
     }
@@ -132,6 +143,7 @@ def knowing_physics() -> dict[str, Player]:
 
 
 def rollout(model: StringModel[Any], plucked: PluckedString) -> Blocks:
+    """The motion that a model predicts from a pluck's displacement on the grid; the grid's frames become modes."""
     state = model.encode((displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype()))
 
     def more(frames: int) -> Tensor:
@@ -143,9 +155,12 @@ def rollout(model: StringModel[Any], plucked: PluckedString) -> Blocks:
 
 
 def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[tuple[float, float], FamilyErrors]]:
-    """The errors in ranges of the rise of tension.
+    """The errors by range of the rise of tension: (low, high) in ΔT/T₀, and the errors of the strings there.
 
-    The last has both ends, and ranges without a string are left out.
+    A range includes its low end; the last one also its high end. Ranges without a string are left out.
+
+    Args:
+        edges: of the ranges, ascending.
     """
     groups = []
     for low, high in pairwise(edges):

@@ -21,10 +21,10 @@ from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from training.family.strings import PluckedString, displacement_m
 
-DIFFERENCE = 1e-4
-FLOOR = 1e-13  # of a relative error, below which it counts no more
+DIFFERENCE = 1e-4  # of a curve's number, for a derivative
+FLOOR = 1e-13  # is added to each relative error: smaller ones count no more
 FRAMES = 256  # of a string that enter the matrix, drawn again for each step
-DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)  # times the last that was best
+DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)  # tried in each step, times the damping that was best in the last
 
 
 @dataclass(frozen=True)
@@ -47,27 +47,34 @@ def fit_curves(
     seed: int,
     report: Callable[[float, str, float], None] = lambda share, text, left_s: None,
 ) -> float:
-    """Set the model's curves in place to those that are best on validation; its geometric mean there.
+    """Set the model's curves in place to those that are best on validation.
 
     Args:
+        steps: of Gauss and Newton.
         first_frames: in reach of the first step; they grow to all within the first half of the steps.
+        seed: of the frames that enter each step's matrix.
+        report: receives the share that is done, 0 … 1, what was reached in words, and the seconds left.
+
+    Returns:
+        The geometric mean of the strings' relative squared errors on validation.
     """
     generator = torch.Generator().manual_seed(seed)
     longest = len(train[0].truth)
-    size = len(model.A)
+    size = len(model.A)  # numbers of each of the curves A, r, p
     best, present = geometric_mean(errors(model, validation, rate_hz, longest)), _numbers(model)
     best_numbers = present.clone()
     damping = 1e-3
     started = time.monotonic()
     for step in range(steps):
         frames = min(longest, round(first_frames * (longest / first_frames) ** (2 * step / max(1, steps))))
+        # by string: residuals (frames, modes) in m; `before`: relative squared errors (strings,)
         residual = [_motion(model, case, rate_hz, frames) - case.truth[:frames] for case in train]
         before = torch.stack(
             [r.square().sum() / case.truth[:frames].square().sum() for r, case in zip(residual, train, strict=True)]
         )
         matrix, gradient = torch.zeros(3 * size, 3 * size).double(), torch.zeros(3 * size).double()
         chosen = [torch.randperm(frames, generator=generator)[:FRAMES] for _ in train]
-        columns: list[list[Tensor]] = [[] for _ in train]
+        columns: list[list[Tensor]] = [[] for _ in train]  # of each string, by number: slopes at the chosen frames
         for number in range(3 * size):
             moved = present.clone()
             moved[number] += DIFFERENCE
@@ -111,6 +118,7 @@ def errors(model: KoopmanTension, cases: Sequence[FitCase], rate_hz: int, frames
 
 
 def geometric_mean(errors: Tensor) -> float:
+    """The geometric mean of errors (strings,)."""
     return float(errors.clamp(min=1e-300).log().mean().exp())
 
 
@@ -122,9 +130,11 @@ def _motion(model: KoopmanTension, case: FitCase, rate_hz: int, frames: int) -> 
 
 
 def _numbers(model: KoopmanTension) -> Tensor:
+    """A copy of the numbers of the curves A, r and p, one after the other, (3 · numbers of a curve,)."""
     return torch.cat([model.A, model.r, model.p]).detach().clone()
 
 
 def _set(model: KoopmanTension, numbers: Tensor) -> None:
+    """Set the curves from numbers in the order of `_numbers`."""
     for curve, part in zip((model.A, model.r, model.p), numbers.chunk(3), strict=True):
         curve.copy_(part)

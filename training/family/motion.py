@@ -22,9 +22,9 @@ from engine.models.koopman_tension import SERIES, KoopmanTension
 from engine.resonators.base import Array, Resonator
 from engine.truth import ModalState, SplittingSolver, default_substeps
 
-SCALE_M = 1e-3
-UNHEARD = 1e-18  # of the energy at the release: an error below that of what has fallen so far is none
-AT_ONCE = 1_200  # frames; 1,600 modes of them are 15 MB
+SCALE_M = 1e-3  # a model's unit of displacement
+UNHEARD = 1e-18  # share of the squares at the release: a motion that has fallen below it counts as silent
+AT_ONCE = 1_200  # frames of a block; with 1,600 modes they are 15 MB
 # times fewer sub-steps than a data set has: 1e-12 of the energy off after a second, inside the family
 SUBSTEP_DIVISOR = 3
 
@@ -39,7 +39,7 @@ class Released:
         tension_rise: ΔT/T₀ that the start would reach, if all of it were displacement.
     """
 
-    silence: ClassVar = 0.0  # the share of all, below which the solver leaves out a mode
+    silence: ClassVar = 0.0  # share of the amplitude of all modes, below which the highest is left out; 0: none is
 
     resonator: Resonator
     amplitudes_m: Array
@@ -53,21 +53,25 @@ class Released:
 
     @property
     def state(self) -> ModalState:
+        """Amplitudes in m and speeds in m/s at the start, float64 (1, modes) each."""
         return ModalState(*(torch.from_numpy(part)[None] for part in (self.amplitudes_m, self.speeds_m_s)))
 
     @property
     def unheard(self) -> float:
-        """The sum over a frame of the squares below which nothing is heard."""
+        """The weighted sum of squared amplitudes in m² of a frame that is just silent: `UNHEARD` of the start's."""
         size = np.square(self.amplitudes_m) + np.square(self.speeds_m_s / self.resonator.omega)
         return UNHEARD * float(size @ self.weight)
 
 
-Blocks = Callable[[int], Tensor]  # each call gives the next frames, (frames, modes) in m
-Player = Callable[[Any, int], Blocks]  # of what is `Released`, at a rate in Hz
+# Each call with a number of frames gives the next ones, modal amplitudes (frames, modes) in m. The first call begins
+# one sample after the start, which is no frame itself.
+Blocks = Callable[[int], Tensor]
+# from what is `Released`, and a rate in Hz, to its motion
+Player = Callable[[Any, int], Blocks]
 
 
 def true_motion(released: Released, rate_hz: int) -> Blocks:
-    """The true motion, by the solver."""
+    """The true motion by the solver (a splitting of exact flows and kicks), from one sample after the start."""
     resonator, state = released.resonator, released.state
     substeps = max(1, -(-default_substeps(resonator, rate_hz) // SUBSTEP_DIVISOR))
     solver = SplittingSolver(resonator, rate_hz, substeps=substeps, silence=released.silence)
@@ -75,13 +79,16 @@ def true_motion(released: Released, rate_hz: int) -> Blocks:
 
 
 def linear_motion(released: Released, rate_hz: int) -> Blocks:
-    """The motion without tension modulation, exactly: what all errors are large beside."""
+    """The exact motion without tension modulation, as a baseline that every model should be far better than."""
     uncoupled = replace(released.resonator, coupling=np.zeros_like(released.resonator.coupling))
     return true_motion(replace(released, resonator=uncoupled), rate_hz)
 
 
 def model_player(model: StringModel[Any]) -> Player:
-    """The player by what was learned of strings. Raises ValueError: see `of_many`."""
+    """The player by a model of many strings, for strings and drums alike. Raises ValueError: see `of_many`.
+
+    It sets out from the modes' amplitudes and speeds; `errors.player` sets out from displacement on a grid.
+    """
     of_any = of_many(model)
 
     def play(released: Released, rate_hz: int) -> Blocks:
@@ -106,7 +113,7 @@ def of_many(model: StringModel[Any]) -> KoopmanTension:
 
 
 def untrained(how: str) -> KoopmanTension:
-    """`koopman_tension` as its start of this name leaves it, without a string."""
+    """`koopman_tension` before training, without a string; `how`: the name of its start, "kicks" or "series"."""
     model = of_many(build_model("koopman_tension", {"modes": 1, "grid_points": 1}))
     if how == "series":
         with torch.no_grad():
@@ -115,6 +122,13 @@ def untrained(how: str) -> KoopmanTension:
 
 
 def _blocks(advance: Callable[[Any, int], tuple[Any, Any]], state: Any, scale: float = 1.0) -> Blocks:
+    """The motion from a state on.
+
+    Args:
+        advance: from a state and a number of frames to these frames (1, frames, modes) and the state after them.
+        scale: m in a unit of its amplitudes.
+    """
+
     def more(frames: int) -> Tensor:
         nonlocal state
         motion, state = advance(state, frames)
@@ -125,7 +139,13 @@ def _blocks(advance: Callable[[Any, int], tuple[Any, Any]], state: Any, scale: f
 
 @dataclass(frozen=True)
 class Window:
-    """Relative squared errors between two times, by player; `energy`: what they are relative to."""
+    """The errors between two times, counted from the start.
+
+    Attributes:
+        energy: weighted sum of the true squared amplitudes of its frames, in m², which errors are relative to.
+        rel_mse: by player; inf: the motion is not finite; nan: the truth has no energy there.
+        processor_s: time of the processor that each player took for it.
+    """
 
     start_s: float
     stop_s: float
@@ -144,12 +164,20 @@ def motion_errors(
     *,
     window: int | None = None,
 ) -> list[Window]:
-    """The errors of players over the first frames: in all, then in each `window` of frames; None: a second."""
+    """The errors of players over the first `frames` of a motion.
+
+    Args:
+        report: receives the share that is done, 0 … 1.
+        window: frames of a window; None: a second of them. The last window may be shorter.
+
+    Returns:
+        One `Window` over all frames, then each window by itself.
+    """
     true, weight = true_motion(released, rate_hz), torch.from_numpy(released.weight)
     playing = [play(released, rate_hz) for play in players.values()]
     edges = [*range(0, frames, window or rate_hz), frames]
-    energy = np.zeros(len(edges) - 1)
-    wrong, spent = np.zeros((2, len(edges) - 1, len(players)))
+    energy = np.zeros(len(edges) - 1)  # (windows,)
+    wrong, spent = np.zeros((2, len(edges) - 1, len(players)))  # squared errors, seconds: (windows, players)
     for part, (first, stop) in enumerate(pairwise(edges)):
         for begin in range(first, stop, AT_ONCE):
             count = min(AT_ONCE, stop - begin)

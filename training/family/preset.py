@@ -33,9 +33,11 @@ class FamilyConfiguration:
 
     Attributes:
         string: that the preset plays by default, with `modes`.
+        initialisation: a start of `koopman_tension`, "kicks" or "series".
+        degree: of the polynomials that are its curves.
         strings, validation_strings, test_strings: how many of each split.
         seconds: of each string's motion.
-        steps: of the fit; the first reaches `first_s` of the motion.
+        steps: of the fit, see `fit_curves`; the first reaches `first_s` seconds of the motion.
     """
 
     title: str
@@ -61,7 +63,7 @@ class FamilyConfiguration:
 
 
 def read_configuration(path: Path = CONFIGURATION) -> FamilyConfiguration:
-    """Raise SchemaError, naming file and field."""
+    """Read a run's .toml file; default that of studio_any_string. Raises SchemaError, which names file and field."""
     if not path.is_file():
         raise SchemaError(f"{path}: no such configuration; give a .toml file")
     return read(FamilyConfiguration, read_toml(path), str(path))
@@ -79,7 +81,7 @@ def train_preset(
         report: receives the share that is done, what is being done, and the time left, where it is known.
     """
     c, started = configuration, time.monotonic()
-    steps = round(c.seconds * c.rate_hz)
+    steps = round(c.seconds * c.rate_hz)  # frames of each motion; c.steps are the fit's
     counts = {"train": c.strings, "validation": c.validation_strings, "test": c.test_strings}
     cases: dict[str, list[FitCase]] = {split: [] for split in counts}
     for split, count in counts.items():
@@ -138,7 +140,7 @@ def train_preset(
 
 @torch.inference_mode()
 def mean_errors(model: KoopmanTension, cases: list[FitCase], rate_hz: int) -> tuple[float, float]:
-    """Relative MSE and MAE of displacement on the grid, each string's own, and their mean over the strings."""
+    """Relative MSE and MAE of displacement on the grid: the mean over the strings of each string's own."""
     play = player(model)
     errors = []
     for case in cases:

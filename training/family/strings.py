@@ -26,16 +26,18 @@ Column = Literal["inside", "beyond"]
 COLUMNS: tuple[Column, ...] = get_args(Column)
 SPLITS = ("train", "validation", "test")
 DRAWN_SHAPES: tuple[Shape, ...] = ("triangular", "raised_cosine", "gaussian")
-FAMILY_VERSION = 1  # of what a seed means
-HIGHEST_HZ = 20_000.0
+FAMILY_VERSION = 1  # of the draws: with another one the same seed and number give another string
+HIGHEST_HZ = 20_000.0  # of a mode
 MOST_MODES = 99
 GRID_POINTS = 101
+# of every string: they change nothing but units
 LENGTH_M = 0.65
 MASS_KG_M = 5e-4
 AREA_M2 = 5e-7
-MODULUS_PA = 2e10  # of every string: they change nothing but units
+MODULUS_PA = 2e10
 
 
+# pitch in Hz, inharmonicity B, decay by 60 dB of the first mode and of that near 3 kHz in s, rise of tension ΔT/T₀
 FAMILY: dict[Column, StringFamily] = {
     "inside": StringFamily(((55, 880),), ((1e-5, 1e-3),), (1, 20), (0.1, 1), (0.02, 0.5)),
     "beyond": StringFamily(((30, 55), (880, 1500)), ((2e-6, 1e-5), (1e-3, 3e-3)), (1, 40), (0.1, 1), (0.1, 0.8)),
@@ -50,13 +52,13 @@ class PluckedString(Released):
 
 
 def draw_string(column: Column, split: str, number: int, seed: int = 0) -> PluckedString:
-    """The string of a number; the same for ever, however many are drawn."""
+    """The string of a number in a column and split, with its pluck; always the same, however many are drawn."""
     entropy = (FAMILY_VERSION, seed, COLUMNS.index(column), SPLITS.index(split), number)
     return draw_from(FAMILY[column], np.random.default_rng(entropy))
 
 
 def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | None = None) -> PluckedString:
-    """A string and a pluck of it within any ranges; the shape is drawn where none is given."""
+    """A random string and a pluck of it within ranges; `shape`: of the pluck, None: drawn."""
     while True:
         pitch_hz, inharmonicity = (_either(random, r) for r in (ranges.pitch_hz, ranges.inharmonicity))
         t60_s, bright_t60_s = log_uniform(random, ranges.t60_s), log_uniform(random, ranges.bright_t60_s)
@@ -68,6 +70,7 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
     half_width, rise = log_uniform(random, ranges.half_width), log_uniform(random, ranges.tension_rise)
     shape = shape or drawn
     width = 2 * half_width if shape == "raised_cosine" else half_width
+    # a peak of 1 mm first, then scaled to the rise of tension that was drawn
     amplitudes = resonator.to_modes(displacement(shape, place, width, 1e-3, GRID_POINTS))
     amplitudes = amplitudes * np.sqrt(rise / resonator.relative_tension_rise(amplitudes))
     at_rest, even = np.zeros_like(amplitudes), np.ones_like(amplitudes)  # sines are orthogonal, and of one size
@@ -79,8 +82,9 @@ def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s:
 
     Where even a first mode without any damping of its own would decay faster than `t60_s`, it decays so.
     """
+    # decay rates σ in 1/s: mode n has constant + of_squares · n²
     slow, fast = math.log(1000) / t60_s, math.log(1000) / bright_t60_s
-    bright = max(2, round(BRIGHT_HZ / pitch_hz))
+    bright = max(2, round(BRIGHT_HZ / pitch_hz))  # number of the mode near BRIGHT_HZ
     of_squares = min((fast - slow) / (bright**2 - 1), fast / bright**2)
     constant = max(0.0, slow - of_squares)
     eta = math.pi / LENGTH_M
@@ -104,13 +108,15 @@ def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
 
 
 def displacement_m(plucked: PluckedString) -> Tensor:
-    """The displacement at its release, float64 (grid_points,)."""
+    """The displacement at its release in m, float64 (grid_points,)."""
     return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m))
 
 
 def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+    """A draw between bounds above 0 that is uniform in the logarithm."""
     return math.exp(random.uniform(math.log(bounds[0]), math.log(bounds[1])))
 
 
 def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]) -> float:
+    """A draw by `log_uniform` from one of several ranges, each as likely."""
     return log_uniform(random, bounds[int(random.integers(len(bounds)))])

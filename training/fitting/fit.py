@@ -37,8 +37,8 @@ from training.fitting.soap import SOAP
 from training.fitting.start import begin
 from training.start import LEAST_SQUARES
 
-CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
-TELL_EVERY_S = 5.0  # within an epoch
+CHECKPOINT_EVERY_S = 30.0  # at most between two; longer where one step takes longer
+TELL_EVERY_S = 5.0  # between two reports of progress within an epoch
 
 
 class Diverged(RuntimeError):
@@ -51,8 +51,11 @@ class FitProgress:
 
     Attributes:
         step, steps: optimiser's steps, done and in all.
-        epoch: the one that ends, or is under way.
-        loss: mean square of the predictions' errors so far in this epoch.
+        epoch: the one that ends, or is under way, from 1 to `epochs`.
+        horizon: frames in reach of the loss.
+        loss: mean square of the predictions' errors so far in this epoch, in normalised units.
+        validation: None where it was not measured now.
+        seconds, seconds_left: of training, so far and estimated.
     """
 
     step: int
@@ -167,11 +170,11 @@ class Steps:
     """The steps of runs that are at the same one: in one pass where their model allows it, recorded on a GPU."""
 
     def __init__(self) -> None:
-        self._runs: Sequence[TrainingState] = []
-        self._work: Callable[[], None] = lambda: None
+        self._runs: Sequence[TrainingState] = []  # that took the last step
+        self._work: Callable[[], None] = lambda: None  # a step of these runs
 
     def take(self, runs: Sequence[TrainingState]) -> None:
-        """Take the next step of `runs`."""
+        """Take the next step of `runs`; a change of runs makes the work again."""
         if runs != self._runs:
             self._runs = runs
             work = partial(take_step, runs)
@@ -200,7 +203,15 @@ def take_step(runs: Sequence[TrainingState]) -> None:
 
 
 class TrainingState:
-    """A training between two steps: all that a checkpoint holds."""
+    """A training between two steps: all that a checkpoint holds.
+
+    Latents are what an encoder yields. After a matching pursuit the encoder first learns the latents that were fitted
+    to the data; only then are there predictions to train on.
+
+    Attributes:
+        step: of the optimiser, how many are done.
+        seconds: of training, over all processes that took part.
+    """
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
@@ -209,20 +220,20 @@ class TrainingState:
         self._dataset = dataset
         self.device = device
         self.model, latents = begin(configuration, dataset)
-        self._latents = latents.to(device) if latents else None
+        self._latents = latents.to(device) if latents else None  # to be learned first; None: none are
         self.model.to(device)
         self._data = TrainingData(dataset, device)
-        self._per_epoch = -(-self._data.count // recipe.batch_size)
+        self._per_epoch = -(-self._data.count // recipe.batch_size)  # steps
         self._optimiser = _optimiser(self.model, recipe)
-        self._rows = torch.zeros(0, dtype=torch.int64, device=device)
-        self._average: AveragedModel | None = None
+        self._rows = torch.zeros(0, dtype=torch.int64, device=device)  # trajectories of the step that was begun
+        self._average: AveragedModel | None = None  # running mean of the weights; None: the recipe has none
         if recipe.average_decay:
             mean = get_ema_multi_avg_fn(recipe.average_decay)
             self._average = AveragedModel(self.model, multi_avg_fn=mean, use_buffers=True)
         self.step, self.seconds = 0, 0.0
-        self._total = torch.zeros((), device=device)  # of this epoch's losses
-        self._start: RelativeError | None = None
-        self._best: RelativeError | None = None
+        self._total = torch.zeros((), device=device)  # sum of this epoch's mean squares, one a step
+        self._start: RelativeError | None = None  # validation error before training, see `FitResult.start`
+        self._best: RelativeError | None = None  # lowest validation error by MAE; None: none was finite
         self._best_sums: ErrorSums | None = None  # None where they were measured before the last checkpoint
         self._best_epoch = 0
         self._best_model = _copy(self.model)
@@ -234,10 +245,12 @@ class TrainingState:
 
     @property
     def ends_epoch(self) -> bool:
+        """Return True between two epochs, also before the first step."""
         return self.step % self._per_epoch == 0
 
     @property
     def ended(self) -> bool:
+        """Return True if no step is left: after the last epoch, or where patience has run out."""
         # while the latents are learned there is no prediction, and so none that is no better
         since = max(self._best_epoch, self._latent_steps // self._per_epoch)
         gave_up = 0 < self.recipe.patience <= self.epoch - since
@@ -250,6 +263,7 @@ class TrainingState:
 
     @property
     def validation_is_due(self) -> bool:
+        """Return True if the epoch that has just ended is one that is validated."""
         if self.step <= self._latent_steps:
             return self.step == self._latent_steps
         return self.epoch % self.recipe.validate_every == 0 or self.epoch == self.recipe.epochs
@@ -261,6 +275,7 @@ class TrainingState:
 
     @property
     def learns_latents(self) -> bool:
+        """Return True if the next step teaches the encoder the fitted latents."""
         return self._latents is not None and self.step < self._latent_steps
 
     @property
@@ -307,7 +322,7 @@ class TrainingState:
             self.descend(error)
 
     def draw(self) -> Batch:
-        """The batch of the step that was begun."""
+        """The batch of the step that was begun, over the present horizon."""
         horizon, _ = self._schedules()
         return self._data.draw(self.recipe, self._rows, horizon, self.step)
 
@@ -343,7 +358,7 @@ class TrainingState:
         return horizon_at(recipe, share, self._configuration.steps), learning_rate_at(recipe, share)
 
     def progress(self, validation: RelativeError | None, step_s: float) -> FitProgress:
-        """`step_s`: what a step has taken."""
+        """The progress; `validation`: None where it was not measured now, `step_s`: mean time of a step so far."""
         epochs, (horizon, learning_rate) = self.recipe.epochs, self._schedules()
         steps = epochs * self._per_epoch
         left_s = step_s * (steps - self.step)
@@ -367,6 +382,7 @@ class TrainingState:
             self._start = error if _is_finite(error) else None
 
     def result(self) -> FitResult:
+        """Return the best model by validation MAE with its errors. Raises Diverged: there is none."""
         if self._best is None:
             raise Diverged("the validation error was never a number; lower peak_learning_rate")
         model = self._measured()
@@ -375,6 +391,7 @@ class TrainingState:
         return FitResult(model.eval(), sums, self.epoch, self._best_epoch, self.seconds, self._start)
 
     def checkpoint(self) -> Checkpoint:
+        """Return all that `restore` needs to continue bit for bit."""
         facts = {
             "configuration": write(self._configuration),
             "step": self.step,
@@ -389,6 +406,11 @@ class TrainingState:
         return Checkpoint(self.model.state_dict(), self._best_model, average, moments, facts)
 
     def restore(self, checkpoint: Checkpoint, path: Path) -> None:
+        """Set all of the state to a checkpoint's; `path`: its file, for messages.
+
+        Raises:
+            ValueError: it is damaged, or of other settings; the message names the remedy.
+        """
         facts, device = checkpoint.facts, next(self.model.parameters()).device
         try:  # read, not compared as it is: fields that came later have their defaults
             other = read_configuration(facts["configuration"], f"{path}: configuration")
@@ -430,26 +452,32 @@ class _UnderWay(TrainingState):
         begun = time.monotonic()
         super().__init__(run.configuration, dataset, device)
         self._path, self._report = folder / run.name / "checkpoint.safetensors", partial(report, run)
-        self._diverged: Diverged | None = None
+        self._diverged: Diverged | None = None  # None: it has not
         if self._path.exists():
             self.restore(Checkpoint.load(self._path), self._path)
         else:
             self.measure_start()
             self.seconds = time.monotonic() - begun
-        self._saved = self._reported = time.monotonic()
+        self._saved = self._reported = time.monotonic()  # when it was last, in s of that clock
 
     @property
     def ended(self) -> bool:
         return self._diverged is not None or super().ended
 
     def outcome(self) -> FitResult | Diverged:
+        """Return the result of a run that has ended, or why it has none."""
         try:
             return self._diverged or self.result()
         except Diverged as error:
             return error
 
     def follow_step(self, step_s: float, every_s: float) -> None:
-        """Validate, report and save what is due after a step that took about `step_s`."""
+        """Validate, report and save what is due after a step.
+
+        Args:
+            step_s: mean time of a step so far.
+            every_s: between two checkpoints, at most.
+        """
         validation = None
         if self.ends_epoch:
             if not math.isfinite(self.loss):
@@ -482,6 +510,11 @@ def _fit_at_once(run: Run, dataset: Dataset, report: Report) -> FitResult:
 
 
 def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer:
+    """The optimiser of a recipe, with three groups of parameters.
+
+    They are all others, the couplings, and last the slow ones, as a rule the eigenvalues'. A group's `share` is that
+    of the learning rate which it gets.
+    """
     eigenvalues: list[torch.nn.Parameter] = []
     coupling: list[torch.nn.Parameter] = []
     others: list[torch.nn.Parameter] = []
@@ -521,4 +554,5 @@ def _is_finite(error: RelativeError) -> bool:
 
 
 def _copy(model: torch.nn.Module) -> dict[str, Any]:
+    """A copy of a model's weights by name."""
     return {name: deepcopy(t.detach()) for name, t in model.state_dict().items()}

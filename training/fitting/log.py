@@ -16,7 +16,7 @@ DIGITS = 6  # of a figure in the log
 
 @dataclass(frozen=True)
 class Epoch:
-    """A line of the log; the errors are those of validation, where it was measured."""
+    """A line of the log; the errors are those of validation, None where it was not measured; horizon in frames."""
 
     epoch: int
     horizon: int
@@ -45,7 +45,7 @@ class TrainingLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._trimmed = False
+        self._trimmed = False  # whether later epochs of an earlier run are gone from the file
 
     def add(self, progress: FitProgress) -> None:
         """Add the epoch that has ended; later ones of an earlier run are dropped."""
@@ -63,4 +63,5 @@ class TrainingLog:
 
 
 def _rounded(value: float | None) -> float | None:
+    """A figure to `DIGITS` digits; None where it is none, or is not finite."""
     return float(f"{value:.{DIGITS}g}") if value is not None and math.isfinite(value) else None

@@ -28,7 +28,7 @@ SILENT = 1e-12  # a string's mean square in normalised units that a relative los
 
 @runtime_checkable
 class ObservedModel(Protocol):
-    """A Koopman model of constant eigenvalues, whose decoder reads states that follow from the latents."""
+    """A Koopman model of constant eigenvalues λ, whose decoder reads states that follow from the latents."""
 
     def encode(self, displacement: Tensor) -> Any: ...
     def powers(self, frames: Tensor) -> Tensor: ...
@@ -91,6 +91,7 @@ def _is_a_mean(model: nn.Module, recipe: Recipe) -> bool:
 
 
 def _powers(model: ObservedModel, batch: Batch) -> Tensor:
+    """The powers of the eigenvalues at the batch's frames, complex of its precision."""
     return model.powers(batch.frames).to(batch.target.dtype.to_complex())
 
 
@@ -102,7 +103,16 @@ def _text_loss(
     latents: Tensor,
     predicted: Tensor,
 ) -> tuple[Tensor, Tensor]:
-    """The loss of the paper's text: encoding on the first frame, consistency of latents."""
+    """The loss of the paper's text: encoding on the first frame, consistency of latents.
+
+    Args:
+        origin: encoded initial frames, complex (batch, latents).
+        latents: predicted ones at the batch's frames, (batch, frames, latents).
+        predicted: displacement at these frames, (batch, frames, grid_points).
+
+    Returns:
+        the loss, and the mean square of the prediction's error.
+    """
     loss, prediction = _prediction(predicted, batch.target, recipe)
     loss = loss + functional.mse_loss(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
@@ -123,16 +133,22 @@ def _published_loss(model: ObservedModel, batch: Batch, recipe: Recipe, powers: 
 
 
 def _consistency(states: Tensor, encoded: Tensor) -> Tensor:
+    """The mean squared magnitude of the difference of complex states, one number."""
     return 2 * functional.mse_loss(torch.view_as_real(states), torch.view_as_real(encoded))
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
+    """The prediction at the batch's frames, (batch, frames, grid_points), by a rollout up to the last of them."""
     frames, _ = model.advance(model.encode(batch.initial), batch.last)
     return frames if batch.every else frames[:, batch.frames - 1]
 
 
 def _prediction(predicted: Tensor, wanted: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
-    """The prediction's loss, and the mean square of its error."""
+    """The prediction's loss as the recipe counts it, and the mean square of its error, without gradient.
+
+    Args:
+        predicted, wanted: (batch, frames, grid_points) in normalised units.
+    """
     error = functional.mse_loss(predicted, wanted)
     if recipe.loss == "log10_mse":
         return error.log10(), error.detach()

@@ -54,6 +54,7 @@ def known_modes(dataset: Dataset, steps: int) -> Modes:
     grids = []
     for eigenvalue in linear:
         linear_frequency = float(eigenvalue.imag)
+        # rad a sample
         reach = linear_frequency - 4 * math.pi / steps, linear_frequency * (1 + rise) + math.pi / steps
         spacing = max(math.pi / 2 / steps, linear_frequency * rise / FREQUENCIES)
         grids.append(_grid(linear_frequency, reach, spacing, -float(eigenvalue.real), steps))
@@ -70,6 +71,7 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
     points, stride = dataset.configuration.grid_points, dataset.configuration.stride
     if stride != 1:
         raise ValueError(f"a blind start needs every frame: the data's stride must be 1, not {stride}")
+    # sums of u uᵀ, and of (u(t+1) + u(t-1)) uᵀ: (grid_points, grid_points)
     now, next_to_it = torch.zeros(2, points, points, dtype=torch.float64)
     for frames in _displacements(dataset, steps):
         middle = frames[:, 1:-1].flatten(0, 1)
@@ -99,7 +101,7 @@ def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
 
 
 def _seen_grid(motions: Tensor, steps: int) -> Tensor:
-    """Exponentials where the motions (count, steps) of one shape have their energy."""
+    """The log eigenvalues to choose from, see `_grid`, where motions (count, steps) of a shape have their energy."""
     window = torch.hann_window(steps, periodic=False, dtype=motions.dtype)
     power = torch.fft.rfft(motions * window).abs().square().mean(0)
     share = power.cumsum(0) / power.sum()
@@ -113,7 +115,13 @@ def _seen_grid(motions: Tensor, steps: int) -> Tensor:
 
 
 def _grid(linear_frequency: float, reach: tuple[float, float], spacing: float, decay: float, steps: int) -> Tensor:
-    """Frequencies in reach, and a mode's own, with each decay: log eigenvalues a sample."""
+    """A grid of log eigenvalues a sample, complex128 (any,): each frequency with each of `DECAYS`.
+
+    Args:
+        linear_frequency: of the mode itself, in rad a sample; it is the first of the grid.
+        reach: lowest and highest other frequency, `spacing` apart, in rad a sample.
+        decay: of the mode itself, in nepers a sample, to which `DECAYS` are added.
+    """
     frequencies = torch.arange(*reach, spacing, dtype=torch.float64)
     frequencies = torch.cat([torch.tensor([linear_frequency], dtype=torch.float64), frequencies[frequencies > 0]])
     decays = torch.tensor(DECAYS, dtype=torch.float64) / steps + decay

@@ -71,7 +71,13 @@ def horizons(frames: int) -> Iterator[int]:
 
 
 def string_modes(motions: list[Floats], slowest: float, modes: Modes) -> StringModes:
-    """The modes as fitted; uncoupled where there is no κ."""
+    """The modes as fitted.
+
+    Args:
+        motions: of each mode ω, σ, Re s, Im s and its κ (modes,); without κ the modes are uncoupled.
+        slowest: least σ in nepers a sample.
+        modes: their shapes, and their motions for the starts.
+    """
     omega, sigma, real, imag = np.array(motions)[:, :4].T
     count = len(motions)
     coupling = np.array(motions)[:, 4:] if len(motions[0]) > 4 else np.zeros((count, count))
@@ -85,7 +91,7 @@ def string_modes(motions: list[Floats], slowest: float, modes: Modes) -> StringM
 
 
 def first_guess(motions: Floats, count: int) -> Floats:
-    """The guess of ω, σ, Re s, Im s and κ (count,) from the first frames.
+    """The guess of ω, σ, Re s, Im s and κ (count,) from the first frames of a mode's motions (trajectories, frames).
 
     ω is the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t).
     """
@@ -104,7 +110,13 @@ def upright(guess: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class ModeMotion:
-    """A mode's samples: start and displacement there, time, and the energies' integrals, (samples, modes)."""
+    """Samples of a mode's motion, each of some trajectory at some time.
+
+    Attributes:
+        start, displacement: the mode's amplitude at frame 0 and at the sample, (samples,).
+        times: in frames, (samples,).
+        integrals: of the energy of each mode up to the sample, (samples, modes).
+    """
 
     start: Floats
     displacement: Floats
@@ -112,6 +124,7 @@ class ModeMotion:
     integrals: Floats
 
     def fitted(self, guess: Floats) -> Floats:
+        """A better guess by least squares; numbers and their order are those of `first_guess`."""
         fit = least_squares(
             self._error, guess, self._slopes, method="lm", x_scale="jac", ftol=1e-4, max_nfev=EVALUATIONS
         )
@@ -121,13 +134,14 @@ class ModeMotion:
         return self._latent(guess).real - self.displacement
 
     def _slopes(self, guess: Floats) -> Floats:
-        """(samples, unknowns)."""
+        """The derivatives of `_error` by ω, σ, Re s, Im s and each κ, (samples, unknowns)."""
         latent = self._latent(guess)
         turn = latent / complex(guess[2], guess[3])
         along = np.stack([-latent.imag * self.times, -latent.real * self.times, turn.real, -turn.imag], axis=1)
         return np.concatenate([along, -latent.imag[:, None] * self.integrals], axis=1)
 
     def _latent(self, guess: Floats) -> NDArray[np.complex128]:
+        """The complex amplitude at each sample, (samples,), whose real part is the displacement."""
         omega, sigma, real, imag = guess[:4]
         phase = omega * self.times + self.integrals @ guess[4:]
         return self.start * complex(real, imag) * np.exp(-sigma * self.times + 1j * phase)

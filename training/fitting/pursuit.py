@@ -135,7 +135,7 @@ def pursue(
         raise ValueError(f"latent_epochs needs every frame: the data's stride must be 1, not {c.stride}")
     modes = found_modes(dataset, steps) if blind else known_modes(dataset, steps)
     n, count = model.configuration.state_size, len(modes.grids)
-    most = min(n, 3 * (-(-n // count)))
+    most = min(n, 3 * (-(-n // count)))  # exponentials of a mode: three times an even share
     motions = modes.motions[:, 1:]
     chains = [_pursuit(grid, motions[:TRAJECTORIES, :, mode], most) for mode, grid in enumerate(modes.grids)]
     lengths = _share_out([chain.gains for chain in chains], n)
@@ -147,7 +147,7 @@ def pursue(
     mirror = torch.ones(2 * n)
     first = 0
     for mode, (chain, length) in enumerate(zip(chains, lengths, strict=True)):
-        here = torch.arange(first, first + length)
+        here = torch.arange(first, first + length)  # latents of this mode
         log_eigenvalues[here] = chain.log_eigenvalues[:length]
         shapes[here] = modes.shapes[mode]
         basis = chain.basis[:, : 2 * length]
@@ -181,7 +181,10 @@ class _Chain:
 
 
 def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
-    """Simultaneous orthogonal matching pursuit of real motions (count, steps) in exponentials of `grid`."""
+    """Choose at most `most` exponentials of `grid` that explain real motions (count, steps) together.
+
+    It is simultaneous orthogonal matching pursuit. It ends early where no exponential differs from the chosen ones.
+    """
     exponentials = torch.exp(grid[:, None] * _frames(motions.shape[1]))
     pairs = torch.stack([exponentials.real, exponentials.imag], dim=1)  # (grid, 2, steps)
     pairs = pairs / pairs.square().sum(-1, keepdim=True).sqrt()
@@ -189,7 +192,7 @@ def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
     chosen = []
     gains = []
     basis = []
-    for _ in range(most):
+    for _ in range(most):  # (grid, 2, 2): products of each pair with itself, and with the motions
         gram = pairs @ pairs.mT
         determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1].square()
         apart = (gram[:, 0, 0] > APART) & (gram[:, 1, 1] > APART) & (determinant > 0.1 * APART**2)
@@ -210,7 +213,11 @@ def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
 
 
 def _share_out(gains: list[list[float]], size: int) -> list[int]:
-    """Share out exponentials to the modes, the greatest gains first: `size` in all, or all there are."""
+    """The number of exponentials for each mode: `size` in all, or all there are, the greatest gains first.
+
+    Args:
+        gains: of each mode's exponentials, in the order of their choice.
+    """
     lengths = [0] * len(gains)
     for _ in range(min(size, sum(map(len, gains)))):
         open_modes = [mode for mode, chain in enumerate(gains) if lengths[mode] < len(chain)]
@@ -219,4 +226,5 @@ def _share_out(gains: list[list[float]], size: int) -> list[int]:
 
 
 def _frames(steps: int) -> Tensor:
+    """The frame numbers 1 … steps, float64 (steps,)."""
     return torch.arange(1, steps + 1, dtype=torch.float64)

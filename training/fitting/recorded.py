@@ -22,9 +22,9 @@ class RecordedWork:
     """
 
     def __init__(self, work: Callable[[], None]) -> None:
-        self._work, self._calls = work, 0
-        self._graph: torch.cuda.CUDAGraph | None = None
-        self._stream = torch.cuda.Stream()
+        self._work, self._calls = work, 0  # calls before the recording
+        self._graph: torch.cuda.CUDAGraph | None = None  # the recording; None: not made yet
+        self._stream = torch.cuda.Stream()  # of the calls before it
 
     def __call__(self) -> None:
         if self._graph is None and self._calls == BEFORE:
@@ -43,6 +43,7 @@ class RecordedWork:
 
 @contextmanager
 def _products() -> Iterator[None]:
+    """Give products of matrices `PRECISION` within the block."""
     before = torch.get_float32_matmul_precision()
     torch.set_float32_matmul_precision(PRECISION)
     try:

@@ -52,7 +52,12 @@ def _matrix(tensor: Tensor) -> Tensor:
 
 
 def _direction(state: dict[str, Tensor], gradient: Tensor) -> Tensor:
-    """The direction of a step at a learning rate of 1, to be subtracted, of the gradient's shape."""
+    """The direction of a step at a learning rate of 1, to be subtracted, of the gradient's shape.
+
+    Args:
+        state: of one parameter, changed in place; empty before the first iteration, whose direction is 0.
+        gradient: (m, n), or a vector.
+    """
     if not state:
         if not bool(gradient.isfinite().all()):  # it has no eigenvectors
             return torch.zeros_like(gradient)
@@ -82,6 +87,7 @@ def _direction(state: dict[str, Tensor], gradient: Tensor) -> Tensor:
 
 
 def _covariances(gradient: Tensor) -> tuple[tuple[str, Tensor], tuple[str, Tensor]]:
+    """Both covariances of one gradient (m, n): "left" (m, m) and "right" (n, n)."""
     return ("left", gradient @ gradient.T), ("right", gradient.T @ gradient)
 
 

@@ -61,6 +61,7 @@ def new_model(
 
 
 def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> StringModel[Any]:
+    """The model of a run that starts from the displacement alone, see `phases`; as many modes as are found."""
     from training.fitting.modes import found_modes
     from training.fitting.phases import STORES, WIRED
 

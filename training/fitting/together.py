@@ -37,6 +37,7 @@ def can_be_mapped(models: Sequence[StringModel[Any]], batches: Sequence[Batch]) 
 
 
 def _same_frames(batches: Sequence[Batch]) -> bool:
+    """Return True if all batches have the same frames."""
     if all(batch.every for batch in batches):
         return True
     return all(torch.equal(batch.frames, batches[0].frames) for batch in batches)
@@ -73,7 +74,7 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
 
 
 class _Loss(nn.Module):
-    """`training_loss` as a module's output, for `functional_call`."""
+    """`training_loss` as a module's output, for `functional_call`; `every`: see `Batch`."""
 
     def __init__(self, model: StringModel[Any], recipe: Recipe, every: bool) -> None:
         super().__init__()

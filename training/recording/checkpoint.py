@@ -28,7 +28,7 @@ VERSION = 1  # of the steps of a fit: a checkpoint of other steps is not continu
 
 @dataclass(frozen=True)
 class PoleState:
-    """A pole and its amplitude, as `Pole`."""
+    """A pole s and its amplitude a, as `Pole`; partial 0: it does not glide."""
 
     partial: int
     real: float
@@ -39,7 +39,7 @@ class PoleState:
 
 @dataclass(frozen=True)
 class TakeState:
-    """The part of the state that one take has of its own."""
+    """The part of the state that one take has of its own; `glide` and `pitch` as in `Glide`."""
 
     glide: tuple[float, ...]
     pitch: float
@@ -55,8 +55,8 @@ class State:
     """A fit between two steps.
 
     Attributes:
-        steps: that are done.
-        damping, rests: of each band.
+        steps: of the fit that are done, see `fit_takes`.
+        damping, free_damping, rests: as in `Takes`.
     """
 
     steps: int

@@ -23,19 +23,24 @@ from training.recording.slow import settle_slow
 from training.recording.sweeps import FIRST_DAMPING, Takes
 
 MOST_PARTIALS = 80
-HIGHEST_HZ = 10_000.0
-FREE_POLES = 10
+HIGHEST_HZ = 10_000.0  # of a partial
+FREE_POLES = 10  # that do not glide
 FREE_RANGE_HZ = (25.0, 1_500.0)
-FIRST_SWEEPS = 4
-SWEEPS = 6
-LAST_SWEEPS = 6
-WORTH = 3.0  # times the bits that BIC asks of a second pole
-Progress = Callable[[float], None]
+FIRST_SWEEPS = 4  # with one pole a partial
+SWEEPS = 6  # with the second poles
+LAST_SWEEPS = 6  # with the free poles
+WORTH = 3.0  # times the gain that BIC (Bayesian information criterion) asks of a second pole
+Progress = Callable[[float], None]  # receives the share that is done, 0 … 1
 
 
 @dataclass(frozen=True)
 class LearnedNote:
-    """Poles with amplitudes at the beginning of the fit, and the glide."""
+    """Poles with amplitudes at the beginning of the fit, 8 ms after the onset, and the glide.
+
+    Attributes:
+        f0_hz, stiffness: of the series before the fit; stiffness is B.
+        spreads: intervals by number of partial.
+    """
 
     rate_hz: int
     f0_hz: float
@@ -45,7 +50,7 @@ class LearnedNote:
     spreads: dict[int, Spread] = field(default_factory=dict)
 
     def render(self, t: Array) -> Array:
-        """The sound at times in s after the beginning of the fit."""
+        """The sound (times,) at times in s after the beginning of the fit."""
         tau = self.glide.tau(t)
         total = np.zeros(len(t))
         for pole in self.poles:
@@ -73,6 +78,7 @@ def fit_takes(
     Amplitudes and glide are each take's own, and a pitch within some cents of the first.
 
     Args:
+        seconds: that are fitted, from 8 ms after the onset.
         poles_a_partial: at most.
         free: how many poles do not glide.
         glides: False: a linear string, as a baseline.
@@ -108,7 +114,7 @@ def _steps(
 ) -> list[tuple[float, Callable[[], None]]]:
     """The steps of a fit in order, each with the share that is done after it."""
 
-    def start() -> None:
+    def start() -> None:  # one pole a band, the same in all takes
         for number in range(len(hz)):
             plain = Pole(complex(-3.0, 2 * math.pi * hz[number]), partial=number + 1)
             first = _loudest(takes, number).start(number, 1) or [plain]
@@ -145,6 +151,12 @@ def _steps(
 def _fit_of(
     note: Note, series: PartialSeries, first: PartialSeries, hz: Array, edges: Array, seconds: float, glides: bool
 ) -> Fit:
+    """The fit of one take before its first step, without poles.
+
+    Args:
+        series: of the take; `first`: of the first take, whose pitch the poles have.
+        hz, edges: of the partials (partials,) and of their bands (partials + 1,).
+    """
     samples, rate = note.fitted(seconds), note.rate_hz
     tuned = series is not first
     pitch = series.f0_hz / first.f0_hz - 1 if tuned else 0.0
@@ -171,6 +183,7 @@ def _loudest(takes: Takes, number: int) -> Fit:
 
 
 def _partials(note: Note, series: PartialSeries) -> int:
+    """The number of partials that are fitted: two more than were seen, as far as the rate has room for them."""
     last = max(series.present, default=1) + 2
     hz = series.partials_hz(MOST_PARTIALS)
     inside = int((hz < min(HIGHEST_HZ, 0.42 * note.rate_hz)).sum())
@@ -178,12 +191,14 @@ def _partials(note: Note, series: PartialSeries) -> int:
 
 
 def _edges(hz: Array) -> Array:
+    """The edges in Hz (partials + 1,) of bands around partials (partials,): halfway between neighbours."""
     middle = 0.5 * (hz[1:] + hz[:-1])
     top = hz[-1] + 0.5 * (hz[-1] - hz[-2] if len(hz) > 1 else hz[0])
     return np.concatenate([[0.5 * hz[0]], middle, [top]])
 
 
 def _first_glide(samples: Array, rate: int, hz: Array, edges: Array) -> Glide:
+    """The glide to start from, by the phases of the twelve partials that show it best; bands as in `_fit_of`."""
     size = fft.next_fast_len(len(samples), real=True)
     spectrum, step = fft.rfft(samples, size), rate / size
     bands = []
@@ -218,8 +233,8 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[Complex]) -> None:
             two, after, damping = takes.improved(two, targets, wheres, damping)
         if after < best:
             best, chosen = after, two
-    bins = sum(2 * (where.stop - where.start) for where in wheres)
-    more = 2 + 2 * len(takes.fits)  # numbers
+    bins = sum(2 * (where.stop - where.start) for where in wheres)  # real numbers that are fitted
+    more = 2 + 2 * len(takes.fits)  # unknowns of a second pole
     if bins * math.log(left / max(best, 1e-300)) > WORTH * more * math.log(bins):
         takes.set_poles(number, chosen)
         takes.damping[number] = FIRST_DAMPING

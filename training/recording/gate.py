@@ -16,37 +16,38 @@ from engine.resonators.base import Array
 from training.recording.note import Note, envelope
 from training.recording.numbering import SPECTRUM_S, PartialSeries, Peaks, followed, number, peaks_of
 
-CLIPPED_RUNS = 3  # of so many equal samples at the peak
-CLIPPED_SAMPLES = 4
+CLIPPED_RUNS = 3  # samples of a run of equal ones at the peak, at least
+CLIPPED_SAMPLES = 4  # in such runs, at least: fewer do not count as clipped
 MOST_CLIPPED = 0.02  # of the samples of the first half second: more is no string's waveform
 SHORTEST_RINGING_S = 0.4
-LEAST_PERIODS = 10
-LEAST_SNR_DB = 18.0
-ONSET_RISE_DB = 6.0
+LEAST_PERIODS = 10  # of the pitch, in a note
+LEAST_SNR_DB = 18.0  # of the loudest level, above the noise
+ONSET_RISE_DB = 6.0  # within 40 ms: another attack
 LOUD_ONSET_DB = -20.0  # of the loudest attack: below it a sound is no second note
-LEAST_PARTIALS = 4
-LEAST_EXPLAINED = 0.3
-LEAST_FITTED = 0.12  # the same: less is not even tried
-MOST_MISSING = 0.45
-BODY_SILENT_S = 0.25  # after the attack
+LEAST_PARTIALS = 4  # that stand out of the noise
+LEAST_EXPLAINED = 0.3  # see `PartialSeries.explained`: less is a warning
+LEAST_FITTED = 0.12  # the same: less is refused
+MOST_MISSING = 0.45  # see `PartialSeries.missing`
+BODY_SILENT_S = 0.25  # after the onset
 CLEAR_DB = 15.0  # above the floor: less may be noise
 BODY_HZ = 200.0  # above it, less may be left of a body's mode
 HIGHEST_BODY_HZ = 1_000.0
 MOST_OFF = 0.006  # of the energy then, at BODY_HZ: more is not one string's
 LOUD_DB = -12.0  # below the loudest peak that is off the law
-LEAST_SECOND = 2  # of a second note's partials
-SIMPLE_INTERVALS = ((4, 5), (3, 5), (3, 4), (2, 3))  # the first fits, for it is the narrowest
+LEAST_SECOND = 2  # partials of a second note, at least
+# numbers that two notes have in a series below both: third, sixth, fourth, fifth. The first that fits is taken
+SIMPLE_INTERVALS = ((4, 5), (3, 5), (3, 4), (2, 3))
 LEAST_OF_TWO = 0.003  # of the energy, in partials that only one of two notes has
-MOST_OF_NEITHER = 1e-4
-HUM_BLOCK_S = 0.02
-ATTACK_S = 0.06  # at most before the onset
-SLOWEST_ATTACK_S = 0.12
+MOST_OF_NEITHER = 1e-4  # of the energy, in partials that neither has
+HUM_BLOCK_S = 0.02  # stretches whose median power is the hum's
+ATTACK_S = 0.06  # at most so long before the onset the attack begins
+SLOWEST_ATTACK_S = 0.12  # that a level rises without a warning
 PLUCKED_S = 0.06  # as long rises the level of a pluck, in a window of 0.05 s
 MOST_BEFORE_PEAK = 0.5  # of the energy: more is a note reversed
 LOOP_S = 0.08  # a stretch that is looked for
 LOOP_LAG_S = 0.5  # at least so far before: beats of a pure tone come back sooner
 LOUD_LOOP = 1e-4  # of the loudest stretch's energy
-LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the attack
+LEAST_FILLED_DB = 20.0  # from partials down to what sounds between them, 0.3 to 0.9 s after the onset
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,13 @@ class Finding:
 
 
 def examine(samples: Array, note: Note, series: PartialSeries | None) -> tuple[Finding, ...]:
-    """The findings against a recording; empty: nothing speaks against it."""
+    """The findings against a recording; empty: nothing speaks against it.
+
+    Args:
+        samples: of the file, (frames,) or (frames, channels), at any rate.
+        note: the same as mono; all times count from its onset.
+        series: its partials; None: none were found.
+    """
     findings = [
         clipped(samples, note),
         already_playing(note),
@@ -82,13 +89,14 @@ def examine(samples: Array, note: Note, series: PartialSeries | None) -> tuple[F
 
 
 def clipped(samples: Array, note: Note) -> Finding | None:
-    """Runs of equal samples at the peak, as of a converter that is full."""
+    """Runs of equal samples at the peak, as of a converter that is full; refused where they are many."""
     sound = np.asarray(samples, float)
     sound = sound if sound.ndim == 1 else sound[:, int(np.argmax(np.nanmax(np.abs(sound), axis=0)))]
     peak = float(np.nanmax(np.abs(sound)))
     count = 0
     for sign in (1, -1):
         full = sign * sound >= peak * (1 - 1e-4)
+        # of each run at the peak, in samples
         lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], full.astype(int), [0]]))))[::2]
         count += int(np.sum(lengths[lengths >= CLIPPED_RUNS]))
     if count < CLIPPED_SAMPLES:
@@ -100,7 +108,7 @@ def clipped(samples: Array, note: Note) -> Finding | None:
 
 
 def already_playing(note: Note) -> Finding | None:
-    """A waveform that does not start from rest."""
+    """A waveform that is at a fifth of its peak or more where the file begins; the onset lies within 10 ms."""
     if note.onset > round(0.01 * note.rate_hz):
         return None
     loudest = float(np.abs(note.samples[: round(0.3 * note.rate_hz)]).max())
@@ -112,7 +120,7 @@ def already_playing(note: Note) -> Finding | None:
 
 def slow_attack(note: Note) -> Finding | None:
     """A level that rises for longer than any pluck, as in a room; most of the energy before the peak: reversed."""
-    level = envelope(note.samples, note.rate_hz, 0.05)
+    level = envelope(note.samples, note.rate_hz, 0.05)  # (frames,), a window of 0.05 s
     peak = int(np.argmax(level))
     quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
     rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
@@ -128,7 +136,7 @@ def reverberant(note: Note, series: PartialSeries | None) -> Finding | None:
     """Sound between the partials half a second after the attack, well above the noise: the room's."""
     if series is None or note.seconds < 0.9 or len(series.present) < LEAST_PARTIALS:
         return None
-    part = note.part(0.3, 0.9)
+    part = note.part(0.3, 0.9)  # s after the onset
     power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
     hz = np.fft.rfftfreq(len(part), 1 / note.rate_hz)
     noise = note.noise_power * float(np.sum(np.hanning(len(part)) ** 2))
@@ -146,9 +154,12 @@ def reverberant(note: Note, series: PartialSeries | None) -> Finding | None:
 
 
 def too_short(note: Note, series: PartialSeries | None) -> Finding | None:
-    """The finding that a note rings too briefly, or stands too little above its noise; None: neither."""
+    """The finding that a note rings too briefly, or stands too little above its noise; None: neither.
+
+    It rings from its onset until its level falls for good below twice the noise, or a thousandth of the loudest.
+    """
     remedy = "let the note ring for two seconds or more"
-    level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
+    level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)  # from the onset, a window of 0.03 s
     noise = np.sqrt(note.noise_power)
     above = np.flatnonzero(level > max(2 * noise, 1e-3 * float(level.max())))
     seconds = min(note.seconds, float(above[-1]) / note.rate_hz if len(above) else 0.0)
@@ -164,7 +175,7 @@ def too_short(note: Note, series: PartialSeries | None) -> Finding | None:
 
 
 def looped(note: Note) -> Finding | None:
-    """Stretches that come back sample by sample, as a sampler's loop does."""
+    """A last loud stretch of 0.08 s that equals one at least 0.5 s before it, as of a sampler's loop."""
     sound = note.samples[note.onset :]
     block = round(LOOP_S * note.rate_hz)
     energies = np.sum(sound[: len(sound) // block * block].reshape(-1, block) ** 2, axis=1)
@@ -186,7 +197,7 @@ def looped(note: Note) -> Finding | None:
 
 
 def more_onsets(note: Note, series: PartialSeries | None) -> Finding | None:
-    """A rise of level after the first attack, in any of four bands that together hold the note."""
+    """A rise of level from 0.09 s after the onset on, in two of three bands at once; refused where it is loud."""
     rate = note.rate_hz
     sound = note.samples[note.onset : note.onset + round(6 * rate)]
     period = 1 / series.f0_hz if series is not None else 0.02
@@ -198,10 +209,10 @@ def more_onsets(note: Note, series: PartialSeries | None) -> Finding | None:
             continue
         sections = signal.butter(2, (low, high), "bandpass", fs=rate, output="sos")
         level = envelope(signal.sosfilt(sections, sound), rate, window)
-        step = max(1, round(0.005 * rate))
+        step = max(1, round(0.005 * rate))  # 5 ms: from here on times are in these
         db = 20 * np.log10(level[::step] + 2 * noise + 1e-4 * float(level.max()))
         apart = max(1, round(0.04 / 0.005))
-        rise = db[apart:] - db[:-apart]
+        rise = db[apart:] - db[:-apart]  # within 40 ms
         begin = round(0.09 / 0.005)
         if len(rise) > begin:
             rises.append(ndimage.maximum_filter1d(rise[begin:], 3))
@@ -220,7 +231,7 @@ def more_onsets(note: Note, series: PartialSeries | None) -> Finding | None:
 
 
 def no_series(series: PartialSeries | None) -> Finding | None:
-    """Peaks that are not the partials of one stiff string."""
+    """Peaks that are not the partials of one stiff string, or too few of them."""
     words = "its peaks are not the partials of one string"
     remedy = "give one plucked note; drums, slaps and strums are no strings"
     if series is None or not series.present:
@@ -264,7 +275,10 @@ def second_series(note: Note, series: PartialSeries) -> Finding | None:
 
 
 def _two_in(peaks: Peaks, series: PartialSeries) -> tuple[float, float] | None:
-    """The pitches of two strings that were numbered as one: of a fifth, only multiples of 2 and of 3 sound."""
+    """The pitches in Hz of two strings that were numbered as one series; None: it is one string's.
+
+    Of a fifth, for example, only the numbers that are multiples of 2 or of 3 sound.
+    """
     numbers = series.numbers_of(peaks.hz)
     power = np.where(peaks.near(series), peaks.power, 0.0)
     for low, high in SIMPLE_INTERVALS:
@@ -276,7 +290,7 @@ def _two_in(peaks: Peaks, series: PartialSeries) -> tuple[float, float] | None:
 
 
 def _hum_db(note: Note, part: Array) -> float:
-    """The level of a peak that holds all that sounds before the attack, as a hum may: the median of short blocks."""
+    """The level in dB, as in the spectrum of `part`, of a peak with all the power before the attack: a hum's."""
     block = round(HUM_BLOCK_S * note.rate_hz)
     count = max(0, note.onset - round(ATTACK_S * note.rate_hz)) // block
     powers = np.var(note.samples[: count * block].reshape(count, block), axis=1)

@@ -16,17 +16,18 @@ from scipy import interpolate
 
 from engine.resonators.base import Array
 
-TIMES_S = np.array([0.08, 0.3, 1.0])
-CENTS = math.log(2) / 1200
+TIMES_S = np.array([0.08, 0.3, 1.0])  # the T_i
+CENTS = math.log(2) / 1200  # of one cent, the logarithm of the ratio
 PRIOR_CENTS = np.array([10.0, 15.0, 10.0])  # standard deviation of each c_i
 PRIOR_PITCH_CENTS = 10.0  # of a take's pitch, above that of the first
 
 
 @dataclass(frozen=True)
 class Glide:
-    """c_i of the time constants, a share of the frequency each, (3,).
+    """A glide of pitch.
 
     Attributes:
+        shares: the c_i of the time constants, shares of the frequency, (3,).
         pitch: share of all frequencies above those of the poles; of takes that share their poles.
     """
 
@@ -35,6 +36,7 @@ class Glide:
 
     @staticmethod
     def none() -> Glide:
+        """The glide of a linear string: constant pitch, so that τ is t."""
         return Glide(np.zeros(len(TIMES_S)))
 
     def tau(self, t: Array) -> Array:
@@ -55,7 +57,7 @@ class Glide:
 
 
 def basis(t: Array) -> Array:
-    """φ_i(t) = T_i (1 - exp(-t/T_i)), (times, 3)."""
+    """The integrals φ_i(t) = T_i (1 - exp(-t/T_i)) in s, (times, 3), of times t in s."""
     return TIMES_S * -np.expm1(-np.asarray(t)[..., None] / TIMES_S)
 
 
@@ -65,7 +67,7 @@ def rate_basis(t: Array) -> Array:
 
 
 def warped(samples: Array, rate_hz: int, glide: Glide) -> tuple[Array, Array]:
-    """Samples at equal steps of τ from the beginning, and the time t of each."""
+    """Samples at equal steps of τ, a sample's length each, and the time t of each in s, (frames,) both."""
     duration = (len(samples) - 1) / rate_hz
     end = float(glide.tau(np.array(duration)))
     tau = np.arange(int(end * rate_hz) + 1) / rate_hz
@@ -77,15 +79,15 @@ def warped(samples: Array, rate_hz: int, glide: Glide) -> tuple[Array, Array]:
 
 
 def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]]) -> Glide:
-    """The glide from the phases of partials.
+    """The glide from the phases of partials, by least squares with the prior; outliers lose weight.
 
     Args:
-        bands: of each partial its frequency in Hz, the step in s, and its complex envelope at equal steps.
+        bands: of each partial its frequency in Hz, the step in s, and its complex envelope (steps,) at equal steps.
     """
     rows, values = [], []
     for hz, step, z in bands:
         turned = z[1:] * z[:-1].conj()
-        off = np.angle(turned) / (2 * math.pi * hz * step)
+        off = np.angle(turned) / (2 * math.pi * hz * step)  # its frequency above hz, as a share, in each step
         weight = np.sqrt(np.abs(turned)) * hz
         # beats turn the phase where the envelope is small; a common offset is the partial's own frequency
         t = np.asarray((np.arange(len(off)) + 0.5) * step, np.float64)

@@ -38,15 +38,15 @@ from training.recording.glide import CENTS, Glide
 from training.recording.refine import FREE, Complex, Fit, Pole, moments, polarisations, real_rows
 
 MODEL_ERRORS = {"cents": 0.6, "decay": 0.05, "level_db": 0.35}  # cents, a share, dB
-NORMAL_95 = 1.96
+NORMAL_95 = 1.96  # standard deviations to either side of 95 %
 NEIGHBOURS = 4  # bins over which a residual counts as correlated
 MOST_LEVERAGE = 0.95  # of one bin
-DRAWS = 400
-SECONDS, POINTS = 2.4, 1200
+DRAWS = 400  # of the poles' numbers, for each partial
+SECONDS, POINTS = 2.4, 1200  # of the curves of pitch and energy
 LAW_PARTIALS = 12  # the lowest, which have nearly all of the tension
 FIT_CENTS = 2.0  # that a fit's own end of the glide is off, an estimate; on synthetic notes it is 1.2
 LEAST_FALL = 0.1  # of a partial's energy: what falls less looks like a constant
-LEAST_WEIGHT = 1e-3
+LEAST_WEIGHT = 1e-3  # of a time in the law's fit, as a share of the energy at the loudest one
 PLACES = np.linspace(0.05, 0.5, 200)  # of plucks
 OWN = 0.5  # what a partial adds to its own glide, of what it adds to all
 
@@ -82,12 +82,20 @@ def spreads(fit: Fit) -> dict[int, Spread]:
 def _spread(
     fit: Fit, band: int, pair: list[Pole], rest: Rest, residual: Complex, random: np.random.Generator
 ) -> Spread:
+    """The spread of one partial, by random draws of the numbers of all poles in its band.
+
+    Args:
+        pair: those of the band's poles that are its polarisations, one or two.
+        rest: from its poles to its frequency at rest.
+        residual: what the whole fit leaves, (bins,).
+    """
     where = fit.bands[band]
     poles = [pole for pole in fit.poles[band] if pole.a]
     spread = covariance(np.concatenate(fit.columns(poles, where), 1), residual[where])
     values, vectors = np.linalg.eigh(spread)
     draws = random.standard_normal((DRAWS, len(values))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
     p, chosen = len(poles), [poles.index(pole) for pole in pair]
+    # (draws, poles) each
     a = np.array([pole.a for pole in poles]) + draws[:, 0 : 2 * p : 2] + 1j * draws[:, 1 : 2 * p : 2]
     decay = np.array([pole.decay for pole in poles]) * np.exp(np.clip(draws[:, 2 * p :: 2], -3, 3))
     omega = np.array([pole.s.imag for pole in poles]) + draws[:, 2 * p + 1 :: 2]
@@ -139,6 +147,7 @@ def _deviation(values: Array) -> float:
 
 
 def _reach(kind: str, *errors: float) -> float:
+    """Half an interval of 95 % from standard errors and the model's, in the unit that `MODEL_ERRORS` has for it."""
     return NORMAL_95 * math.hypot(MODEL_ERRORS[kind], *errors)
 
 

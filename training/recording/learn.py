@@ -31,7 +31,7 @@ from training.recording.verdict import Verdict, verdict_of
 
 Progress = Callable[[float], None]
 
-SAME_PITCH_CENTS = 60.0
+SAME_PITCH_CENTS = 60.0  # of two recordings: below it they are takes of one note
 
 
 class Refused(RecordingError):
@@ -53,7 +53,9 @@ class Learned:
     """The results learned from one recording.
 
     Attributes:
+        strung: the string in a chosen length and gauge.
         findings: what speaks against the recording: warnings, and refusals that were overruled.
+        seconds: from the call of `learn` until it was learned.
     """
 
     source: Source
@@ -118,6 +120,7 @@ def learn(
         WriteError, OSError: a checkpoint cannot be written or read.
     """
     started = time.monotonic()
+    # the lead is the first recording; takes are those of its pitch, others the rest, by place in `recordings`
     notes = [usable(examined, anyway, source.name) for examined, source in recordings]
     lead = notes[0][1]
     takes = [place for place, (_, series) in enumerate(notes) if apart_cents(lead, series) < SAME_PITCH_CENTS]
@@ -148,7 +151,10 @@ def learn(
 
 
 def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:
-    """The additions of all recordings to the string of the first."""
+    """The additions of all recordings to the string of the first; `settings`: of the fit, kept with them.
+
+    Smooth decays are averaged over all. Corrections of partials are medians over takes of the first's pitch.
+    """
     first = learned[0]
     note = recorded_note(first.note, first.fitted, first.source)
     first_string = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
@@ -175,6 +181,7 @@ def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedSt
 
 
 def _part(progress: Progress, done: float, share: float, of_part: float) -> None:
+    """Report a part of the work that is a `share` of all and begins at `done`; fits are 0.95 of all."""
     progress(0.95 * (done + share * of_part))
 
 

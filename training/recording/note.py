@@ -97,6 +97,7 @@ def onset_of(samples: Array, rate_hz: int, share: float = 0.1) -> int:
 
 
 def _mono(samples: Array) -> Array:
+    """A single channel (frames,), float64: the mean of two that are alike, else the one with most energy."""
     sound = np.asarray(samples, np.float64)
     if sound.ndim == 1:
         return sound
@@ -120,6 +121,7 @@ def _without_silence(sound: Array) -> Array:
 
 
 def _noise_power(samples: Array, rate_hz: int, onset: int) -> float:
+    """The least mean square of blocks of 0.05 s before the onset and at the end; 1e-14 where all of them are 0."""
     block = max(1, round(0.05 * rate_hz))
     blocks = [samples[first : first + block] for first in range(0, max(0, onset - block // 2 - block), block)]
     count = min(6, (len(samples) - onset) // (2 * block))

@@ -18,15 +18,15 @@ from engine.resonators.base import Array
 from training.recording.note import Note
 
 F0_RANGE_HZ = (26.0, 4_300.0)
-STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])
-COARSE = (0.0, 4e-5, 3e-4)  # of B, for the choice of f0 that are looked at closely
+STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])  # values of B that are tried
+COARSE = (0.0, 4e-5, 3e-4)  # values of B for the first choice among all f0
 MOST_PARTIALS = 80
 PRESENT_DB = 9.0  # above the local floor, for a peak that counts
 FULL_DB = 40.0  # above it a peak counts no more than at it
 HEARD_HZ = 1_500.0  # below it a pluck's first partials are heard
 HEARD = 3  # so many of them
 MISSING = 0.55  # what a predicted partial costs that is not there, of a strong one
-SPECTRUM_S = 0.7
+SPECTRUM_S = 0.7  # length of a stretch whose spectrum is numbered
 GLIDES_CENTS = np.arange(-60.0, 31.0, 5.0)  # down from a loud attack, or a little up
 
 
@@ -60,7 +60,7 @@ class PartialSeries:
 
 
 def apart_cents(first: PartialSeries, other: PartialSeries) -> float:
-    """The interval of two series."""
+    """The interval between the f0 of two series in cents, 0 or more."""
     return abs(1200 * math.log2(other.f0_hz / first.f0_hz))
 
 
@@ -75,7 +75,13 @@ def partials_hz(f0_hz: float, stiffness: float, count: int) -> Array:
 
 @dataclass(frozen=True)
 class Peaks:
-    """Peaks of a spectrum: frequencies, and dB above the local floor."""
+    """Peaks of a spectrum, in order of frequency.
+
+    Attributes:
+        hz, above_db, level_db: frequency, and level above the local floor and by itself, (peaks,) each.
+        width_hz: resolution of the spectrum.
+        highest_hz: up to which it was searched.
+    """
 
     hz: Array
     above_db: Array
@@ -91,6 +97,7 @@ class Peaks:
 
     @property
     def power(self) -> Array:
+        """The power of each peak, (peaks,), in the spectrum's own unit."""
         return np.asarray(10 ** (self.level_db / 10), np.float64)
 
     def near(self, series: PartialSeries) -> NDArray[np.bool_]:
@@ -133,7 +140,7 @@ def tolerance(hz: Array, f0_hz: float, width_hz: float) -> Array:
 
 
 def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
-    """The peaks of a whole stretch of sound through a Hann window."""
+    """The peaks of a whole stretch of sound (frames,) through a Hann window; `noise_power`: of a sample."""
     window = np.hanning(len(samples) + 2)[1:-1]
     size = 1 << (2 * len(samples) - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(samples * window, size)) ** 2
@@ -180,12 +187,17 @@ def followed(peaks: Peaks, series: PartialSeries) -> PartialSeries:
 
 
 def _best_refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
+    """The series after three refinements of f0 and B, each kept where it scores more."""
     for _ in range(3):
         series = max((_refined(peaks, series), series), key=lambda candidate: candidate.score)
     return series
 
 
 def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
+    """Values of f0 that are worth a try, in Hz, ascending, (any,).
+
+    They are whole fractions of strong or loud peaks, and distances between strong peaks.
+    """
     order = np.argsort(-peaks.strength * (1 + 0.02 * peaks.level_db))[:12]
     loud = np.argsort(-peaks.level_db)[:12]
     chosen = np.unique(np.concatenate([order, loud]))
@@ -212,7 +224,7 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
     strength = peaks.strength
     loudness = np.clip((peaks.level_db - peaks.level_db.max() + 60) / 60, 0.0, 1.0)
     weight = strength * (0.3 + 0.7 * loudness)
-    best = np.zeros(MOST_PARTIALS + 1)
+    best = np.zeros(MOST_PARTIALS + 1)  # by number of partial: weight of the peak that is its
     np.maximum.at(best, k_of[inside], (near * weight)[inside])
     present = np.flatnonzero(best > 0.02)
     if len(present) == 0:
@@ -229,7 +241,7 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
         apart = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
         absent &= apart > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
     missing = float(absent.sum() / count)
-    first = 0.12 * float(absent[0])
+    first = 0.12 * float(absent[0])  # what a missing first partial costs
     score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
     return PartialSeries(f0_hz, stiffness, tuple(present.tolist()), explained, missing, score)
 
@@ -248,9 +260,13 @@ def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
 
 
 def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Array, Array]:
-    """f0² and f0² B of (f/k)² = f0² + f0² B k² by least squares; outliers lose weight from round to round.
+    """Fit (f/k)² = f0² + f0² B k² by least squares; outliers lose weight from round to round.
 
-    Beside them the rows and the weights of the equations.
+    Args:
+        k, hz, weight: number, frequency and weight of each peak, (peaks,).
+
+    Returns:
+        f0² and f0² B, (2,); the rows of the equations, (peaks, 2); and their weights after the last round.
     """
     rows = np.stack([np.ones_like(k), k**2], 1)
     scale = weight * k / hz  # errors in Hz are alike

@@ -24,8 +24,8 @@ from training.recording.refine import Pole, moments, polarisations
 Kind = Literal["guitar", "bass", "harp", "piano"]
 
 SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
-MOST_NODES = 24
-MOST_BESIDE_SMOOTH = 5.0
+MOST_NODES = 24  # of the curve of decay over frequency
+MOST_BESIDE_SMOOTH = 5.0  # times the smooth decay, or a fifth: a partial beyond is not the string's
 MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
 MOST_DECAYS_APART = 12.0  # an estimate, of two polarisations; intervals are stated for closer ones
 NEAR_CENTS = 12.0  # an estimate: a partial with a pole so near has no other further off
@@ -58,8 +58,8 @@ class Partial:
     """A partial of the note.
 
     Attributes:
-        hz: mean over its energy.
-        decay: σ of the one exponential with the same centre of energy in time.
+        hz: mean frequency over time, weighted by its energy.
+        decay: σ in 1/s of the one exponential with the same centre of energy in time.
         amplitude: |a| of its poles, summed.
         energy: ∫ |z|².
         poles: the lower one first; one or two.
@@ -78,9 +78,9 @@ class LearnedPhysics:
     """The physics that the sound gives.
 
     Attributes:
-        f0_hz, stiffness: with standard errors.
+        f0_hz, stiffness: with standard errors; stiffness is B.
         partials: ascending.
-        smooth_hz, smooth_decay: σ over frequency, a curve through all partials.
+        smooth_hz, smooth_decay: σ in 1/s over frequency, a curve through all partials.
         rise: share that the glide adds to all frequencies when the fit begins: the product of the tension's
             coupling and the squared amplitude, which a sound cannot take apart.
     """
@@ -101,7 +101,8 @@ class Strung:
 
     Attributes:
         amplitude_m: of the recorded pluck's rise of tension, as the peak of a triangle at `position`.
-        assumed: in words.
+        position: of the pluck, in lengths.
+        assumed: what the sound did not give, in words.
     """
 
     string: StringParameters
@@ -180,7 +181,11 @@ def physics_of(learned: LearnedNote) -> LearnedPhysics:
 
 
 def _smooth(hz: Array, decay: Array, weight: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Weighted mean of log σ in windows of octaves."""
+    """The weighted median of σ in windows of octaves: frequencies (nodes,) in Hz, and σ in 1/s there.
+
+    Args:
+        hz, decay, weight: of each partial, (partials,).
+    """
     count = min(MOST_NODES, len(hz))
     nodes = np.geomspace(hz[0], hz[-1], count) if count > 1 else hz[:1]
     values = []
@@ -274,15 +279,20 @@ def pluck_place(physics: LearnedPhysics) -> float:
 
 
 def corrections(physics: LearnedPhysics, string: StringParameters) -> dict[str, tuple[float, ...]]:
-    """The corrections by the note's partials to the law of its string, as `engine.resonators.recorded` keeps them."""
+    """The corrections by the note's partials to the law of its string, by name; see `RecordedString` for each.
+
+    Those of partials have an entry for each number from 1 to the highest; one that was not heard has no correction.
+    """
     count = max(partial.number for partial in physics.partials)
     omega = undamped_frequencies(string, count)
     sigma = decay_rates(string, count)
+    # σ by the string's law at the frequencies of the smooth decay, as a logarithm
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
     smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
     nodes = np.log(2 * math.pi * np.array(physics.smooth_hz))
     smooth = sigma * np.exp(np.interp(np.log(omega), nodes, np.log(smooth_ratio)))
     pairs = [partial.poles for partial in physics.partials if len(partial.poles) == 2]
+    # typical second polarisation: cents above the first, and times its decay; for partials that show none
     split = float(np.median([_split(pair) for pair in pairs])) if pairs else 0.0
     slower = float(np.median([second.decay / first.decay for first, second in pairs])) if pairs else 1.0
     cents = np.zeros(count)

@@ -21,8 +21,8 @@ from training.recording.physics import COMB_FLOOR, LearnedPhysics, Strung, corre
 
 BASE = "studio_any_string"  # whose curves play every string
 LEAST_GRID = 101
-BODY_S = 0.25
-BODY_RANGE_DB = 70.0
+BODY_S = 0.25  # length of a body's response
+BODY_RANGE_DB = 70.0  # from the loudest partial down to the softest in it
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class Source:
     """The source of a note.
 
     Attributes:
+        name: of the file; `digest`: its SHA-256.
         rate_hz, frames: of the file, before any conversion.
     """
 
@@ -67,7 +68,7 @@ def recorded_string(
     settings: dict[str, Any],
     errors: dict[str, float],
 ) -> RecordedString:
-    """The additions of the recording to the law of its string."""
+    """The additions of the recording to the law of its string; `settings`: of the fit, `errors`: of the report."""
     figures_of_string: dict[str, Any] = corrections(physics, strung.string)
     return RecordedString(
         pitch_hz=float(strung.string.undamped_frequency(1) / (2 * math.pi)),

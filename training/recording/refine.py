@@ -24,7 +24,7 @@ from training.recording.glide import CENTS, PRIOR_CENTS, PRIOR_PITCH_CENTS, Glid
 Complex = NDArray[np.complex128]
 
 LEAST_DECAY = 0.05  # σ, in 1/s
-MOST_FREE_DECAY = 250.0
+MOST_FREE_DECAY = 250.0  # of a pole that does not glide, in 1/s
 WIDEST = 0.4  # σ of a string's pole, of a band's width in Hz
 RIDGE = 1e-4  # of the bins' squares, on amplitudes: two near poles must not cancel each other
 GLIDE_FIRMNESS = 1000.0  # how many times a residual counts that is correlated from bin to bin
@@ -35,8 +35,8 @@ MOST_GLIDE = (-0.02, 0.08)  # of each share
 MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
-MOST_DECAYS_APART = 8.0
-LONGEST_WINDOW = 120  # of the subspace
+MOST_DECAYS_APART = 8.0  # times one's σ, the other's
+LONGEST_WINDOW = 120  # steps of an envelope, of the subspace
 FREE = -1  # the place of the poles that do not glide, behind all bands
 
 
@@ -59,7 +59,10 @@ class Pole:
 
 @dataclass
 class Fit:
-    """A note's poles while they are refined.
+    """A note's poles while they are refined, and its spectrum in warped time.
+
+    A band is the range of frequencies around one partial; band n holds partial n + 1. A bin is a frequency of the
+    FFT. Free poles are those that do not glide; their number is `FREE`.
 
     Attributes:
         samples: that are fitted, (frames,).
@@ -80,17 +83,19 @@ class Fit:
     def __post_init__(self) -> None:
         self.poles = self.poles or [[] for _ in range(len(self.partials_hz) + 1)]
         self.width_hz = np.diff(self.edges_hz)
+        # samples of the FFT with zeros behind the note; a multiple of COARSE
         self.size = COARSE * fft.next_fast_len(math.ceil((1.04 * len(self.samples) + 64) / COARSE))
-        self.step_hz = self.rate_hz / self.size
+        self.step_hz = self.rate_hz / self.size  # from bin to bin
         first = np.floor((self.edges_hz[:-1] - OVERLAP * self.width_hz) / self.step_hz).astype(int)
         last = np.ceil((self.edges_hz[1:] + OVERLAP * self.width_hz) / self.step_hz).astype(int)
-        self.highest = int(min(last.max(), self.size // 2))
+        self.highest = int(min(last.max(), self.size // 2))  # number of bins that are used
         self.bands = [slice(max(1, low), min(high, self.highest)) for low, high in zip(first, last, strict=True)]
-        self.omega = 2 * math.pi * self.step_hz * np.arange(self.highest)
+        self.omega = 2 * math.pi * self.step_hz * np.arange(self.highest)  # rad/s, (bins,)
         self.turn = np.exp(-1j * self.omega / self.rate_hz)
         self._look()
 
     def _look(self) -> None:
+        """Compute `data`, the spectrum (bins,) of the samples as the glide warps them, and their `times` in s."""
         data, times = warped(self.samples, self.rate_hz, self.glide)
         data, self.times = data[: self.size], times[: self.size]  # a large glide stretches time beyond the spectrum's
         self.count = len(data)
@@ -99,6 +104,7 @@ class Fit:
         self.energy = float(np.sum(data**2)) * self.size / 2
 
     def set_glide(self, glide: Glide) -> None:
+        """Set the glide, and compute the spectrum again."""
         self.glide = glide
         self._look()
 
@@ -116,7 +122,7 @@ class Fit:
         return value, ((q * value - self.count * last) * below / self.rate_hz if slope else value)
 
     def _bent(self, pole: Pole, bins: slice) -> tuple[Complex, Complex]:
-        """The sum over all samples by the trapezoidal rule over every eighth."""
+        """The result of `spectra` for a free pole: sums over samples by the trapezoidal rule over every eighth."""
         t = self.times[::COARSE]
         shape = np.exp(pole.s * t)
         spectrum = COARSE * fft.fft(np.stack([shape, shape * t]), self.size // COARSE)
@@ -141,9 +147,11 @@ class Fit:
         return total
 
     def gliding(self) -> list[Pole]:
+        """The poles of all bands."""
         return [pole for band in self.poles[:FREE] for pole in band]
 
     def every(self) -> list[Pole]:
+        """The poles of all bands, then the free ones."""
         return self.gliding() + self.poles[FREE]
 
     def bins(self, number: int) -> slice:
@@ -156,7 +164,7 @@ class Fit:
     # Steps
 
     def start(self, number: int, count: int) -> list[Pole]:
-        """Poles of a band from its complex envelope, without amplitudes."""
+        """At most `count` poles to start from in the band `number`, without amplitudes, by its complex envelope."""
         first, last = (round(self.edges_hz[edge] / self.step_hz) for edge in (number, number + 1))
         envelope = fft.ifft(self.data[first:last])
         step = self.size / ((last - first) * self.rate_hz)
@@ -172,10 +180,11 @@ class Fit:
         return poles
 
     def _far_hz(self, number: int) -> float:
+        """The farthest that a pole of a band may lie from its partial's place."""
         return 0.3 * float(self.width_hz[number])
 
     def solve(self, poles: list[Pole], target: Complex, where: slice) -> tuple[float, list[Pole], Complex]:
-        """Amplitudes by least squares; the energy that they leave, the poles with them, and the residual."""
+        """Find amplitudes by least squares; return the energy left, the poles with them, and the residual (bins,)."""
         columns, _ = self.columns(poles, where)
         amplitudes = projector(columns) @ real_rows(target)
         pairs = amplitudes.reshape(-1, 2)
@@ -194,6 +203,7 @@ class Fit:
         return np.stack(linear, 1), np.stack(bent, 1)
 
     def moved(self, pole: Pole, step: Array) -> Pole:
+        """A pole after a step (2,) of log σ and of ω in rad/s, held within its bounds; its amplitude stays."""
         decay = pole.decay * math.exp(float(np.clip(step[0], -1.0, 1.0)))
         omega = pole.s.imag + float(np.clip(step[1], -LARGEST_STEP, LARGEST_STEP))
         if number := pole.partial:
@@ -206,7 +216,7 @@ class Fit:
         return Pole(complex(-decay, omega), pole.a, pole.partial)
 
     def part(self, poles: list[Pole], where: slice) -> Complex:
-        """The spectrum of poles in some bins."""
+        """The spectrum (bins,) of poles with their amplitudes, in some bins."""
         total = np.zeros(where.stop - where.start, complex)
         for pole in poles:
             value, _ = self.spectra(pole, where, slope=False)
@@ -214,7 +224,7 @@ class Fit:
         return total
 
     def reach(self, pole: Pole, loudest: float) -> slice:
-        """The bins into which a pole leaks, compared with the loudest one."""
+        """The bins into which a pole leaks, the more the nearer its |a| is to `loudest`, that of the loudest one."""
         reach = 2.5 * float(self.width_hz.max()) + LEAK_HZ * abs(pole.a) / max(loudest, 1e-300) + pole.decay
         low, high = (round((pole.hz + side * reach) / self.step_hz) for side in (-1, 1))
         return slice(min(self.highest, max(1, low)), max(1, min(self.highest, high)))
@@ -229,7 +239,12 @@ class Fit:
         return Glide(shares, float(np.clip(pitch, -MOST_PITCH, MOST_PITCH)))
 
     def _border(self) -> tuple[Array, Array, Array]:
-        """The glide's normal equations once all poles are eliminated, and its prior."""
+        """The glide's normal equations once all poles are eliminated, and its prior.
+
+        Returns:
+            matrix (n, n), right side (n,) and the prior's diagonal (n,), where n counts the shares, and the pitch
+            last where it is tuned.
+        """
         residual = self.data - self.model()
         slope = self.model(self.gliding(), derivative=True)
         slope = fft.irfft(np.pad(slope, (0, self.size // 2 + 1 - len(slope))), self.size)
@@ -263,6 +278,9 @@ def polarisations(poles: list[Pole], most_decays_apart: float = MOST_DECAYS_APAR
     """The loudest pole of a partial and the one that may be its other polarisation, the lower one first.
 
     A pole that is far off, or decays at another rate altogether, is the body's.
+
+    Args:
+        most_decays_apart: the largest ratio of their decay rates.
     """
     if not poles:
         return []
@@ -302,12 +320,16 @@ def moments(a: Complex, s: Complex) -> tuple[Array, Array, Array]:
 
 
 def real_rows(columns: Complex) -> Array:
-    """Real parts above imaginary ones."""
+    """Real parts above imaginary ones: (bins, …) to (2 bins, …)."""
     return np.concatenate([columns.real, columns.imag])
 
 
 def projector(columns: Complex) -> Array:
-    """(2 poles, 2 bins): from real values to the amplitudes of their projection."""
+    """The matrix (2 poles, 2 bins) that turns a spectrum, as `real_rows`, into amplitudes by ridge regression.
+
+    Args:
+        columns: of amplitudes, (bins, 2 poles).
+    """
     a = real_rows(columns)
     square = a.T @ a
     square[np.diag_indices_from(square)] *= 1 + RIDGE

@@ -30,10 +30,11 @@ class FitErrors:
     """The errors of one sound against another.
 
     Attributes:
-        esr, esr_from_50_ms: error-to-signal ratio after one gain and one delay, else from 8 ms after the onset.
+        esr: error-to-signal ratio from 8 ms after the onset, after one gain and one delay.
+        esr_from_50_ms: the same from 50 ms after the onset.
         stft: multi-resolution STFT: spectral convergence plus mean absolute log magnitude.
-        noise_esr: of the recording's noise.
-        gain_db, delay_s: that were applied.
+        noise_esr: energy of the recording's noise over that of the recording.
+        gain_db, delay_s: that were applied to the second sound.
     """
 
     esr: float
@@ -138,9 +139,10 @@ def errors_of(truth: Array, model: Array, rate_hz: int, noise_power: float = 0.0
 
 
 def aligned(truth: Array, model: Array, rate_hz: float) -> tuple[Array, float, float]:
-    """The sound `found` with the gain and the delay, below 2 ms, that leave the least.
+    """The sound `model` with the gain and the delay, up to 2 ms either way, that bring it nearest to `truth`.
 
-    Beside it the gain, and the delay in s.
+    Returns:
+        that sound (frames,), the gain as a factor, and the delay in s.
     """
     size = fft.next_fast_len(2 * len(truth), real=True)
     theirs, ours = fft.rfft(truth, size), fft.rfft(model, size)
@@ -174,7 +176,13 @@ def bands_of(truth: Array, model: Array, rate_hz: int, noise_power: float) -> tu
 
 
 def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
-    """The T60 by the slope of the backward integral (Schroeder 1965), from -2 to -22 dB or as its noise lets."""
+    """The T60 in s by the slope of the backward integral (Schroeder 1965) from -2 to -22 dB, or to -12 dB.
+
+    It is nan where noise covers that, or the sound does not decay.
+
+    Args:
+        sound: of one octave, (frames,); `noise_power`: of a sample of it.
+    """
     power = np.maximum(sound**2 - noise_power, -noise_power)
     left = np.cumsum(power[::-1])[::-1]
     if left[0] <= 0 or left[0] < 30 * noise_power * rate_hz * 0.05:

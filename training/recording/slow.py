@@ -26,7 +26,7 @@ SPREAD = 0.5  # standard deviation of log σ, an estimate
 
 
 def settle_slow(takes: Takes) -> None:
-    """Settle the slow poles of takes, which share them."""
+    """Settle the slow poles of takes, which share them; poles and amplitudes change in place."""
     least = FALL / max(len(fit.samples) / fit.rate_hz for fit in takes.fits)
     residuals = takes.residuals()
     for number in (*range(len(takes.damping)), FREE):
@@ -34,6 +34,11 @@ def settle_slow(takes: Takes) -> None:
 
 
 def _settled(takes: Takes, number: int, residuals: Sequence[Complex], least: float) -> list[list[Pole]]:
+    """The poles of a band, or the free ones, by take, with the slow ones settled and amplitudes fitted again.
+
+    Args:
+        least: σ in 1/s; faster poles stay as they are.
+    """
     before, wheres = takes.poles(number), takes.bins(number)
     if not any(pole.decay < least for pole in before[0]):
         return before
@@ -49,6 +54,7 @@ def _settled(takes: Takes, number: int, residuals: Sequence[Complex], least: flo
 
 
 def _decay(decay: float, known: float, least: float) -> float:
+    """The settled σ in 1/s of one pole; `known`: inverse variance of its log σ by the recording."""
     if decay >= least:
         return decay
     prior = 1 / SPREAD**2

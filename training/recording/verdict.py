@@ -20,9 +20,9 @@ MOST_ESR = 0.15  # besides the recording's noise
 MOST_NOISE_ESR = 0.15
 GOOD_ESR = 0.05  # up to it the linear poles may be as near
 LOUD_DB = -40.0  # below the loudest partial
-NEAR_CENTS = 25.0
+NEAR_CENTS = 25.0  # from the law: a partial that lies on it
 PULLED_CENTS = 75.0  # so far a body pulls a partial from the law, often the loudest one
-LEAST_LOUD = 2
+LEAST_LOUD = 2  # partials
 LEAST_NEAR = 0.7  # of the loud partials
 LEAST_ENERGY = 0.3  # of the recording's, in partials that belong to the law, pulled or not
 

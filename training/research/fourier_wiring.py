@@ -70,15 +70,15 @@ class Kernels:
         self.bias = torch.zeros(grid_points, width, dtype=torch.float64)
 
     def add_shifted(self, source: int, target: int, factor: float, lag: int = 0) -> None:
-        """A channel's number at any point to another channel's, `lag` points further."""
+        """Add a channel's number at each point, times a factor, to another channel's `lag` points further."""
         self.lags[lag, source, target] += factor
 
     def spread(self, source: int, at: int, target: int, shape: Tensor) -> None:
-        """The number at a point of a channel, times shape (grid_points,), to another channel."""
+        """Add the number at a point of a channel, times a shape (grid_points,), to another channel."""
         self.lags[torch.arange(self.points) - at, source, target] += shape
 
     def gather(self, source: int, target: int, at: int, weights: Tensor) -> None:
-        """The sum of weights (grid_points,) times a channel, to a point of another."""
+        """Add the sum of a channel, times weights (grid_points,), to one point of another."""
         self.lags[at - torch.arange(self.points), source, target] += weights
 
     @torch.no_grad()
@@ -90,7 +90,10 @@ class Kernels:
         bias.copy_(torch.stack([constant.real, constant.imag], dim=1))
 
     def _transformed(self, values: Tensor) -> Tensor:
-        """(2·points, …) to the kept frequencies; the value that no field sees takes what the highest would have."""
+        """The spectrum (points, …) of values (2·points, …), without the highest frequency.
+
+        The value at the middle, which no field sees, is set so that the highest frequency has nothing.
+        """
         signs = torch.ones(2 * self.points, dtype=torch.float64)
         signs[1::2] = -1
         values = values.clone()
@@ -109,8 +112,8 @@ def end_channels(modes: int) -> int:
     return -(-modes // ENDS)
 
 
-LIFT = 30.0  # standard deviations of displacement: what ReLU does not bend
-HELD_DOWN = -300.0
+LIFT = 30.0  # standard deviations of displacement: a bias above all that may come, so that ReLU is the identity
+HELD_DOWN = -300.0  # a bias below all that may come, so that ReLU is 0
 
 
 def store_in_frnn(model: FRNN, modes: StringModes) -> None:
@@ -127,10 +130,11 @@ def store_in_frnn(model: FRNN, modes: StringModes) -> None:
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
         raise ValueError(f"{count} modes need a width of {1 + 2 * pairs} and a depth of 3, not {width} and {depth}")
+    # first channels: the field, the amplitudes by pair, the numbers that are 0 at rest by pair
     field = 0
     now = 1
-    rate = 1 + pairs  # first channels
-    last = points - 1
+    rate = 1 + pairs
+    last = points - 1  # the other end of the grid
     analyse, turn, synthesise = layers = tuple(Kernels(points, width) for _ in range(3))
     for layer in layers:
         layer.bias[:, 1 : 1 + 2 * pairs] = HELD_DOWN
@@ -172,7 +176,10 @@ def store_in_frnn(model: FRNN, modes: StringModes) -> None:
 
 
 def _turns(modes: StringModes) -> Tensor:
-    """A sample of each mode's (amplitude, what is 0 at rest): (modes, 2, 2)."""
+    """The matrices (modes, 2, 2) that turn each mode's state by a sample.
+
+    A state is (amplitude, a number that is 0 at rest).
+    """
     eigenvalues = torch.exp(modes.log_eigenvalues)
     tilt = modes.starts.imag / modes.starts.real
     # c = amplitude + i (tilt · amplitude + other)
@@ -196,10 +203,10 @@ LARGEST_DRIFT = 7.0  # times the typical one: so much farther the loudest string
 RAREST = 0.01  # of the weight of a drift of 0: any drift counts so much, lest a loud string grow without end
 LEAST_DRIFT = 1e-6  # rad a sample
 WINDOW = 0.4  # how much the fields that a string is released in differ from one another
-ALTERNATIONS = 30
-RIDGE = 1e-4
-MOST_OWN = 1.0
-TINY = 1e-30
+ALTERNATIONS = 30  # rounds of least squares for a, b and e
+RIDGE = 1e-4  # on b, as a share of the diagonal
+MOST_OWN = 1.0  # of e
+TINY = 1e-30  # in place of 0 where something is divided
 
 
 def store_in_fgru(model: FGRU, modes: StringModes) -> None:
@@ -433,7 +440,7 @@ def _start_frnn(model: FRNN, modes: Modes, seed: int) -> None:
 
 
 def use() -> None:
-    """Let runs of this process start so."""
+    """Give FGRU and FRNN these starts in this process, for `training.fitting.phases`."""
     phases.STORES.update(fgru=_start_fgru, frnn=_start_frnn)
 
 

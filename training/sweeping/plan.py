@@ -27,7 +27,10 @@ class CellBlock:
     """Cells: the product of what is listed.
 
     Attributes:
-        horizons: frames.
+        strings: kinds of string.
+        initials: random shapes that strings are released from.
+        horizons: frames that are trained.
+        recipe: of all its cells, see `Cell`.
     """
 
     models: tuple[str, ...]
@@ -76,6 +79,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class _File:
+    """A plan's file as it is read; `block`: its [[block]] tables in order."""
+
     description: str
     block: tuple[CellBlock, ...]
     data: dict[str, Any] = field(default_factory=dict)  # fields of the data that differ from the protocol

@@ -46,6 +46,8 @@ def fitted(
     Args:
         tasks: more workers than these are not made.
         device: "auto" takes CUDA devices where there are some.
+        workers: how many; None: as many as fit.
+        threads: of each; None: one on a CPU, an even share of the cores with GPUs.
 
     Raises:
         ValueError: there is no CUDA device, though one is asked for.
@@ -89,11 +91,16 @@ def process_workers(layout: Layout) -> Iterator[Workers]:
 
 
 class _Place:
-    """A place where one process works after another: the death of one disturbs no other."""
+    """A place where one process works after another: the death of one disturbs no other.
+
+    Attributes:
+        pool: of its one process; a new one where that has died.
+    """
 
     def __init__(self, environment: Mapping[str, str], leash: Connection) -> None:
+        # variables of its process, and a pipe that ends the process when its other end is closed
         self._environment, self._leash = environment, leash
-        self._last: Future[dict[str, Any]] | None = None
+        self._last: Future[dict[str, Any]] | None = None  # task; None: it had none
         self.pool = self._new_pool()
 
     @property
@@ -101,6 +108,7 @@ class _Place:
         return self._last is None or self._last.done()
 
     def submit(self, task: Mapping[str, Any]) -> Future[dict[str, Any]]:
+        """Begin a written `Task` in its process; its future has what `perform` returns."""
         try:
             self._last = self.pool.submit(perform, task)
         except BrokenExecutor:  # its process has died since
@@ -115,7 +123,7 @@ class _Place:
 
 
 def _enter(environment: Mapping[str, str], leash: Connection) -> None:
-    """Set up a worker's process."""
+    """Set up a worker's process: its variables, and a thread that ends it when the leash is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the interrupt of a terminal is for the command alone
     os.environ.update(environment)
     threading.Thread(target=_leave_with, args=(leash,), daemon=True).start()
@@ -137,5 +145,6 @@ def _memory_bytes() -> int:
 
 
 def _environment(threads: int, gpu: str | None = None) -> dict[str, str]:
+    """The variables of a worker: its number of threads, and the one GPU that it can use; None: not restricted."""
     names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
     return dict.fromkeys(names, str(threads)) | ({} if gpu is None else {"CUDA_VISIBLE_DEVICES": gpu})

@@ -38,7 +38,9 @@ class Options:
     Attributes:
         results: the file; None: the plan's own, see `results_of`.
         runs, cache: folders, as the workers see them; None: their defaults.
+        threads: of the CPU in each worker; None: as the worker was started.
         retries: further tries after a run has failed.
+        checkpoint_every_s: between two checkpoints of a run; None: `CHECKPOINT_EVERY_S` of `training.fitting.fit`.
         seeds_at_once: the seeds of a cell are one piece of work, as is worth it on a GPU; else each is one.
         ends_s: on the clock of `time.monotonic`, when the sweep ends with what is done by then; None: when all is.
     """
@@ -55,10 +57,11 @@ class Options:
 
     @property
     def left_s(self) -> float:
+        """The seconds until the sweep ends; infinite where it ends with its runs."""
         return math.inf if self.ends_s is None else self.ends_s - time.monotonic()
 
     def pieces(self, runs: Iterable[Run]) -> list[tuple[Run, ...]]:
-        """The pieces of work that runs are, each where its first run is."""
+        """The pieces of work, runs that one task trains together, in the order of their first runs."""
         pieces: dict[str, list[Run]] = {}
         for run in runs:
             recipe = replace(run.configuration.recipe, seed=0)
@@ -67,6 +70,7 @@ class Options:
         return [tuple(piece) for piece in pieces.values()]
 
     def task(self, plan: Plan, *runs: Run) -> Task:
+        """The task of one piece of a plan's work."""
         return Task(
             runs=runs,
             digests=tuple(run.digest for run in runs),
@@ -96,7 +100,10 @@ class Watch(Protocol):
 
 
 def group_of(plan: Plan) -> str:
-    """A trial's runs have cells' names and are other runs: they lie in a folder of their own."""
+    """The folder in the folder of runs for a plan's runs: of its name for a trial, "" for any other plan.
+
+    A trial's runs have cells' names and are other runs.
+    """
     return plan.name if plan.trial else ""
 
 
@@ -178,4 +185,5 @@ def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
 
 
 def _failed(run: Run, error: str) -> Row:
+    """The row of a run that has failed; `error`: why, in one line."""
     return Row(**row_facts(run), status="failed", finished=now(), message=error)

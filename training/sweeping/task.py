@@ -65,6 +65,7 @@ class Task:
         group: a folder in `folder` for the runs' folders, "" for none.
         device: "cpu", "cuda" or "auto".
         threads: of the CPU, None: as the worker was started.
+        checkpoint_every_s: between two checkpoints of a run; None: see `Options`.
     """
 
     runs: tuple[Run, ...]
@@ -114,6 +115,7 @@ def read_progress(folder: Path) -> FitProgress | None:
 
 
 def _train(task: Task) -> list[Row]:
+    """Train the runs of a task together, write their progress into their folders, and return their rows."""
     import torch
 
     from training.run import device_of, run_rows

@@ -55,6 +55,7 @@ def own_lines(section: Section) -> list[TableLine]:
 
 
 def _lines(section: Section, metric: str) -> list[list[str]]:
+    """The rows of a section as text: string, model, start, seeds, then a cell for each of `COLUMNS`."""
     table = []
     for model in section.models:
         lines: list[TableLine | None] = [line for line in own_lines(section) if line.model == model]
@@ -65,11 +66,13 @@ def _lines(section: Section, metric: str) -> list[list[str]]:
 
 
 def _seeds(section: Section, line: TableLine | None) -> str:
+    """The number of seeds that are done, or "1 to 5" where cells differ; None: nothing was run."""
     counts = sorted({len(entry.done) for entry in section.lines[line].values()}) if line else [0]
     return str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
 def _cell(section: Section, model: str, line: TableLine | None, column: DatasetColumn, metric: str) -> str:
+    """The text of a cell: ours, the paper's and their ratio, and runs that ended without errors; None: not run."""
     paper = section.paper(model, column, metric)
     if line is None and paper is not None:
         return f"{NOT_RUN} ({paper.mean:.4f})"
@@ -85,6 +88,7 @@ def _cell(section: Section, model: str, line: TableLine | None, column: DatasetC
 
 
 def _against(ours: MeanFigure, paper: MeanFigure | None) -> str:
+    """The text of a figure of ours with the paper's, bold or italic; None: the paper has none."""
     if paper is None:
         return f"{ours.mean:.2g} ({NONE})"
     words = f"{ours.mean:.2g} ({paper.mean:.4f}) {factor(ours, paper)}"

@@ -113,7 +113,8 @@ def configuration_of(row: Row) -> TrainingConfiguration | None:
 
 
 def _section(rows: Sequence[Row], string: str, horizon: int) -> Section:
-    gathered: dict[TableLine, dict[DatasetColumn, dict[int, Row]]] = {}
+    """The table of one kind of string ("linear" or "nonlinear") and horizon in frames, from all rows."""
+    gathered: dict[TableLine, dict[DatasetColumn, dict[int, Row]]] = {}  # last by seed
     for row in rows:
         column = DatasetColumn(row.initial, row.rate_hz)
         if row.string != string or column not in COLUMNS or not _is_measured(row, horizon):
@@ -133,6 +134,7 @@ def _section(rows: Sequence[Row], string: str, horizon: int) -> Section:
 
 
 def _is_measured(row: Row, horizon: int) -> bool:
+    """Return True if a row has a place in a horizon's table: trained on it, or on the long one, for the short."""
     of_longer = (row.horizon, horizon) == (HORIZON, SHORT_HORIZON)
     return row.horizon == horizon or (of_longer and (row.status != "done" or row.rel_mse_400 is not None))
 
@@ -143,6 +145,7 @@ def _line(row: Row) -> TableLine:
 
 
 def _entry(rows: Sequence[Row], horizon: int) -> TableEntry:
+    """The entry of a cell from the rows of its seeds, over the table's horizon."""
     rows = sorted(rows, key=lambda row: row.seed)
     done, diverged, failed = (
         tuple(row for row in rows if row.status == status) for status in ("done", "diverged", "failed")
@@ -153,6 +156,7 @@ def _entry(rows: Sequence[Row], horizon: int) -> TableEntry:
 
 
 def _figure(rows: Sequence[Row], metric: str, horizon: int) -> MeanFigure | None:
+    """The mean of a metric over seeds that are done; None where a seed has none, or there are no seeds."""
     name = metric if all(row.horizon == horizon for row in rows) else f"{metric}_{SHORT_HORIZON}"
     values, errors = _known(rows, name), _known(rows, f"{name}_se")
     if not values or len(values) < len(rows):  # of a split on which a seed runs away there is no mean
@@ -163,4 +167,5 @@ def _figure(rows: Sequence[Row], metric: str, horizon: int) -> MeanFigure | None
 
 
 def _known(rows: Sequence[Row], name: str) -> list[float]:
+    """The values of a column, without those that are None."""
     return [value for row in rows if (value := getattr(row, name)) is not None]

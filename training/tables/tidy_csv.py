@@ -38,7 +38,7 @@ def _record(section: Section, model: str, line: TableLine | None, column: Datase
 
     trained: see `TableLine`. seeds: runs behind the figures; 0 where none was run. mse_mark …: of validation
     against the paper's; test_… of the test split's. runs: their names, separated by spaces, with those that diverged
-    or failed. rel_mse_std …: over seeds; rel_mse_se …: over the trajectories of the split; see `Figure`.
+    or failed. rel_mse_std …: over seeds; rel_mse_se …: over the trajectories of the split; see `MeanFigure`.
     """
     entry = (section.lines[line].get(column) if line else None) or TableEntry(None, None)
     marks: dict[str, Any] = {}
