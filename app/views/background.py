@@ -13,7 +13,7 @@ from engine.presets import PresetError
 class Background(QObject):
     """A worker of one job at a time, the latest.
 
-    Methods belong to the thread that made it, where its signals arrive too.
+    Methods are to be called in the thread that made it, where its signals arrive too.
 
     Args: see `Worker`.
     """
@@ -65,6 +65,7 @@ class Background(QObject):
 
     @Slot(object, str, tuple)
     def _pass_on(self, job: Job, signal_name: str, arguments: tuple[object, ...]) -> None:
+        """Emit the signal of this name for the latest job; drop what an abandoned one still reports."""
         if job is not self._job:
             return
         if signal_name != "progressed":

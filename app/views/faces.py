@@ -19,6 +19,7 @@ Area = Literal[
     "growth",  # header: a sign where the error grew
 ]  # the string, its listening point, the keys and the output are in both
 
+# face -> its areas
 FACES: Mapping[Face, frozenset[Area]] = {
     "play": frozenset({"instrument", "growth"}),
     "lab": frozenset(get_args(Area)) - {"instrument", "growth"},

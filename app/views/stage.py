@@ -66,14 +66,16 @@ class StageAxes:
 
 
 class StageView(QWidget):
-    """A picture above the decks. A `side` of the listener is "left" or "right", its points are 0 … 1 across.
+    """A picture above the decks, of the motions that the slots A and B hold: of sources such as model and truth.
 
-    A part is what a press would take: a side's mark, or what the picture has. Dragging a mark beneath the picture
-    moves its listening point, with Shift more finely. A double-click resets it.
+    A listening point is where the sound is taken from, 0 … 1 across the picture: one for each `side`, the channels
+    "left" and "right". Its mark stands beneath the picture. A part is what a press would take: the mark of a side
+    (named as the side), or what the picture has. Dragging a mark moves its listening point, with Shift more finely.
+    A double-click resets it.
     """
 
-    listening_point_moved = Signal(str, float)  # side, position
-    listening_point_reset = Signal(str)
+    listening_point_moved = Signal(str, float)  # side, point
+    listening_point_reset = Signal(str)  # side
     drag_started = Signal()
     drag_ended = Signal()
     motion_toggled = Signal(bool)
@@ -96,17 +98,17 @@ class StageView(QWidget):
         mark = f"Drag to hear the {name} from {self.ELSEWHERE}; double-click resets. Shift and arrow keys move it"
         self._tips = {**self.TIPS, "left": mark, "right": mark.replace("Shift", "Ctrl, Shift")}
         self.setToolTip(self._tips[None])
-        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
-        self._warning, self._grave = "", True
+        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}  # side -> point; without those that have no mark
+        self._warning, self._grave = "", True  # as of `set_warning`
         self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
         self._drag: str | None = None  # the part that is dragged
-        self._dragged_at = QPointF()
+        self._dragged_at = QPointF()  # of the mouse, at its last move
         self._dragged_point = 0.0  # that the mark has come to, unlimited
-        self._hovered: str | None = None
-        self._plain = False
-        self._ground_pixmap: QPixmap | None = None
-        self._ground_key: tuple[object, ...] = ()
-        self._toggles: list[QToolButton] = []
+        self._hovered: str | None = None  # the part under the mouse; None: none
+        self._plain = False  # without scale, legend and time, as in Play
+        self._ground_pixmap: QPixmap | None = None  # what `_ground` has painted; None: nothing yet
+        self._ground_key: tuple[object, ...] = ()  # all that it was painted from
+        self._toggles: list[QToolButton] = []  # Motion, then what a subclass adds, from left to right
         self._add_toggle("Motion", f"Show the {name} in motion; off saves processor time (M)", self.motion_toggled)
 
     def _add_toggle(self, text: str, tip: str, toggled: SignalInstance) -> None:
@@ -131,7 +133,7 @@ class StageView(QWidget):
         self.update()
 
     def set_plain(self, plain: bool) -> None:
-        """Draw string or drum alone, without scale, legend and time."""
+        """Draw string or drum alone, without scale, legend, time and buttons; else with these."""
         self._plain = plain
         for button in self._toggles:
             button.setVisible(not plain)
@@ -154,7 +156,7 @@ class StageView(QWidget):
         """Show a moment of the motion; None: at rest."""
 
     def set_listening_points(self, left: float | None, right: float | None = None) -> None:
-        """Set the points where it is heard; None: has no mark, as the right one in mono, or both at a bridge."""
+        """Set the listening points, 0 … 1; None: it has no mark, as the right one in mono, or both at a bridge."""
         points = {"left": left, "right": right}
         self._listening = {side: position for side, position in points.items() if position is not None}
         self.update()
@@ -162,6 +164,7 @@ class StageView(QWidget):
     # Gestures
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Begin to drag the mark under the left button, or hand the press to the picture."""
         if event.button() != Qt.MouseButton.LeftButton:
             return
         part = self._part_at(event.position())
@@ -172,6 +175,7 @@ class StageView(QWidget):
             self._press(part, event)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Reset the listening point of the mark there, or hand the press to the picture."""
         part = self._part_at(event.position())
         if event.button() != Qt.MouseButton.LeftButton:
             return
@@ -181,6 +185,7 @@ class StageView(QWidget):
             self._press_again(part, event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Move the part that is dragged; otherwise light the part under the mouse, with its tooltip."""
         at = event.position()
         if self._drag is None:
             self._hover(self._part_at(at))
@@ -196,6 +201,7 @@ class StageView(QWidget):
             self._drag_on(at, by)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """End the drag: emit `drag_ended`, then call `_drop` with the part that was dragged."""
         if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
             return
         dragged, self._drag = self._drag, None
@@ -234,17 +240,20 @@ class StageView(QWidget):
         self._press(part, event)
 
     def _drag_on(self, at: QPointF, by: QPointF) -> None:
-        """Drag a part of the picture by so many pixels, with Shift fewer than the pointer has gone."""
+        """Drag a part of the picture; `at`: the mouse, `by`: its way in pixels, times FINE with Shift."""
 
     def _drop(self, part: str) -> None:
         """End the drag of a part."""
 
     @abstractmethod
     def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
-        """Take a key, of an arrow with its direction; return False where it means nothing here."""
+        """Take a key; return False where it means nothing here.
+
+        `across`, `up`: the direction of an arrow, -1 or 1 (right, up); 0 for both where it is no arrow.
+        """
 
     def _part_at(self, at: QPointF) -> str | None:
-        """The part that can be grabbed there; None: none."""
+        """The part that can be grabbed at a point: the picture's, or below it the nearest mark; None: none."""
         if at.y() <= self.axes.bottom - 6:
             return self._picture_part_at(at)
         near = {side: abs(at.x() - self.axes.x(point)) for side, point in self._listening.items()}
@@ -253,15 +262,17 @@ class StageView(QWidget):
 
     @abstractmethod
     def _picture_part_at(self, at: QPointF) -> str | None:
-        """The same above the marks."""
+        """The part of the picture at a point, which lies above the marks; None: none."""
 
     def _hover(self, part: str | None) -> None:
+        """Show the mouse's cursor for the part under it (None: none), and light that part."""
         self.setCursor(self.CURSORS.get(part, Qt.CursorShape.SizeHorCursor))
         if part != self._hovered:
             self._hovered = part
             self.update()
 
     def _step_mark(self, side: str, steps: int) -> None:
+        """Ask to move a listening point by `steps` of STEP to the right, within 0 … 1; nothing without a mark."""
         if side in self._listening:
             self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
 
@@ -333,7 +344,10 @@ class StageView(QWidget):
         """Paint the ground behind the motion, on the backdrop."""
 
     def _ground(self, *chosen: object) -> QPixmap:
-        """The backdrop and the ground on it, painted again only when something in them changes, as `chosen`."""
+        """The picture of backdrop, ground and legend, painted again only when one of its causes has changed.
+
+        `chosen`: what a subclass paints the ground from, besides the causes known here.
+        """
         key = (
             self.size(),
             self.devicePixelRatioF(),
@@ -419,7 +433,7 @@ def paint_caption(painter: QPainter, place: QRectF, text: str) -> None:
 
 
 def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: float, bottom: float) -> None:
-    """Words below the feet at these x; two that are near each other make room for one another."""
+    """Paint the words of marks, (x in pixels, words) each, below their feet; neighbours make room for one another."""
     font = theme.small_font(11)
     for place, text in label_places(QFontMetrics(font), marks, width, bottom):
         write(painter, place, text, theme.GOOD, font)
@@ -428,7 +442,10 @@ def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: f
 def label_places(
     metrics: QFontMetrics, marks: Sequence[tuple[float, str]], width: float, bottom: float
 ) -> list[tuple[QRectF, str]]:
-    """The place of each label: under its mark, but within `width` and clear of its neighbour."""
+    """The box of each label: under its mark, but within `width` and clear of its neighbour; all in pixels.
+
+    `marks`: (x, words), at least one. `bottom`: the height at which feet stand.
+    """
     texts = sorted(marks)
     widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
     lefts = [x - width_px / 2 for (x, _), width_px in zip(texts, widths, strict=True)]
@@ -437,7 +454,7 @@ def label_places(
         lefts[second - 1] -= overlap / 2
         lefts[second] += overlap / 2
     right = lefts[-1] + widths[-1]
-    aside = max(0.0, -lefts[0]) + min(0.0, width - right)
+    aside = max(0.0, -lefts[0]) + min(0.0, width - right)  # moves all back within the widget
     return [
         (QRectF(left + aside, bottom + 16, label_width, 18), text)
         for left, label_width, (_, text) in zip(lefts, widths, texts, strict=True)

@@ -58,7 +58,7 @@ class Theme:
 
 DARK, LIGHT = Theme(dark=True), Theme(dark=False)
 
-FONT_PX = 12
+FONT_PX = 12  # at a text size of 100 %
 SHEET = Path(__file__).with_name("sheet.qss")
 SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the themes' colours
 
@@ -68,7 +68,7 @@ _SCHEMES: dict[ThemeChoice, Qt.ColorScheme] = {
     "light": Qt.ColorScheme.Light,
 }
 
-present = DARK
+present = DARK  # the theme in use, which `use` exchanges
 SOURCE_COLOURS = {kind: getattr(DARK, kind) for kind in ("model", "truth", "difference", "other")}
 
 
@@ -109,6 +109,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def _luminance(colour: QColor) -> float:
+    """The relative luminance of WCAG, 0 … 1."""
     linear = [
         c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
         for c in (colour.redF(), colour.greenF(), colour.blueF())
@@ -117,6 +118,7 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
+    """The text of `sheet.qss` in the present theme: colours for @role, a line per source for @source, sizes grown."""
     tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
     values = {**present.colours, "tick": tick.as_posix()}
     lines = [
@@ -129,6 +131,7 @@ def _style_sheet() -> str:
 
 
 def _palette() -> QPalette:
+    """The palette of Qt in the colours of the present theme."""
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {

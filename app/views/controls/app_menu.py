@@ -105,7 +105,7 @@ class AppMenu(QMenu):
 
     def __init__(self, window: QWidget | None = None) -> None:
         super().__init__(window)
-        self._looks: dict[tuple[str, object], QAction] = {}
+        self._looks: dict[tuple[str, object], QAction] = {}  # field of `Look` and its value -> the entry for it
         self.action: dict[str, QAction] = {}
         for title, entries in MENUS.items():
             menu = self.addMenu(title)
@@ -145,6 +145,7 @@ class AppMenu(QMenu):
             self.action[name].setText(f"{ENTRIES[name].text}{words}")
 
     def _add_looks(self, above: QMenu, title: str, field: str, values: dict[str, object]) -> None:
+        """Add a menu of the values of a field of `Look`, by their words, of which one is checked."""
         menu = above.addMenu(title)
         group = QActionGroup(menu)
         for text, value in values.items():

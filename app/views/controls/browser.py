@@ -33,8 +33,8 @@ KEYS = Qt.Key
 MOVES = (KEYS.Key_Up, KEYS.Key_Down, KEYS.Key_PageUp, KEYS.Key_PageDown)
 CLOSES = (KEYS.Key_Return, KEYS.Key_Enter, KEYS.Key_Escape)
 NARROWEST_SEARCH, SHORTEST_CHOICE = 120, 6  # pixels; letters of a box beside it
-TOP = 52  # pixels: of its place without notices
-REST_MS = 160  # after the last step in the list, what is loaded is played
+TOP = 52  # pixels: its upper edge in a window without a notice bar
+REST_MS = 160  # from the last step in the list to the playing of the loaded row, where `at_rest`
 DELETE, REALLY = "Delete", "Delete it for good?"
 _COMMAND = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 _PLACES = {QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show, QEvent.Type.Hide}  # what it keeps clear of
@@ -44,7 +44,8 @@ _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier 
 class Browser(QFrame):
     """A browser that is hidden at first; closing gives the focus back to the widget that had it.
 
-    One row of the list is selected, loaded or not: card and keys are for it.
+    A row is an entry, a preset or an instrument, known by its name. It is listed where it passes search and filters.
+    The loaded row is the one in use. One listed row is selected, loaded or not: card and keys are for it.
 
     Args:
         what: of what it is a browser, in the plural.
@@ -52,8 +53,9 @@ class Browser(QFrame):
         columns: of the list, the title's first; one alone has no heading.
         filters: the accessible name of each box, and the words for no filter.
         orders: in which the list can be sorted.
-        plays: the word for playing what is selected; `at_rest`: arrows play too.
-        size: in pixels, and how much of the window below it stays free.
+        plays: the word for playing what is selected.
+        at_rest: whether a row that arrows or a click loaded is played too, after REST_MS.
+        size: largest width and height, and how much of the window stays free below it, in pixels.
         folder_tip: the tooltip of the button that opens the user's folder.
 
     Attributes:
@@ -90,8 +92,8 @@ class Browser(QFrame):
         self._size = size
         self._at_rest = at_rest
         self.loaded = self.selected = self._folder = ""
-        self._before: QWidget | None = None  # had the focus
-        self._filling = False
+        self._before: QWidget | None = None  # had the keyboard focus before it was opened
+        self._filling = False  # list and boxes change by the code: their signals are no choices of the user
         self._rest = QTimer(self, interval=REST_MS, singleShot=True)
         self._rest.timeout.connect(self.play)
         self._rows: Sequence[BrowserRow] = ()
@@ -187,6 +189,7 @@ class Browser(QFrame):
         self._fill()
 
     def _fill(self) -> None:
+        """List the rows that pass search and filters, with their number; select the selected one, or the best hit."""
         kinds = [box.currentData() for box in self.filters.values()]
         order = max(0, self.order.currentIndex())
         self._filling = True
@@ -226,7 +229,7 @@ class Browser(QFrame):
             self._fill()
 
     def show_card(self, name: str) -> None:
-        """Show the card of a row; "" of none."""
+        """Show the card of a listed row; for another name, as "", the advice to clear search or filters."""
         row = next((row for row in self.list.rows if row.name == name), None)
         self.delete.setText(DELETE)
         for button in (self.play_button, self.star):
@@ -269,7 +272,7 @@ class Browser(QFrame):
             self.clear_filter()
 
     def reveal(self, name: str) -> None:
-        """Clear a filter that hides an entry."""
+        """Clear search and filters where they hide the row of this name."""
         if name not in self.listed:
             self.clear_filter()
 
@@ -310,13 +313,13 @@ class Browser(QFrame):
         return self.loaded if self.loaded in hits else next(iter(hits), "")
 
     def set_chosen(self, name: str) -> None:
-        """Select an entry that was loaded, if it is listed."""
+        """Take note that the row of this name was loaded elsewhere, and select it if listed; emit nothing."""
         if name != self.loaded:
             self.loaded = name
             self.select(name)
 
     def select(self, name: str = "") -> None:
-        """Select an entry, or the best hit where it is not listed. Load nothing."""
+        """Select the row of a name, or the best hit where it is not listed. Load nothing."""
         self.selected = name if name in self.listed else self.best_hit
         self._filling = True
         self.list.setCurrentIndex(self.list.index_of(self.selected))
@@ -332,7 +335,7 @@ class Browser(QFrame):
             self.chosen.emit(name)
 
     def move_selection(self, key: Qt.Key) -> None:
-        """Load the selected entry, or, where it is loaded already, the one that one of MOVES goes to."""
+        """Load the selected row, or where it is loaded already, the row to which a key of MOVES leads from it."""
         names = self.listed
         if names:
             self.list.setFocus()  # where Space plays
@@ -380,9 +383,10 @@ class Browser(QFrame):
             self.load(line.name)
 
     def _click_row(self, index: QModelIndex) -> None:
+        """Load the row that was clicked, or ask to change its favourite where the star was."""
         line = self.list.line(index)
         if isinstance(line, str):
-            self.select(self.selected)  # a heading took the mark
+            self.select(self.selected)  # Qt made the heading current
         elif index.column() == STAR:
             self.favourite_asked.emit(line.name)
         else:
@@ -395,6 +399,10 @@ class Browser(QFrame):
             self.dismiss()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Take the keys of `press`, and typed characters for the search, from all widgets of the browser.
+
+        Also follow the sizes of parent and notice. Return True for a key that was taken.
+        """
         if watched is self.parent() or isinstance(watched, NoticeBar):
             if event.type() in _PLACES and self.isVisible():
                 self.place()
@@ -410,7 +418,7 @@ class Browser(QFrame):
         return watched is not self.search and self.take_typed(event)
 
     def _is_browser_key(self, watched: QObject, event: QKeyEvent) -> bool:
-        """Return True if a key is one of `press`; buttons and boxes keep all of these but Escape."""
+        """Return True if a key is for `press`; with the focus on a button or a box, only Escape is."""
         control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if watched not in (self.search, self.list):
             return event.key() == KEYS.Key_Escape

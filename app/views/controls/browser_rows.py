@@ -26,11 +26,11 @@ class BrowserRow:
         name: which entry it is; title: its name for people.
         heading: under which it is listed.
         searched: its text for the search, in lower case.
-        kinds: for each filter its value, and that in words.
+        kinds: (value, its words) for each filter of the browser.
         card: gives its facts as rich text.
-        cells: further columns, with their tooltips.
+        cells: (text, tooltip) for each column behind the title's.
         tip: of the title.
-        ranks: for each order what is sorted by, the smallest first.
+        ranks: for each order of the browser what is sorted by: (whether unknown, value), the smallest first.
         own: whether it can be renamed and deleted.
     """
 
@@ -83,7 +83,7 @@ def listed_rows(
 
 
 class RowList(QTreeWidget):
-    """Rows under headings, which cannot be selected; the first column has a star."""
+    """Rows under headings. A heading cannot be selected. The first column has the star of a favourite."""
 
     def __init__(self, columns: Sequence[BrowserColumn]) -> None:
         super().__init__()
@@ -94,7 +94,7 @@ class RowList(QTreeWidget):
         self.setHeaderLabels(["", *(column.title for column in columns)])
         for place, column in enumerate(columns, TITLE):
             self.headerItem().setToolTip(place, column.tip)
-        self._lines: list[BrowserRow | str] = []  # a row, or a heading's text
+        self._lines: list[BrowserRow | str] = []  # for each line shown its row, or a heading's text
 
     def show_rows(self, rows: Sequence[BrowserRow], favourites: Collection[str]) -> None:
         """List rows in their order, each heading before the first of its own."""

@@ -14,7 +14,7 @@ from app.views.controls.parts import NO_MARGINS, Handler, filled, tool_button
 if TYPE_CHECKING:
     from app.presets.library import PresetEntry
 
-PADDING = 26  # of the style sheet, with the borders
+PADDING = 26  # pixels: of the style sheet, with the borders
 
 
 class NameButton(QPushButton):
@@ -55,6 +55,7 @@ class FilterButton(QToolButton):
         self.clicked.connect(pressed)
 
     def show_listed(self, listed: int, total: int) -> None:
+        """Show how many rows of all pass the filter; hide the button where all do."""
         self.setVisible(listed < total)
         self.setText(f"{listed} of {total}  ✕")
         self.setAccessibleName(f"Filtered: {listed} of {total} {self._what}; clear the filter")
@@ -74,7 +75,7 @@ class ChoiceBar(QFrame):
     """
 
     browse_asked = Signal()
-    step_asked = Signal(int)
+    step_asked = Signal(int)  # -1: previous, 1: next
     all_asked = Signal()  # clear the browser's filter
 
     def __init__(self, what: str, name: str, keys: tuple[str, str, str] = ("", "", "")) -> None:

@@ -21,11 +21,11 @@ class DragHandle(QToolButton):
     """The button that asks for a drag as it is pulled, and for files already when the mouse comes.
 
     Attributes:
-        subject: what is dragged.
-        pulled: the mouse left it pressed, and was not released since.
+        subject: what is dragged, one of WORDS.
+        pulled: the mouse has left the button while pressed, which asked for a drag, and was not released since.
     """
 
-    asked = Signal(str)  # one of Way
+    asked = Signal(str)  # one of Way: prepare the files, drag them, or copy them to the clipboard
 
     def __init__(self) -> None:
         super().__init__()
@@ -64,6 +64,7 @@ class DragHandle(QToolButton):
         self.asked.emit("prepare")
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Ask for a drag as the pressed mouse leaves the button; back on the button it is a click again."""
         was_down = self.isDown()
         super().mouseMoveEvent(event)
         if was_down != self.isDown():

@@ -16,7 +16,7 @@ class FocusRing(QWidget):
         super().__init__(parent)
         self._ground = parent
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self._around: QGraphicsView | None = None
+        self._around: QGraphicsView | None = None  # the plot that has the keyboard focus; None: none has
         self.hide()
         application = QApplication.instance()
         assert isinstance(application, QApplication)
@@ -33,6 +33,7 @@ class FocusRing(QWidget):
         painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _follow(self, _before: QWidget | None, now: QWidget | None) -> None:
+        """Surround the widget that got the keyboard focus, if it is a plot of the parent; else hide."""
         if self._around is not None:
             self._around.removeEventFilter(self)
             self._around = None

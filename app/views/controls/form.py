@@ -25,7 +25,7 @@ from app.views.controls.plain import Label
 from app.views.file_places import FileKind, FilePlaces
 
 Part = TypeVar("Part", bound=QWidget)
-LABEL_WIDTH = 104
+LABEL_WIDTH = 104  # pixels, at least
 FILTERS = {
     ".wav": "WAV (*.wav)",
     ".flac": "FLAC (*.flac)",
@@ -53,7 +53,7 @@ class Form(QWidget):
     def __init__(self, choices: object = None, tips: Mapping[str, str] | None = None) -> None:
         super().__init__()
         self._choices, self._tips = choices, tips or {}
-        self._controls: dict[str, Any] = {}
+        self._controls: dict[str, Any] = {}  # by field
         self.rows = QFormLayout(self)
         self.rows.setContentsMargins(NO_MARGINS)
         self.rows.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
@@ -148,7 +148,7 @@ class FilePicker(QWidget):
         super().__init__()
         self.places, self.kind = places, kind
         self.suffix = suffix
-        self._named_by_user = False
+        self._named_by_user = False  # so that no name is suggested any more
         self.edit = QLineEdit()
         self.edit.setAccessibleName("File")
         self.edit.setToolTip(tip)
@@ -175,6 +175,7 @@ class FilePicker(QWidget):
             self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
 
     def browse(self) -> None:
+        """Ask for the file, or for the folder in which one of the present name is made; nothing if cancelled."""
         named = Path(self.edit.text().strip()).name
         path: Path | None
         if self.suffix:

@@ -27,7 +27,7 @@ from app.views.painting import set_ink, write
 from engine.parameters import Parameter
 
 SWEEP_DEGREES = 270
-WIDTH, NARROW_WIDTH = 62, 52
+WIDTH, NARROW_WIDTH = 62, 52  # pixels, as the next two
 HEIGHT, LOW_HEIGHT = 82, 60
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
@@ -54,7 +54,7 @@ class _Editor(QLineEdit):
 
     def __init__(self, start: str, unit: str, prefix: str, parent: QWidget) -> None:
         super().__init__(start, parent)
-        self._unit, self._prefix = unit, prefix
+        self._unit, self._prefix = unit, prefix  # that may be typed with the number; "": none
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._is_alien(event):
@@ -63,6 +63,7 @@ class _Editor(QLineEdit):
         return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Give the field up by Escape or by a key that no number has, which then goes to the window."""
         if event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
         elif self._is_alien(event):
@@ -89,6 +90,8 @@ class _Editor(QLineEdit):
 class Knob(QWidget):
     """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`.
 
+    A figure is what the value amounts to in the present string, as "72.3 N". It may be shown in the value's place.
+
     Args:
         width: in pixels, by the longest name or value.
         low: smaller, for rows of many knobs.
@@ -105,12 +108,12 @@ class Knob(QWidget):
         super().__init__(parent)
         self.parameter, self.default = parameter, parameter.default  # to which a double-click resets
         self._value = parameter.default
-        self._dragged_at: QPointF | None = None
-        self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
-        self._editor: QLineEdit | None = None
+        self._dragged_at: QPointF | None = None  # of the mouse, at its last move; None: it does not drag
+        self._dragged_share = 0.0  # of the range, 0 … 1; may go past the ends, so that the way back is as long
+        self._editor: QLineEdit | None = None  # the field of a number that is being typed; None: none is
         self._width, self._low = width, low
-        self._figure = self._why_barred = self._tip = ""
-        self._stays = False
+        self._figure = self._why_barred = self._tip = ""  # "": the value is shown; it is free; no tip of its own
+        self._stays = False  # keyboard focus stays here after typing, as keys have brought it
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.set_name(parameter.label, parameter.tip)
@@ -211,6 +214,7 @@ class Knob(QWidget):
         return keeps_keys(event, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Ask for a step by arrows, an end or the default by Home, End, Delete; begin to type by a digit or sign."""
         steps = _STEPS.get(Qt.Key(event.key()))
         places = dict(zip(_PLACES, (*self.parameter.limits, self.default), strict=True))
         if steps is not None:
@@ -232,6 +236,7 @@ class Knob(QWidget):
         super().focusInEvent(event)
 
     def _type(self, start: str) -> None:
+        """Open a field over the knob's value, which begins with the character that was typed."""
         unit, prefix = self.parameter.typed_unit, self.parameter.prefix
         if self._figure:
             unit, prefix = self.parameter.figure_unit or "", ""
@@ -245,6 +250,7 @@ class Knob(QWidget):
         self._editor = editor
 
     def _take_typed(self) -> None:
+        """Close the field and ask for its number: a figure, or a value, limited to the range; refuse other texts."""
         if self._editor is None:
             return
         text = self._editor.text()
@@ -276,6 +282,7 @@ class Knob(QWidget):
             editor.deleteLater()
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the name above, the dial with its pointer, and below it the figure or the value."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         scale = theme.present.scale  # all of it grows with the text

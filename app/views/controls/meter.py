@@ -23,8 +23,8 @@ class Meter(QWidget):
         self.setToolTip(
             "Playback level in dBFS. LIMIT lights while the safety limiter is active (playback only, not in files)"
         )
-        self._peak_db = LOWEST_DB
-        self._hold = 0
+        self._peak_db = LOWEST_DB  # dBFS, as shown; LOWEST_DB at least
+        self._hold = 0  # calls of `show_level` for which the light stays on; 0: it is off
 
     def sizeHint(self) -> QSize:
         return QSize(theme.px(150), theme.px(40))
@@ -55,6 +55,7 @@ class Meter(QWidget):
         return self._hold > 0
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the bar of the peak, its scale in dBFS below, and the light at the right."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         scale = theme.present.scale  # all of it grows with the text

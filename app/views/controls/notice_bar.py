@@ -51,8 +51,8 @@ class NoticeBar(QFrame):
         super().__init__(parent)
         self.setObjectName("notice")
         self.setAccessibleName("Notice")
-        self._notices: list[Notice] = []
-        self._list: NoticeList | None = None
+        self._notices: list[Notice] = []  # of this run, the latest last, MOST_KEPT at most
+        self._list: NoticeList | None = None  # the dialog of all; None: it was not opened yet
         self._hide = QTimer(self, interval=INFORMED_MS, singleShot=True)
         self._hide.timeout.connect(self.hide)
         self.faulted.connect(self._report_fault, Qt.ConnectionType.QueuedConnection)
@@ -85,6 +85,7 @@ class NoticeBar(QFrame):
         self._take(Notice(message, details))
 
     def _report_fault(self, sentence: str, text: str) -> None:
+        """Show an unexpected error: a sentence with the last line of its traceback, which the details hold."""
         *_, error = text.strip().splitlines()
         self.report(f"{sentence} {one_line(error)}", f"{text}\nPlease report it. It is also in {log_file()}.")
 
@@ -133,6 +134,7 @@ class NoticeBar(QFrame):
         self.resize(self.width(), self.heightForWidth(self.width()))
 
     def _take(self, notice: Notice) -> None:
+        """Show a notice and list it last, with its count where it was listed before; hide it later if no error."""
         earlier = next((old for old in self._notices if old.message == notice.message), None)
         if earlier is not None:
             self._notices.remove(earlier)

@@ -31,7 +31,13 @@ def refusal(text: str, example: str) -> str:
 
 
 class NumberBox(QDoubleSpinBox):
-    """A field for a number with its unit, of which only a whole text counts."""
+    """A field for a number with its unit. Typed text counts at Enter, or as the focus leaves, if it is understood.
+
+    Args:
+        limits: lowest and highest value.
+        suffix, prefix: text behind and before the number, such as its unit.
+        width: least width in pixels.
+    """
 
     def __init__(
         self,
@@ -80,7 +86,7 @@ class NumberBox(QDoubleSpinBox):
         return (state.Intermediate if self.understood(text) is None else state.Acceptable), text, position
 
     def fixup(self, text: str) -> str:
-        """Say that a text is refused, as it would count; Qt then shows the value again."""
+        """Show above the field why a typed text is refused, and which value is kept; Qt then shows that again."""
         valid_text = self.specialValueText() if self.value() == self.minimum() else ""
         valid_text = valid_text or f"{self.prefix()}{self.textFromValue(self.value())}{self.suffix()}"
         number = typed_number(self._own(text), self.suffix(), self.prefix())

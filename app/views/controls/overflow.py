@@ -13,9 +13,9 @@ LINE_LETTERS = 64  # of words in the menu
 
 
 class Overflow(QToolButton):
-    """A row hides what does not fit and hands it over with `hold`.
+    """A menu button for a row of controls, which hides what does not fit and hands it over with `hold`.
 
-    A button's entry presses it; a label's words are shown.
+    A button's entry in the menu presses it; a label's words are shown. Without parts the menu button is hidden.
 
     Attributes:
         parts: what is in the menu.
@@ -41,6 +41,7 @@ class Overflow(QToolButton):
         self.setVisible(bool(parts))
 
     def _fill(self) -> None:
+        """Fill the menu with the present parts as it opens: entries for buttons, then the words of labels."""
         menu = self.menu()
         menu.clear()
         for part in self.parts:

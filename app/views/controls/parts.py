@@ -57,6 +57,7 @@ def push_button(
 
 
 def _prepared(button: Button, text: str, name: str, tip: str, kind: str, pressed: Handler | None) -> Button:
+    """The button with its text, names, tooltip and handler; arguments as of `tool_button`."""
     button.setText(text)
     button.setAccessibleName(name)
     button.setToolTip(tip)

@@ -11,9 +11,9 @@ from app.views.controls.browser import open_browser
 
 X11 = "xcb"  # Qt's name: there a held key is repeated by releases and presses, most of which Qt does not mark so
 LEAVE_MS = 2  # delay of `released` there: by then the press of a repetition has arrived
-REPEAT_MS = 5  # between such a release and its press on the server's clock, at most
+REPEAT_MS = 5  # at most, from such a release to the press of the repetition, on the clock of the X server
 _WRITING = (QLineEdit, QAbstractSpinBox, QPlainTextEdit, QTextEdit)
-_HELD = (
+_HELD = (  # modifiers with which a key does not play
     Qt.KeyboardModifier.ControlModifier
     | Qt.KeyboardModifier.AltModifier
     | Qt.KeyboardModifier.MetaModifier
@@ -41,11 +41,11 @@ class PlayingKeys(QObject):
 
     def __init__(self, window: QWidget, platform: str = "") -> None:
         super().__init__(window)
-        self._holds_back = (platform or QApplication.platformName()) == X11
+        self._holds_back = (platform or QApplication.platformName()) == X11  # releases wait LEAVE_MS
         self._window = window
-        self._watched: QWidget | None = None
+        self._watched: QWidget | None = None  # has the keyboard focus and is filtered; None: the window alone is
         self.piano = False
-        self._down: dict[int, KeyPress] = {}  # by Qt's key, or the platform's code
+        self._down: dict[int, KeyPress] = {}  # keys that were reported as pressed, by `_number`
         self._leaving: dict[int, int] = {}  # keys whose release is held back -> when, in ms of the platform's clock
         window.installEventFilter(self)
         application = QApplication.instance()
@@ -96,6 +96,7 @@ class PlayingKeys(QObject):
         return notes
 
     def _let_go(self, *numbers: int) -> None:
+        """Report these keys as released, once each, whether they are down or held back."""
         for number in numbers:
             self._leaving.pop(number, None)
             if (press := self._down.pop(number, None)) is not None:
@@ -125,6 +126,7 @@ class PlayingKeys(QObject):
 
 
 def _number(event: QKeyEvent) -> int:
+    """The number of a key: the platform's scan code; Qt's key, negated, where there is none."""
     return event.nativeScanCode() or -event.key()
 
 

@@ -15,7 +15,7 @@ class ProgressStrip(QWidget):
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setFixedHeight(2)
-        self._share: float | None = None
+        self._share: float | None = None  # as of `show_share`
 
     @property
     def share(self) -> float | None:

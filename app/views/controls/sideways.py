@@ -38,6 +38,7 @@ class Sideways(QScrollArea):
         self._fit()
 
     def _fit(self) -> None:
+        """Make the part as wide as the area, or its least width; and the area as high as it, with the scroll bar."""
         part = self.widget()
         if part is not None:
             if (layout := part.layout()) is not None:

@@ -23,7 +23,7 @@ DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
 WIDTH = 148  # this and the next two: fixed, so that a longer title moves nothing
 NARROW_WIDTH = 108
 TIGHT_WIDTH = 82
-PADDING = 16  # of the style sheet, with the borders
+PADDING = 16  # pixels: of the style sheet, with the borders
 
 _SOURCES = (
     ("model", "Model of the chosen preset"),
@@ -33,17 +33,20 @@ _SOURCES = (
 
 
 class SlotButtons(QWidget):
-    """A button for each slot, which hears it, and beside it a menu of the sources that it may hold."""
+    """A button for each slot, which makes it the heard one, and beside it a menu of the sources that it may hold.
+
+    The slots A and B hold a source each: "model", "truth", "difference", or "preset:NAME" for another preset's model.
+    """
 
     change_asked = Signal(str, object)  # a field of `Choices` and its new value
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._choices = Choices()
-        self._width = WIDTH
-        self._entries: Sequence[PresetEntry] = ()
-        self._gains_db: dict[str, float | None] = {}
-        self._buttons: dict[str, QPushButton] = {}
+        self._width = WIDTH  # of a button, in pixels that grow with the text
+        self._entries: Sequence[PresetEntry] = ()  # the presets whose models can be chosen
+        self._gains_db: dict[str, float | None] = {}  # by slot, as of `show_gains`
+        self._buttons: dict[str, QPushButton] = {}  # by slot
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(3)
@@ -64,7 +67,7 @@ class SlotButtons(QWidget):
         self._show()
 
     def set_narrow(self, narrow: bool, tight: bool = False) -> None:
-        """Set the width for a window with little room; `tight`: with very little."""
+        """Set the width of the buttons for a window of little width; `tight`: narrower still, for even less."""
         self._width = TIGHT_WIDTH if tight else NARROW_WIDTH if narrow else WIDTH
         for button in self._buttons.values():
             button.setFixedWidth(theme.px(self._width))
@@ -81,6 +84,7 @@ class SlotButtons(QWidget):
             self._show()
 
     def _show(self) -> None:
+        """Show on both buttons what their slots hold, the gain, which is heard, and the tooltips."""
         for slot, button in self._buttons.items():
             source = self._choices.source_of(slot)
             title, short = self._title(source)
@@ -97,6 +101,7 @@ class SlotButtons(QWidget):
             button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
+        """The title of a source, and its wording for a button."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
                 return entry.title, entry.title
@@ -116,12 +121,14 @@ class SlotButtons(QWidget):
         return "  ".join(part for part in (letter, cut, beside) if part)
 
     def _gain_text(self, slot: str) -> str:
+        """The gain of a slot with its unit; "" where it is not known, or less than 0.05 dB."""
         gain_db = self._gains_db.get(slot)
         if gain_db is None or abs(gain_db) < 0.05:
             return ""
         return f"{gain_db:+.0f} dB" if self._choices.source_of(slot) == "difference" else f"{gain_db:+.1f} dB"
 
     def _menu_button(self, slot: str) -> QToolButton:
+        """Build the button of a slot's menu, which is filled each time it opens."""
         letter = slot.upper()
         button = tool_button("▾", f"Source of {letter}", f"Source and gain of {letter}", "narrow")
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
@@ -132,6 +139,7 @@ class SlotButtons(QWidget):
         return button
 
     def _fill(self, menu: QMenu, slot: str) -> None:
+        """Fill the menu of a slot: its source, then level match and gain of the difference, which are of both."""
         menu.clear()
         group = QActionGroup(menu)
         for source, title in _SOURCES:

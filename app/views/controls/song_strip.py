@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.parts import NO_MARGINS, faint, filled, tool_button
 
-STEPS_PER_S = 10
-KEY_STEP_S, PAGE_STEP_S = 1, 10
+STEPS_PER_S = 10  # steps of the slider
+KEY_STEP_S, PAGE_STEP_S = 1, 10  # by an arrow key, and by Page up and Page down
 NARROWEST_NAME = 80  # pixels
 
 
@@ -39,7 +39,7 @@ class SongStrip(QWidget):
         row = filled(QHBoxLayout(self), margins=NO_MARGINS)
         for widget, share in ((self.play, 0), (self.name, 1), (self.slider, 3), (self.time, 0), (self.closer, 0)):
             row.addWidget(widget, share)
-        self._shown_step = 0
+        self._shown_step = 0  # of the slider, as set last by the song or the user
         self.hide()
 
     def show_song(self, name: str, length_s: float) -> None:
@@ -50,6 +50,7 @@ class SongStrip(QWidget):
         self.show()
 
     def show_position(self, position_s: float, playing: bool) -> None:
+        """Show the time that is reached and whether it plays; the slider stays while the user drags it."""
         self.play.setText("■" if playing else "▶")
         self.time.setText(f"{_clock(position_s)} / {_clock(self._length_s)}")
         self.slider.setAccessibleDescription(_clock(position_s))
@@ -58,6 +59,7 @@ class SongStrip(QWidget):
             self.slider.setValue(self._shown_step)
 
     def _ask(self, step: int) -> None:
+        """Ask for the time of a step of the slider that the user, not `show_position`, has set."""
         if step != self._shown_step:
             self._shown_step = step
             self.seek_asked.emit(step / STEPS_PER_S)

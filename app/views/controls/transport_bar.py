@@ -27,7 +27,11 @@ OF_THE_INSTRUMENT = "While keys play the instrument, it is the instrument's own 
 
 
 class TransportBar(QFrame):
-    """Gestures emit signals and change nothing; `show_choices` shows what became of them."""
+    """Gestures emit signals and change nothing; `show_choices` shows what became of them.
+
+    The slots A and B hold a source each, such as model or truth; one of them is heard. As trained: plucked in the
+    middle of what the preset's model was trained on.
+    """
 
     play_asked = Signal()
     trained_asked = Signal()
@@ -45,8 +49,8 @@ class TransportBar(QFrame):
         self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._loop.toggled.connect(partial(self.change_asked.emit, "loop"))
         self._fitted = (False, False, 1.0)  # compact, tight, scale of text
-        self._tight, self._verb = False, ""
-        self._groups: list[QHBoxLayout] = []
+        self._tight, self._verb = False, ""  # symbols in place of words; "Pluck" or "Strike"
+        self._groups: list[QHBoxLayout] = []  # rows of controls, each behind a rule
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = filled(QHBoxLayout(self), spacing=5, margins=QMargins(12, 8, 12, 8))
         self.slots = SlotButtons()
@@ -76,7 +80,7 @@ class TransportBar(QFrame):
         self._row.insertWidget(self._row.indexOf(self._space), group)
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """Narrow the bar by a fifth, for a window with little room. `tight`: with very little, symbols for words."""
+        """Narrow the bar by a fifth, for a window of little width; `tight`: for even less, with symbols for words."""
         if (compact, tight, theme.present.scale) == self._fitted:
             return
         self._fitted = compact, tight, theme.present.scale
@@ -98,6 +102,7 @@ class TransportBar(QFrame):
             button.style().polish(button)
 
     def show_choices(self, choices: Choices) -> None:
+        """Show the values on knobs, boxes and slots; disable those that have no effect with the present choices."""
         for field, knob in self.knobs.items():
             knob.set_value(choices.value(field))
         self.knobs["width"].set_barred(NO_WIDTH if choices.pluck.shape == "triangular" else "")
@@ -121,6 +126,7 @@ class TransportBar(QFrame):
         self._trained.setToolTip(why_not or TRAINED_TIP)
 
     def show_playing(self, playing: bool) -> None:
+        """Show on the play button "Stop" while it plays, else "Pluck" or "Strike"; the sign alone in a tight bar."""
         if playing == self._playing:
             return
         self._playing = playing
@@ -129,6 +135,7 @@ class TransportBar(QFrame):
         self._play.setText(words[0] if self._tight else words)
 
     def _show_verb(self, verb: str) -> None:
+        """Name the play button "Pluck", for a string, or "Strike", for drums."""
         if verb != self._verb:
             self._verb = verb
             self._play.setAccessibleName(f"{verb} or stop")
@@ -141,6 +148,7 @@ class TransportBar(QFrame):
         self.play_asked.emit()
 
     def _build_pickup(self) -> QVBoxLayout:
+        """Build the switch of stereo, above the box of pick-ups."""
         tip = f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_INSTRUMENT}"
         self._stereo = tool_button("Stereo", tip=tip, checkable=True)
         self._stereo.toggled.connect(partial(self.change_asked.emit, "stereo"))
@@ -156,6 +164,7 @@ class TransportBar(QFrame):
         return filled(QVBoxLayout(), self._stereo, self._pickup)
 
     def _build_shape(self) -> QVBoxLayout:
+        """Build the box of the pluck's shapes, above the button that plucks as trained."""
         self._shape = shape_box(partial(self.change_asked.emit, "shape"))
         column = QVBoxLayout()
         column.addWidget(Label("PLUCK", objectName="knob"), alignment=Qt.AlignmentFlag.AlignHCenter)

@@ -48,6 +48,9 @@ LARGEST_SEED = 2**32
 class AbxDialog(QDialog):
     """The pages, the sound and the result of the test.
 
+    A and B are two sounds of one pluck, model and truth; in each trial X is one of them, drawn from a seed. A run is
+    a test under way. Stimuli are A and B as they are played.
+
     Args:
         material: what is compared: a result without trials.
         render: starts to render model and truth of the pluck at a rate in Hz; gives the future of their samples,
@@ -74,13 +77,13 @@ class AbxDialog(QDialog):
         self._render = render
         self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
         self._rate_hz = 0  # at which it is, or was, rendered
-        self._pair: Pair | None = None
+        self._pair: Pair | None = None  # plays the stimuli; None: there are none
         self._stimuli: Stimuli | None = None
-        self._silence = RENDERING  # why there are no stimuli
-        self._run: ListeningTest | None = None
-        self._sounding: Sound | None = None
+        self._silence = RENDERING  # why there are no stimuli; "": there are
+        self._run: ListeningTest | None = None  # None: no test is under way
+        self._sounding: Sound | None = None  # "A", "B" or "X", as chosen last; None: none since the sound was stopped
         self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
-        self._record: AbxRecord | None = None
+        self._record: AbxRecord | None = None  # the result that is shown; None: none is
         self._places = places
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
@@ -129,6 +132,7 @@ class AbxDialog(QDialog):
     # Sound
 
     def _ask_for_sound(self) -> None:
+        """Start to render model and truth at the present rate of the output."""
         self._rate_hz = self._output.rate_hz
         self._rendering = self._render(self._rate_hz)
 
@@ -149,6 +153,7 @@ class AbxDialog(QDialog):
         self._show_state()
 
     def _audition(self, sound: Sound, again: bool = False) -> None:
+        """Play A, B or X, from the start or at the playhead; `again`: from the start. Nothing without stimuli."""
         if self._pair is None:
             return
         identity: Identity = "A" if sound == "A" else "B"
@@ -169,6 +174,7 @@ class AbxDialog(QDialog):
     # The test
 
     def _start(self) -> None:
+        """Begin a test, if nothing is in its way, and note device, volume and way of switching."""
         status = self._output.status()
         if self._obstacle(status) or status.device is None:
             return
@@ -185,6 +191,7 @@ class AbxDialog(QDialog):
         self._trial.show_trial(len(self._run.trials) + 1, self._run.planned)
 
     def _answer(self, answer: Identity) -> None:
+        """Take the answer, "A" or "B", if X was heard; then begin the next trial, or end the test."""
         if self._run is None or not self._run.x_heard:
             return
         self._run = self._run.answered(answer)
@@ -223,6 +230,7 @@ class AbxDialog(QDialog):
         self._save(self._places.folder("test", default_folder()))
 
     def _save(self, folder: Path) -> None:
+        """Save the result in a folder, and show where; or why not, so that another folder can be chosen."""
         assert self._record is not None
         try:
             path = save_record(folder, self._record)
@@ -256,6 +264,7 @@ class AbxDialog(QDialog):
         self._setup.show_state(self._obstacle(self._output.status()), advice)
 
     def _look_at_device(self) -> None:
+        """End a test whose device has changed; without a test, render or prepare the sound again where it must be."""
         status = self._output.status()
         if self._run is None or self._through is None:
             if self._rate_hz != self._output.rate_hz:

@@ -128,7 +128,7 @@ class TrialPage(QWidget):
         last = filled(QHBoxLayout(), None, self.stop)
         parts = self._number, self._bar, None, sounds, self._hint, answers, None, keys, last
         filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
-        self._acts: dict[int, Callable[[], object]] = {
+        self._acts: dict[int, Callable[[], object]] = {  # Qt's key -> what it does
             **{getattr(Qt.Key, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
             **dict.fromkeys((Qt.Key.Key_1, Qt.Key.Key_Left), self._answers["A"].click),  # nothing while disabled
             **dict.fromkeys((Qt.Key.Key_2, Qt.Key.Key_Right), self._answers["B"].click),
@@ -185,6 +185,7 @@ class ResultPage(QWidget):
         filled(QVBoxLayout(self), *parts, spacing=14, margins=NO_MARGINS)
 
     def show_record(self, record: AbxRecord) -> None:
+        """Show the score, the mark of each trial, and the p-value; of an incomplete test its number of answers."""
         answered = len(record.trials)
         self._score.setText(f"{record.correct} of {answered} right")
         self._marks.setText(" ".join("●" if trial.correct else "○" for trial in record.trials))

@@ -46,7 +46,10 @@ ADVICE = (
 
 
 class AudioDialog(QDialog):
-    """Gestures emit signals; `show_…` shows what became of them."""
+    """Gestures emit signals; `show_…` shows what became of them.
+
+    A gap is a dropout: a silence while a string should have sounded.
+    """
 
     choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
     rescan_asked = Signal()
@@ -74,8 +77,8 @@ class AudioDialog(QDialog):
         self._gaps = Label("0", minimumWidth=40)
         tip = "Processor time of the sound as a share of the time it plays: near 100 % there are dropouts"
         self._load = Label("0 %", toolTip=tip)
-        self._latest: Gap | None = None
-        self._zero: Gap | None = None  # the user's: gaps up to this one are not counted
+        self._latest: Gap | None = None  # the last one reported; None: none was
+        self._zero: Gap | None = None  # the last one as the user reset the count: up to it none is counted
         self._lay_out()
 
     @property

@@ -41,6 +41,8 @@ CONTINUE, CANCEL = "Continue", "Cancel export"
 class ExportDialog(WorkDialog):
     """The dialog of exports. It follows what the window plays (`show_subjects`) until an export begins.
 
+    A subject is what one kind of export would write, such as the last note. An offer is what the button would do.
+
     Attributes:
         save: the button that starts.
     """
@@ -51,8 +53,8 @@ class ExportDialog(WorkDialog):
     def __init__(self, remembered: Remembered, places: FilePlaces, parent: QWidget | None = None) -> None:
         export, sampled = remembered
         super().__init__("Export", 680, "export", EXPECTED, parent)
-        self._job: ExportJob | None = None  # the latest
-        self._subjects: Mapping[Kind, Any] = {}
+        self._job: ExportJob | None = None  # the latest, under way or ended
+        self._subjects: Mapping[Kind, Any] = {}  # by kind; None or left out: there is nothing to export
         self._places = places
         self.wav = WavForm(export)
         self.note, self.performance = NotePage(export, self.wav, places), PerformancePage(self.wav, places)
@@ -63,7 +65,7 @@ class ExportDialog(WorkDialog):
         self.tabs = QTabBar(drawBase=False, expanding=False)
         self.tabs.setAccessibleName("What to export")
         self.tabs.setToolTip("A note, what was recorded, or the instrument for samplers or as a plug-in")
-        self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)  # runs from each change of a choice
         self._settled.timeout.connect(self._show_offer)
         self._lay_out()
         for page in self.pages.values():
@@ -81,7 +83,7 @@ class ExportDialog(WorkDialog):
         self.save = push_button("Export", tip, kind="primary", pressed=self._start, autoDefault=True)
         self.close_button = push_button("Close", "Close (Escape)", pressed=self._close_or_cancel)
         buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
-        self._choosers = (self.tabs, *self.pages.values(), self.wav)
+        self._choosers = (self.tabs, *self.pages.values(), self.wav)  # disabled while an export is under way
         filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons, spacing=12)
         self.show_folder.hide()
 
@@ -121,6 +123,7 @@ class ExportDialog(WorkDialog):
             self._settled.start()
 
     def _turn_page(self) -> None:
+        """Show the page of the chosen tab alone, the form for sound files where it belongs to it, and the offer."""
         for page in self.pages.values():
             page.setVisible(page is self.page)
         self.wav.setVisible(self.page.writes_wav)
@@ -130,7 +133,7 @@ class ExportDialog(WorkDialog):
         self.adjustSize()
 
     def _show_offer(self) -> None:
-        """Show what would be written. Nothing is, until it begins."""
+        """Show what would be written, or why nothing can be, with the button disabled. Write nothing."""
         self._settled.stop()
         if self.job is not None:
             return
@@ -150,6 +153,7 @@ class ExportDialog(WorkDialog):
     # Work
 
     def _start(self) -> None:
+        """Begin the export that is offered; not where only now the button came to say "Replace"."""
         words = self.save.text()
         self._show_offer()  # of choices that have not settled
         if not self.save.isEnabled() or (self.save.text() == REPLACE != words):
@@ -184,6 +188,7 @@ class ExportDialog(WorkDialog):
         self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
+        """Show the result in words, and let another export be chosen, of what is played by now."""
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)

@@ -111,6 +111,7 @@ class WavForm(Form):
 
     @property
     def ending(self) -> str:
+        """The ending of the chosen format, as ".wav"."""
         return f".{self['format'].currentData().split()[0]}"
 
     def follow(self, file: FilePicker) -> None:
@@ -131,7 +132,7 @@ class ExportPage(Form):
         missing: why there is nothing to export.
         writes_wav: whether the form for sound files belongs to it.
         subject: what the window plays of this kind; None: nothing.
-        what, file: its words, and where it is written.
+        what, file: the words of the subject, and where it is written.
     """
 
     title = missing = ""
@@ -211,6 +212,7 @@ class NotePage(ExportPage):
         wav.changed.connect(self._show)
 
     def show_subject(self, subject: HeardNote | None) -> None:
+        """Follow the note that is heard; where another source is heard, choose it, and the difference's gain."""
         before = self.subject
         if subject is not None and (before is None or before.source != subject.source):
             box = self["source"]
@@ -235,6 +237,7 @@ class NotePage(ExportPage):
         return "Replace" if there else "Export", RECIPE_NOTE
 
     def _show(self) -> None:
+        """Show the controls that the choices need, the note's words, and the names of its files."""
         decays = self["until_decayed"].currentData()
         for field, visible in (("decay_db", decays), ("longest_s", decays), ("seconds", not decays)):
             self[field].setVisible(visible)
@@ -275,6 +278,7 @@ class PerformancePage(ExportPage):
             changed.connect(self._show)
 
     def _show(self) -> None:
+        """Show what was played, and suggest a file of its name."""
         if (subject := self.subject) is not None:
             played = subject.played
             notes = number_of(sum(isinstance(timed_event.event, NoteOn) for timed_event in played.events), "note")
@@ -348,7 +352,7 @@ class SamplerPage(ExportPage):
 
     def __init__(self, choices: SampledChoices, places: FilePlaces) -> None:
         super().__init__(choices, places, "sampler")
-        self._chosen_keys = choices.keys
+        self._chosen_keys = choices.keys  # lowest and highest, as remembered; None: all of the instrument
         self.size_text = label(selectable=True)
         self.size_text.setMinimumHeight(36)  # of two lines
         self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
@@ -372,7 +376,7 @@ class SamplerPage(ExportPage):
             box.valueChanged.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
-        """Show another instrument, or the same that was turned: chosen keys stay as far as it has them."""
+        """Show another instrument, or the same with other values; chosen keys stay if it has all of them."""
         keys = self.keys()
         super().show_subject(subject)
         if subject is None:
@@ -399,6 +403,7 @@ class SamplerPage(ExportPage):
         return SampledChoices(keys=self.keys(), **self.values())
 
     def job(self) -> SampledExport:
+        """The export of the chosen keys and layers. Raises ValueError: no instrument, or keys the wrong way round."""
         instrument, choices = self.offered.instrument, self.choices()
         if self.lowest.value() > self.highest.value():
             raise ValueError("keys: the lowest is above the highest; exchange them")
@@ -416,6 +421,7 @@ class SamplerPage(ExportPage):
         return SampledExport(plan, self.file.path, self.offered.preset.path)
 
     def offer(self) -> tuple[str, str]:
+        """The button's text; also show count, size and pitch error of the samples, and the free room if short."""
         self.size_text.setText("")
         job = self.job()
         plan = job.plan
@@ -473,6 +479,7 @@ class PluginPage(ExportPage):
         return ("Replace", f"{replaces} {PLUGIN_NOTE}") if replaces else ("Export", PLUGIN_NOTE)
 
     def _show(self) -> None:
+        """Show instrument and preset, and suggest a file: for this system, where its plug-ins are installed."""
         form, system = self["form"].currentData(), self["system"].currentData()
         self.file.suffix = f".{form}"
         if (subject := self.subject) is not None:

@@ -43,6 +43,9 @@ HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
 class LearnDialog(WorkDialog):
     """A dialog that writes nothing before "Keep and play".
 
+    The file is examined: is it one note of a string? The user chooses string or body, an impulse response that
+    instruments are played through. A string is learned; the second page compares it with the recording.
+
     Errors are stated without anything copied from the recording.
     """
 
@@ -58,9 +61,9 @@ class LearnDialog(WorkDialog):
     def __init__(self, file: Path, output: Sound, parent: QWidget | None = None) -> None:
         super().__init__(file.name, 620, "learn", EXPECTED, parent)
         self._file, self._output = file, output
-        self._learned: Learned | None = None
-        self._pair: Pair | None = None
-        self._against: Reasons | None = None  # None: not examined yet
+        self._learned: Learned | None = None  # the string, not kept yet; None: nothing was learned
+        self._pair: Pair | None = None  # plays recording and learned note; None until it is learned
+        self._against: Reasons | None = None  # against the file as a note of a string; None: not examined yet
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
@@ -107,6 +110,7 @@ class LearnDialog(WorkDialog):
     # String or body
 
     def _examine(self) -> None:
+        """Find in the background the reasons against the file as one note of a string."""
         self.state.setText("Is this one note of a string? …")
         self.start.setEnabled(False)
 
@@ -123,6 +127,7 @@ class LearnDialog(WorkDialog):
         self._show_choice()
 
     def _show_choice(self) -> None:
+        """Show what will be done with the file, string or body, and the reasons against it as a string."""
         if self.background.busy:
             return
         self._form.setEnabled(self.string.isChecked())
@@ -139,6 +144,7 @@ class LearnDialog(WorkDialog):
         self.start.setEnabled(self.body.isChecked() or self.string.isChecked())
 
     def _continue(self) -> None:
+        """Keep what was learned; before that, use the file as a body, or learn its string."""
         if self._learned is not None:
             self._keep()
         elif self.body.isChecked():
@@ -150,6 +156,7 @@ class LearnDialog(WorkDialog):
     # Learning
 
     def _learn(self) -> None:
+        """Learn the string in the background; a length or a diameter of 0 is left to be assumed."""
         choices = {
             "kind": self.kind.currentData(),
             "length_m": self.length_m.value() or None,
@@ -171,6 +178,7 @@ class LearnDialog(WorkDialog):
         return f"Learning the string.{left and f' {left.capitalize()}.'}"
 
     def _show_learned(self, result: tuple[Any, Any]) -> None:
+        """Show the second page: `result` is what was learned, and the sounds of recording and learned note."""
         from training.recording.table import as_text
 
         self._learned, sounds = result
@@ -200,6 +208,7 @@ class LearnDialog(WorkDialog):
     # The end
 
     def _keep(self) -> None:
+        """Write preset and instrument in the background, then close."""
         learned = self._learned
         name = self.name.text()
         kind = self.kind.currentData()
@@ -222,6 +231,7 @@ class LearnDialog(WorkDialog):
         self.accept()
 
     def show_failure(self, message: str) -> None:
+        """Show why it failed; where the examination did, the file can only be a body."""
         from app.player.learned import Reasons
 
         if self._against is None:  # not even examined: it can only be a body

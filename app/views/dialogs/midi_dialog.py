@@ -37,7 +37,10 @@ OF_THE_INSTRUMENT = "It belongs to the instrument and is saved with it"
 
 
 class MidiDialog(QDialog):
-    """Gestures emit signals; `show_…` shows what became of them."""
+    """Gestures emit signals; `show_…` shows what became of them.
+
+    To learn is to assign a MIDI controller to a field, a knob of instrument or window: the next one that is moved.
+    """
 
     port_chosen = Signal(str)  # "": none
     notes_chosen = Signal(str)
@@ -54,7 +57,7 @@ class MidiDialog(QDialog):
         tip = "Velocity always sets how hard the string is plucked"
         self._notes = combo_box("MIDI notes control", NOTE_MODES, tip=tip, picked=self.notes_chosen.emit)
         turnable = [(_capital(knob.name), knob.id) for knob in modulated_by("wheel")]
-        self._of_instrument: dict[str, QComboBox] = {}
+        self._of_instrument: dict[str, QComboBox] = {}  # field of the instrument -> its box
         for field, name, entries, tip in (
             ("mode", "Channels", CHANNELS, CHANNELS_TIP),
             ("bend_semitones", "Bend range", map(_bend, BENDS), OF_INSTRUMENTS["bend_semitones"].tip),
@@ -64,7 +67,7 @@ class MidiDialog(QDialog):
             picked = partial(self.instrument_turned.emit, field)
             self._of_instrument[field] = combo_box(name, entries, tip=f"{tip}.\n{OF_THE_INSTRUMENT}", picked=picked)
         self._problem = label("warning", selectable=True)
-        self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
+        self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}  # field -> its controller, Learn, Forget
         form = Form()
         for box in (self._inputs, self._notes, *self._of_instrument.values()):
             form.row("Input" if box is self._inputs else box.accessibleName(), box)
@@ -78,6 +81,7 @@ class MidiDialog(QDialog):
         self.show_inputs([], "", "")
 
     def _build_rows(self) -> QGridLayout:
+        """Build a row for each field of LEARNABLE: its name, its controller, and buttons to learn or forget it."""
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)

@@ -35,6 +35,7 @@ COLUMNS = (
 
 
 def preset_browser(parent: QWidget | None = None) -> Browser:
+    """The browser of presets, without rows yet; arrows load a preset and do not pluck it."""
     return Browser(
         "presets",
         "title, model, string, rate, audible errors",
@@ -87,7 +88,7 @@ def preset_card(entry: PresetEntry) -> str:
 
 
 def preset_summary(entry: PresetEntry) -> list[str]:
-    """The same in one line, the longest wording first; the error is in all of them."""
+    """A preset's facts in one line, in wordings for less and less room; the error is in all of them."""
     info = entry.info
     model, rate = model_word(info.model), rate_word(info.rate_hz)
     string = "tension-modulated string" if info.tension_modulated else "linear string"
@@ -106,6 +107,7 @@ def preset_summary(entry: PresetEntry) -> list[str]:
 
 
 def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
+    """The rows of a card, (name, words) each; facts that the preset does not state are left out."""
     info = entry.info
     meaning = model_meaning(info.model)
     facts = [

@@ -41,8 +41,8 @@ class WorkDialog(QDialog):
         self.bar = QProgressBar(maximum=1000)
         self.bar.hide()
         self.bar.setAccessibleName("Progress")
-        self._began_s = 0.0
-        self._then: Callable[[Any], None] = lambda result: None
+        self._began_s = 0.0  # of the work, on the monotonic clock
+        self._then: Callable[[Any], None] = lambda result: None  # takes the result of the work
         self.background = Background(name, self, expected=expected)
         self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(lambda result: self._then(result))
@@ -50,7 +50,10 @@ class WorkDialog(QDialog):
         self.background.cancelled.connect(self.show_cancelled)
 
     def begin(self, work: Work, then: Callable[[Any], None], bar: bool = True) -> None:
-        """Do the work, then call `then` with its result, or one of the two below."""
+        """Do the work in the background, then call `then` with its result, or `show_failure` or `show_cancelled`.
+
+        `bar`: show the progress bar.
+        """
         self._then, self._began_s = then, time.monotonic()
         self.bar.setValue(0)
         self.bar.setVisible(bar)
@@ -74,6 +77,7 @@ class WorkDialog(QDialog):
         self.state.setText(self.progress_words(text, left and f"about {left}"))
 
     def event(self, event: QEvent) -> bool:
+        """Make the dialog as high as its texts need at their width, at most as high as the screen."""
         handled = super().event(event)
         if event.type() in CHANGES and (layout := self.layout()) is not None:
             needed = min(layout.totalHeightForWidth(self.width()), self.screen().availableSize().height())

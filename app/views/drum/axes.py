@@ -12,15 +12,15 @@ from PySide6.QtGui import QPainterPath
 from app.views.stage import MARGIN_TOP, MARGIN_X, StageAxes
 
 Shape = Literal["circle", "rectangle", "bar"]
-Place = tuple[float, float]
+Place = tuple[float, float]  # x, y from the centre in half-lengths: -1 … 1, y upwards
 GAP = 36  # pixels between two pictures
-RIM = 0.98  # of half a drum: farther out it is not struck, for there nothing moves
-FLATTEST = 0.12  # height of a picture, of its width: a bar is narrower
+RIM = 0.98  # half-lengths from the centre: farther out it is not struck, for there nothing moves
+FLATTEST = 0.12  # least height of a picture, as a share of its width: bars are drawn wider than they are
 
 
 @dataclass(frozen=True)
 class HeadAxes(StageAxes):
-    """Pictures of one drum, side by side.
+    """Pictures of one drum, side by side: one for each source, such as the model. `head` is its number from the left.
 
     Places are given from the centre, in half-lengths, and y points up. Listening points are 0 … 1 from left to right,
     beneath the first picture.
@@ -35,7 +35,7 @@ class HeadAxes(StageAxes):
     heads: int = 1
 
     def rect(self, head: int) -> QRectF:
-        """The place of a picture."""
+        """The box of a picture, in pixels of the widget, with the ratio of the drum's sides."""
         count = max(1, self.heads)
         room_x = (self.width - 2 * MARGIN_X - (count - 1) * GAP) / count
         room_y = self.bottom - MARGIN_TOP - 8
@@ -46,7 +46,7 @@ class HeadAxes(StageAxes):
         return QRectF(middle_x - across / 2, middle_y - across * ratio / 2, across, across * ratio)
 
     def outline(self, head: int) -> QPainterPath:
-        """The edge of the drum."""
+        """The edge of the drum in a picture, in pixels."""
         path = QPainterPath()
         if self.shape == "circle":
             path.addEllipse(self.rect(head))
@@ -55,6 +55,7 @@ class HeadAxes(StageAxes):
         return path
 
     def at(self, head: int, place: Place) -> QPointF:
+        """The point of a place in a picture, in pixels."""
         area = self.rect(head)
         x, y = place
         return QPointF(area.center().x() + x * area.width() / 2, area.center().y() - y * area.height() / 2)
@@ -70,7 +71,7 @@ class HeadAxes(StageAxes):
         return None
 
     def holds(self, place: Place) -> bool:
-        """Return True if a drum can be struck at a place."""
+        """Return True if a drum can be struck at a place: within RIM of its centre, in half-lengths."""
         x, y = place
         away = math.hypot(x, y) if self.shape == "circle" else max(abs(x), abs(y))
         return away <= RIM

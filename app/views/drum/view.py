@@ -40,11 +40,14 @@ _Control = Qt.KeyboardModifier.ControlModifier
 
 
 class DrumView(StageView):
-    """Places are given from the centre in half-lengths. The only part is "drum", where it can be struck."""
+    """A picture of the drum for each source that the slots A and B hold, side by side.
+
+    Places are given from the centre in half-lengths. The only part is "drum", where it can be struck.
+    """
 
     struck = Signal(float, float, bool)  # place, and whether as hard as it goes
-    place_moved = Signal(float, float)
-    place_reset = Signal()
+    place_moved = Signal(float, float)  # by an arrow key, to this place
+    place_reset = Signal()  # by Delete
 
     NAME: ClassVar = "Drum"
     ELSEWHERE: ClassVar = "another side"
@@ -54,12 +57,12 @@ class DrumView(StageView):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._name = ""  # of the drum
+        self._name = ""  # of the drum, in words
         self._shape: Shape = "circle"
         self._sides = (1.0, 1.0)  # length and width in m
         self._place: Place = (0.0, 0.0)  # of the strike
-        self._frame: HeadFrame | None = None
-        self._scales_m: dict[str, float] = {}  # the displacement of the full colour, by source
+        self._frame: HeadFrame | None = None  # the moment that is drawn; None: at rest
+        self._scales_m: dict[str, float] = {}  # source -> displacement of the full colour; kept from frame to frame
 
     # What is shown
 
@@ -80,6 +83,7 @@ class DrumView(StageView):
         self.update()
 
     def _describe(self) -> None:
+        """Describe to screen readers the drum, the place of the strike, and the angles of listening."""
         angles = " and ".join(angle_words(point) for point in self._listening.values())
         where = f", heard from {angles}" if angles else ""
         self.setAccessibleDescription(f"{self._name}, struck at {place_words(self._place)}{where}")
@@ -117,6 +121,7 @@ class DrumView(StageView):
             self.struck.emit(*place, bool(event.modifiers() & _Shift))
 
     def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
+        """Move the place of the strike by an arrow, with Shift finely; reset it by Delete."""
         if (across or up) and not modifiers & _Control:
             step = FINE_STEP if modifiers & _Shift else STEP
             place = self._place[0] + step * across, self._place[1] + step * up
@@ -134,6 +139,7 @@ class DrumView(StageView):
     # Painting
 
     def _paint_picture(self, painter: QPainter) -> None:
+        """Paint a drum for each source: its motion with the scale, or the drum at rest, its edge, and the strike."""
         axes = self.axes
         pictures_m = {} if self._frame is None else self._frame.pictures_m
         for head, source in enumerate(self._sources):

@@ -45,11 +45,11 @@ from app.views.instrument.takes_menu import TakesMenu
 from engine.parameters import OF_INSTRUMENTS
 from engine.plain_text import one_line
 
-BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
-ROOMY_MACROS = 6  # more of them are drawn narrow
-NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
+BODY_LETTERS = 8  # width of the box of bodies, in letters X
+ROOMY_MACROS = 6  # with more, knobs are narrow; with six or more, a tight bar has no number of voices
+NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: least width of the name; with more than ROOMY_MACROS
 LONGEST_SCALE_NAME = 120  # characters
-SCALE_LETTERS, TIGHT_LETTERS = 18, 8  # of its name on the button
+SCALE_LETTERS, TIGHT_LETTERS = 18, 8  # most of the scale's name on its button; in a tight bar
 EQUAL_STEPS = "Twelve equal steps"
 INSTANT = QToolButton.ToolButtonPopupMode.InstantPopup
 SAID_MS = 2_500  # a text that says why the octave stops or moves
@@ -61,7 +61,11 @@ MIXES = (*AMP, "body.mix", "room.mix", "level_db")
 
 
 class InstrumentBar(ChoiceBar):
-    """Gestures emit signals; setters show what became of them."""
+    """Gestures emit signals; setters show what became of them.
+
+    A macro is a knob of the instrument's own, which turns one or more of its fields. An instrument is tuned where it
+    has a Scala scale or a keyboard mapping.
+    """
 
     save_asked = Signal()
     rename_asked = Signal()
@@ -78,9 +82,10 @@ class InstrumentBar(ChoiceBar):
     def __init__(self) -> None:
         super().__init__("instrument", "No instrument")
         self.setAccessibleName("Instrument")
-        self._macros: tuple[Macro, ...] = ()
+        self._macros: tuple[Macro, ...] = ()  # of the instrument that is shown
+        # compact: little width; tight: even less, which is compact too; tuned: by a Scala scale or keyboard mapping
         self._compact = self._tight = self._tuned = False
-        self._shows_macros = True
+        self._shows_macros = True  # False: all knobs of the string are shown in their place
         self.knobs = {field: Knob(OF_INSTRUMENTS[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(partial(self.changed.emit, field))
@@ -88,7 +93,7 @@ class InstrumentBar(ChoiceBar):
         for number, knob in enumerate(self.macros):
             knob.value_asked.connect(partial(self.macro_turned.emit, number))
             knob.hide()
-        self._before_macros = vertical_rule()
+        self._before_macros = vertical_rule()  # left of the macros, shown with them
         self._before_macros.hide()
         macros = filled(QHBoxLayout(), *self.macros, spacing=0)
         row = filled(QHBoxLayout(self), spacing=8, margins=NO_MARGINS)
@@ -96,6 +101,7 @@ class InstrumentBar(ChoiceBar):
         row.setStretch(0, 1)
 
     def _build_words(self) -> QVBoxLayout:
+        """Build the row of name, category and buttons, above the row of the state."""
         self.name.setMaximumWidth(320)
         self.category = Label(objectName="badge", toolTip="The instrument's category", visible=False)
         tip = "Save the instrument; a factory one under a name of your own"
@@ -117,6 +123,7 @@ class InstrumentBar(ChoiceBar):
         return filled(QVBoxLayout(), above, self._build_state(), spacing=4)
 
     def _build_state(self) -> QHBoxLayout:
+        """Build the row of note, scale, octave and velocity, voices, and recording."""
         self.note = words_label()
         self._build_scales()
         tip = "The computer's keys play an octave lower (Z)"
@@ -165,6 +172,7 @@ class InstrumentBar(ChoiceBar):
         self._show_scale(TuningChoice())
 
     def _build_sound(self) -> QHBoxLayout:
+        """Build the box of bodies and the knobs of MIXES: amplifier, mixes of body and room, level."""
         tip = "The body of the instrument, which colours the sound of the strings"
         self.body = combo_box("Body", [("No body", "")], tip=tip, picked=self.body_chosen.emit)
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
@@ -177,15 +185,15 @@ class InstrumentBar(ChoiceBar):
     # What is shown
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """Set the bar for a window with little room; `tight`: with very little."""
+        """Set the bar for a panel with little width; `tight`: with even less, where some buttons are in `more`."""
         self._compact, self._tight = compact, tight
         self._show_scale(self._tuning)
         self._share_width()
 
     def _share_width(self) -> None:
-        """Show what there is room for; `more` has the rest.
+        """Show the buttons and words that fit; the menu of `more` has the others.
 
-        Where there is very little, a tuning or a sixth macro takes the place of the number of voices.
+        In a tight bar the number of voices gives way to the scale of a tuned instrument, or to six or more macros.
         """
         many = len(self._macros) > ROOMY_MACROS
         close = self._compact or many
@@ -241,6 +249,7 @@ class InstrumentBar(ChoiceBar):
         self._share_knobs()
 
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
+        """Show the values of macros on their knobs; names and tooltips only where these differ from before."""
         for number, (knob, macro) in enumerate(zip(self.macros, macros, strict=False)):
             if number >= len(self._macros) or _named(self._macros[number]) != _named(macro):
                 knob.set_name(macro.name, f"{macro.name}: changes {', '.join(_named(macro)[1])}")
@@ -250,9 +259,9 @@ class InstrumentBar(ChoiceBar):
         self._share_width()
 
     def _share_knobs(self) -> None:
-        """Give every value one knob: a mix that is a macro's only target is that macro's while macros are shown.
+        """Show one knob for every value: of a mix that is a macro's only target, the macro's, while macros are shown.
 
-        The amplifier's stand with the string's.
+        The amplifier's knobs are hidden then; they are shown with all knobs of the string.
         """
         for number, knob in enumerate(self.macros):
             knob.setVisible(self._shows_macros and number < len(self._macros))
@@ -278,6 +287,7 @@ class InstrumentBar(ChoiceBar):
         show_kind(self.scale, "solo" if self._tuned else "small")
 
     def _show_body(self, name: str) -> None:
+        """Select a body by its name, "" for none; one that is not listed, as its file is missing, is added."""
         row = self.body.findData(name)
         if row < 0:  # its file is missing
             self.body.addItem(name, name)
@@ -290,7 +300,7 @@ class InstrumentBar(ChoiceBar):
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int, lowest: int, highest: int) -> None:
-        """Show the octave of the lowest of the computer's keys, of those at which a key sounds."""
+        """Show the octave of the lowest C on the computer's keys; `lowest`, `highest`: those where a key sounds."""
         self.octave.setText(f"octave C{octave}")
         self._lower.setEnabled(octave > lowest)
         self._higher.setEnabled(octave < highest)
@@ -304,6 +314,7 @@ class InstrumentBar(ChoiceBar):
         self.velocity.setText(f"velocity {velocity}")
 
     def show_pitches(self, pitches: bool) -> None:
+        """Show octave and velocity of the computer's keys; hide them while these keys play no pitches."""
         for widget in (self._lower, self.octave, self._higher, self.velocity):
             widget.setVisible(pitches)
 
@@ -340,4 +351,5 @@ def _scale_name(scale: str) -> str:
 
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
+    """The name of a macro, and those of the parameters that it turns."""
     return macro.name, [OF_INSTRUMENTS[target.field].name for target in macro.targets]

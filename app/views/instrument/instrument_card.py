@@ -15,6 +15,7 @@ MODES = {"guitar": "one MIDI channel per string", "mpe": "MPE"}
 
 
 def instrument_browser(parent: QWidget | None = None) -> Browser:
+    """The browser of instruments, without rows yet; an instrument that arrows load is played too."""
     return Browser(
         "instruments",
         "name, category, description, author",
@@ -46,7 +47,7 @@ def instrument_row(entry: InstrumentEntry) -> BrowserRow:
 
 
 def instrument_card(entry: InstrumentEntry) -> str:
-    """Name, description and facts."""
+    """The card of an instrument as rich text: name, description, and facts such as strings and range of keys."""
     instrument, faint = entry.instrument, QApplication.palette().placeholderText().color().name()
     low, high = instrument.range
     strings = "one string, shortened for every key"

@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 MOST_ROWS, MOST_FRETS = 8, 24
 _NAMES_WIDTH = 40  # open strings, left of the nut
 _FOOT = 15  # numbers of frets, names of octaves
-SHORTEST = 0.14  # of the fan's height
+SHORTEST = 0.14  # least length of a string, as a share of the fan's height
 THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
 LARGEST_DOT = 14.0
-PLACES = 8  # of a fret that a sliding string can be distinguished at
+PLACES = 8  # steps from one fret to the next, at which a sliding string is drawn
 _ARROWS = {  # frets along the string, strings
     Qt.Key.Key_Right: (1, 0),
     Qt.Key.Key_Left: (-1, 0),
     Qt.Key.Key_Up: (0, 1),
     Qt.Key.Key_Down: (0, -1),
 }
-SWING = 0.42  # of a string's row, at full level
+SWING = 0.42  # how far a string at full level is drawn to either side, of its row's height
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
@@ -59,19 +59,22 @@ class Neck(Playable):
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked. So chords can be strummed with one mouse.
+
+    Here strings count from the lowest, 0, as rows from below; `Spot.string` counts from the highest. A level is a
+    loudness.
     """
 
     fingered = Signal(bool)  # whether there are fingers
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Strings", TIP, parent)
-        self._strings: tuple[tuple[str, int], ...] = ()
-        self._stops: dict[tuple[int, float], int] = {}  # string, fret -> level of 0 … LEVEL_STEPS
+        self._strings: tuple[tuple[str, int], ...] = ()  # name and open MIDI key of each, from the lowest
+        self._stops: dict[tuple[int, float], int] = {}  # string, fret where it sounds -> level, 1 … LEVEL_STEPS
         self.fingers: dict[int, int] = {}  # string, counted from the lowest -> the fret where a finger stops it
         self._set_cursor(Spot(60))
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
-        """Show strings of a neck where they are stopped, which lies between two frets while they slide."""
+        """Light the strings of a neck at the frets where the notes stop them; a slide lies between two frets."""
         strings: dict[tuple[int, float], int] = {}
         for note in notes if self.in_rows else ():
             string = len(self._strings) - 1 - note.string
@@ -87,7 +90,7 @@ class Neck(Playable):
         self._stops = strings
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
-        """Name and open key of each; none or one that is fretted for every key is shown as a fan."""
+        """Set the strings, (name, open MIDI key) each; a neck for 2 … MOST_ROWS of them, otherwise a fan."""
         ordered = tuple(sorted(strings, key=lambda string: string[1]))
         if ordered != self._strings:
             self.release_all()
@@ -150,6 +153,7 @@ class Neck(Playable):
         return QRectF((key - self._low) * width, 0, width, self.height())
 
     def key_at(self, at: QPointF) -> int | None:
+        """The key at a point, of a fan's column or a neck's fret; None outside, as behind the last fret."""
         if not (0 <= at.x() < self.width() and 0 <= at.y() < self.height()):
             return None
         if not self.in_rows:
@@ -205,7 +209,7 @@ class Neck(Playable):
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
-        """The spots between two points; on a neck with the strings between them. The mouse is seen at few places."""
+        """The spots from one place of the mouse to the next; on a neck also of the strings that lie between them."""
         met = super().spots_between(before, at)
         if not self.in_rows:
             return met
@@ -249,6 +253,7 @@ class Neck(Playable):
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Put or lift a finger at the cursor by Shift+Enter; lift all by Delete; other keys as of `Playable`."""
         shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
         if self.in_rows and shift and event.key() in ENTER_KEYS:
             if not event.isAutoRepeat():
@@ -261,6 +266,7 @@ class Neck(Playable):
     # How it looks
 
     def paint_rest(self, painter: QPainter) -> None:
+        """Paint the board with its strings; or a fan, where keys that have an open string are brighter."""
         if self.in_rows:
             self._paint_board(painter)
             for number in range(len(self._strings)):
@@ -275,6 +281,7 @@ class Neck(Playable):
                 write(painter, place, note_name(key), theme.FAINT, theme.small_font(9))
 
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
+        """Paint fingers and stops of a neck, or lit strings of a fan; above them the cursor."""
         if self.in_rows:
             self._paint_stops(painter)
         for key in () if self.in_rows else sorted(self.marked):
@@ -295,6 +302,7 @@ class Neck(Playable):
             painter.drawRoundedRect(place.adjusted(1, 1, -1, -1), 3, 3)
 
     def _paint_board(self, painter: QPainter) -> None:
+        """Paint the fingerboard: frets, inlays with the numbers of their frets below, and the nut."""
         bottom = self._bottom
         board = QRectF(self._nut, 1, self.fret_x(self.frets) - self._nut, bottom - 2)
         set_ink(painter, theme.LINE, fill=theme.RAISED)
@@ -307,7 +315,7 @@ class Neck(Playable):
                 continue
             set_ink(painter, fill=theme.blended(theme.FAINT, theme.RAISED, 0.6))
             rows = len(self._strings)
-            between = max(1, rows // 3) / rows  # two strings
+            between = max(1, rows // 3) / rows  # the edge to each of the two inlays of an octave, as a share
             for share in (between, 1 - between) if fret % 12 == 0 else (0.5,):
                 painter.drawEllipse(QPointF((x + before) / 2, share * bottom), 4.5, 4.5)
             number = QRectF(before - 10, bottom + 1, x - before + 20, theme.px(_FOOT) - 2)
@@ -316,6 +324,7 @@ class Neck(Playable):
         painter.drawLine(QPointF(self._nut, 2), QPointF(self._nut, bottom - 2))
 
     def _paint_string(self, painter: QPainter, number: int) -> None:
+        """Paint a string at rest, counted from the lowest, and its name left of the nut."""
         name, open_key = self._strings[number]
         row = self.cell(number, 0)
         room = self._nut - 10
@@ -362,6 +371,7 @@ class Neck(Playable):
         return min(LARGEST_DOT, self._bottom / len(self._strings) - 2)
 
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
+        """Paint the dot where a string is stopped; at a level above 0, up to 1, also how it sounds from there on."""
         size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
@@ -385,7 +395,7 @@ class Neck(Playable):
         painter.drawPath(swing)
 
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
-        """Paint a key's string in the fan; return its end."""
+        """Paint a key's string in the fan, `thicker` than at rest by so many pixels; return its lower end."""
         length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self._bottom - 8)
         x = self._column(key).center().x()
         thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)

@@ -39,8 +39,8 @@ HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or 
 NO_STRINGS = "Drums have no strings to show: keys strike them"
 FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
 LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
-COMPACT_BELOW_PX = 1320  # pixels: in a narrower window the bar is compact
-TIGHT = 900  # pixels: a narrower one has no button that renames
+COMPACT_BELOW_PX = 1320  # a narrower panel has a compact bar
+TIGHT = 900  # pixels: a narrower panel has a tight bar, with fewer buttons than a compact one
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
     "pitch": ("Keys play notes", "The computer's keys play the instrument, as a piano's two rows"),
@@ -83,7 +83,11 @@ _TECHNIQUES = (  # that keys are played with; their amounts have knobs
 
 
 class InstrumentPanel(QFrame):
-    """The panel of an instrument, whose parts are public: `bar`, `keys`, `neck`, `knobs`."""
+    """The panel of an instrument, whose parts are public: `bar`, `keys`, `neck`, `knobs`.
+
+    A surface is what is played with the mouse: "keys" or "neck". Unfolded, all knobs of the string are shown. In a
+    low window, one of little height, these then hide the surface.
+    """
 
     pressed = Signal(int, int, object)  # key, velocity, string as of `Playable`
     released = Signal(int, object)
@@ -101,7 +105,7 @@ class InstrumentPanel(QFrame):
         for surface in self._surfaces:
             surface.pressed.connect(self._press)
             surface.released.connect(self.released)
-        self._drums = False
+        self._drums = False  # the instrument has drums, whose surface is always the keys
         self.touch = Segments("Key while another is held", _TOUCHES)
         self.touch.chosen.connect(self._choose_touch)
         self.techniques = Segments("Technique", _TECHNIQUES, switches=True)
@@ -118,15 +122,16 @@ class InstrumentPanel(QFrame):
         self._build_plays()
         for button in (self._fold, self._lift, self.plays):
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._low = False
-        self._hinted = False
-        self._instrument_area = True
+        self._low = False  # the window has little height
+        self._hinted = False  # the hint was hidden, which is for good
+        self._instrument_area = True  # bar and knobs are shown, not the surface alone
         self._stack = QStackedWidget()
         self._hint = Label(HINTS["keys"], self._stack, objectName="hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._lay_out()
 
     def _lay_out(self) -> None:
+        """Lay out the bar above, a column of buttons at the left, and beside it the surfaces, one at a time."""
         for surface in self._surfaces:
             self._stack.addWidget(surface)
         self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -165,6 +170,7 @@ class InstrumentPanel(QFrame):
         return self._choice.key
 
     def show_surface(self, surface: str) -> None:
+        """Show "keys" or "neck", and its hint; of drums always the keys, while the choice is remembered."""
         self._choice.show_key(surface)
         shown_surface = "keys" if self._drums else surface
         self._stack.setCurrentWidget(self.keys if shown_surface == "keys" else self.neck)
@@ -205,6 +211,7 @@ class InstrumentPanel(QFrame):
             self._share_room()
 
     def _uncover_surface(self) -> None:
+        """Fold the knobs of the string in a low window, where they hide the surface that was clicked."""
         if self._low:
             self.set_unfolded(False)
 
@@ -213,9 +220,11 @@ class InstrumentPanel(QFrame):
         self._fit()
 
     def _fit(self) -> None:
+        """Set the bar compact or tight by the panel's width; both limits grow with the text."""
         self.bar.set_compact(self.width() < theme.px(COMPACT_BELOW_PX), self.width() < theme.px(TIGHT))
 
     def _share_room(self) -> None:
+        """Place the knobs of the string above the surface, or in a low window in its place; show what is unfolded."""
         self._grid.removeWidget(self._knobs_row)
         self._grid.addWidget(self._knobs_row, *((2, 1, 1, 1) if self._low else (1, 0, 1, 2)))
         self._grid.setContentsMargins(*((12, 4, 12, 6) if self._low else (12, 8, 12, 10)))
@@ -283,6 +292,7 @@ class InstrumentPanel(QFrame):
         self.pressed.emit(key, velocity, string)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Keep the hint in the middle as the surface changes its size, or the hint its style."""
         if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Show):
             self._place_hint()
         elif watched is self._hint and event.type() == QEvent.Type.StyleChange:

@@ -14,9 +14,9 @@ from app.views.instrument.playable import Playable, Spot
 from app.views.painting import set_ink, write
 
 BLACK_HEIGHT = 0.62  # of a white key's
-BLACK_WIDTH = 0.6
-FEWEST_KEYS = 48
-SMALLEST_LETTER, LARGEST_LETTER = 7, 11
+BLACK_WIDTH = 0.6  # of the distance of white keys
+FEWEST_KEYS = 48  # that are shown, with a string or without
+SMALLEST_LETTER, LARGEST_LETTER = 7, 11  # pixels
 TIP = (
     "Click or drag to play: softer at the top of a key, harder at the bottom.\n"
     "Right button or Shift: the key stays down. With the keyboard: arrows and Enter"
@@ -45,8 +45,8 @@ class PianoKeys(Playable):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("On-screen keyboard", TIP, parent)
-        self._letters: dict[int, str] = {}
-        self._first, self._last = shown_range(self._low, self._high)
+        self._letters: dict[int, str] = {}  # MIDI key -> what is printed on the computer's key that plays it
+        self._first, self._last = shown_range(self._low, self._high)  # MIDI keys that are shown
         self._set_cursor(Spot(60))
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
@@ -74,6 +74,7 @@ class PianoKeys(Playable):
         return min(max(round(0.9 * BLACK_WIDTH * self._pitch), SMALLEST_LETTER), theme.px(LARGEST_LETTER))
 
     def key_rect(self, key: int) -> QRectF:
+        """The box of a key in pixels, of a white one with what black ones cover; empty for one that is not shown."""
         if not self._first <= key <= self._last:
             return QRectF()
         left = self._white_keys_before(key) * self._pitch
@@ -83,6 +84,7 @@ class PianoKeys(Playable):
         return QRectF(left - width / 2, 0, width, BLACK_HEIGHT * self.height())
 
     def key_at(self, at: QPointF) -> int | None:
+        """The black key at a point, else the white one; None outside the keyboard."""
         if not (0 <= at.x() < self.width() and 0 <= at.y() < self.height()):
             return None
         white = int(at.x() / self._pitch)
@@ -104,6 +106,7 @@ class PianoKeys(Playable):
             self._paint_key(painter, key, QColor(_own(key)) if self.sounds(key) else _silent_colour(key))
 
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
+        """Paint marked keys, and the black ones that lie over marked white ones; latched keys have a dot."""
         marked = self.marked
         covering = {black for key in marked for black in (key - 1, key + 1) if is_black(black) and not is_black(key)}
         for key in sorted(marked | covering, key=is_black):
@@ -129,6 +132,7 @@ class PianoKeys(Playable):
         return theme.blended(theme.FAINT, key_colour, 0.45) if self.is_down(key) else QColor(key_colour)
 
     def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
+        """Paint a key in a colour, with the name of each C and the letter of the computer's key on it."""
         rect = self.key_rect(key)
         if is_black(key):
             set_ink(painter, theme.LINE, fill=filling)

@@ -50,8 +50,10 @@ class Playable(QWidget):
 
     Left button: plays while it is down; moved to other keys it plays these (glissando). Moved to other strings of a
     neck it strums: those that it has left ring until the button is up.
-    Right button, or Shift: the key stays down until it is clicked so again.
-    Arrows and Enter: choose a key and play it; with Ctrl, all strings of a neck.
+    Right button, or Shift: the key is latched (held): it stays down until it is clicked so again.
+    Arrows and Enter: choose a key, where the cursor is drawn, and play it; with Ctrl, all strings of a neck.
+
+    Keys are MIDI keys. A spot is down while mouse, latch or Enter press it here. Keys that sound need not be down.
     """
 
     pressed = Signal(int, int, object)  # key, velocity, string as in `Spot`
@@ -64,22 +66,22 @@ class Playable(QWidget):
         self.setToolTipDuration(TIP_MS)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._low, self._high = 28, 88
-        self._source = "model"
-        self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
-        self._down: Spot | None = None  # by the mouse
+        self._low, self._high = 28, 88  # the lowest and the highest MIDI key that have a string
+        self._source = "model"  # that is heard; it gives lit keys their colour
+        self._levels: dict[int, int] = {}  # MIDI key -> loudness, 1 … LEVEL_STEPS; silent keys are left out
+        self._down: Spot | None = None  # under the left button; None: it is up
         self._at = QPointF()  # of the mouse, while a key is down
         self._clicked = self._played = TYPED  # velocity of the click, which a strum keeps, and of the latest key
         self._strummed: list[Spot] = []  # on strings that the mouse has left
         self.legato = False  # a key that is pressed while another is held takes its note over
-        self._typed: list[Spot] = []  # by Enter
-        self._held: set[Spot] = set()
-        self.chosen = Spot(60)  # which Enter plays
+        self._typed: list[Spot] = []  # down while Enter is
+        self._held: set[Spot] = set()  # latched by the right button or Shift, until clicked so again
+        self.chosen = Spot(60)  # the cursor's, which Enter plays
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
         # the velocity of a click at the mouse, or of the one that sounds; "" where no key is
         self.figure, self._figure_at = "", QRectF()
         self.setMouseTracking(True)
-        self._rest = QPixmap()
+        self._rest = QPixmap()  # the picture of `paint_rest`; null: to be painted
         theme.changes.theme_changed.connect(self.rest_changed)
 
     def sizeHint(self) -> QSize:
@@ -166,7 +168,7 @@ class Playable(QWidget):
 
     @property
     def held(self) -> frozenset[int]:
-        """Keys that stay down by themselves."""
+        """The keys that are latched: they stay down until they are clicked so again."""
         return frozenset(spot.key for spot in self._held)
 
     def release_all(self) -> None:
@@ -184,11 +186,12 @@ class Playable(QWidget):
 
     @property
     def marked(self) -> frozenset[int]:
-        """Keys that do not look as at rest."""
+        """Keys that do not look as at rest: they sound, are down, or have the cursor."""
         cursor = {self.chosen.key} if self.shows_cursor else set()
         return frozenset(self._levels.keys() | cursor | {spot.key for spot in self.down})
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the kept picture of rest, the marks, and the velocity at the mouse."""
         ratio = self.devicePixelRatioF()
         if self._rest.isNull() or self._rest.devicePixelRatio() != ratio:
             self._rest = QPixmap(self.size() * ratio)
@@ -219,7 +222,7 @@ class Playable(QWidget):
 
     @property
     def down(self) -> frozenset[Spot]:
-        """The spots that are pressed here, or stay down by themselves."""
+        """The spots that are down: under the mouse, left by a strum, typed with Enter, or latched."""
         mouse = {self._down} if self._down is not None else set()
         return frozenset(mouse | self._held | {*self._typed, *self._strummed})
 
@@ -246,6 +249,7 @@ class Playable(QWidget):
             self.update(place.toAlignedRect())
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Play the spot there while the left button is down; right button or Shift latch it, or end that."""
         spot = self.spot_at(event.position())
         if spot is None or not self.sounds(spot.key) or self._down is not None:
             return
@@ -270,6 +274,7 @@ class Playable(QWidget):
         self.mousePressEvent(event)  # fast repeats are notes too
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Play the spots that a drag meets; with no button down, show the velocity that a click would have."""
         if self._down is None:
             key = self.key_at(event.position())
             velocity = self.velocity_at(key, event.position()) if key is not None and self.sounds(key) else None
@@ -283,6 +288,11 @@ class Playable(QWidget):
         self._show_velocity(self._at, self._played)
 
     def _move_to(self, spot: Spot, velocity: int) -> None:
+        """Move the mouse's press to another spot, with a velocity of 1 … 127.
+
+        Without legato, another string is strummed: the one before rings until the button is up. With legato, a key
+        of the same string is pressed before the one before is released, so that it takes the note over.
+        """
         before, self._down = self._down, spot
         assert before is not None
         for left in [other for other in self._strummed if other.string == spot.string]:
@@ -299,9 +309,9 @@ class Playable(QWidget):
             self._press(spot, velocity)
 
     def _release_left(self, spot: Spot) -> None:
-        """Release what the mouse has left. On a string that was given one release is enough, when no finger is left.
+        """Release a spot that the mouse has left, unless it is latched as well: that ends with the latch.
 
-        Where the key chooses the string, each stroke of the key has a release of its own.
+        Where the key chooses the string (None), every press has a release of its own, latched or not.
         """
         if spot not in self._held or spot.string is None:
             self._release(spot)
@@ -321,6 +331,7 @@ class Playable(QWidget):
         return keeps_keys(event, *ENTER_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move the cursor by an arrow; play its spot by Enter, with Ctrl all strings; pass other keys on."""
         key = Qt.Key(event.key())
         self._by_keys = self._by_keys or key in _MOVES
         if key in _MOVES:
@@ -364,6 +375,7 @@ class Playable(QWidget):
         return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, spot: Spot) -> None:
+        """Move the cursor to a spot, its key limited to those that sound, and describe it to screen readers."""
         spot = spot._replace(key=min(max(spot.key, self._low), self._high))
         before, self.chosen = self.chosen, spot
         self.setAccessibleDescription(

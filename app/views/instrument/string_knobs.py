@@ -20,8 +20,8 @@ from app.views.painting import write
 from engine.parameters import DECAY, OF_INSTRUMENTS, PITCH, PLUCK, STRING, TECHNIQUE
 from engine.pluck import SHAPES
 
-HEAD_HEIGHT = 13
-FACTS_HEIGHT = 16
+HEAD_HEIGHT = 13  # pixels: of a group's heading
+FACTS_HEIGHT = 16  # of the line of facts, below
 SPACING = 4
 WIDTHS = {  # in pixels, by the longest name or value
     "tuning.transpose": 58,
@@ -49,11 +49,12 @@ class Facts(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._facts: dict[str, str] = {}
+        self._facts: dict[str, str] = {}  # name -> value with its unit
         theme.fix_size(self, height=FACTS_HEIGHT)
         self.setAccessibleName("The string under one key, as the knobs make it")
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
+        """Show facts, name and value with its unit each, in their order; all are in the tooltip."""
         if dict(facts) == self._facts:
             return
         self._facts = dict(facts)
@@ -63,6 +64,7 @@ class Facts(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the facts from left to right, names faint and values bold, as far as there is room."""
         painter = QPainter(self)
         x = 2
         for name, value in self._facts.items():
@@ -102,6 +104,7 @@ class StringKnobs(QWidget):
         theme.fix_size(self, height=HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)
 
     def _group(self, group: str) -> QVBoxLayout:
+        """Build a column of a group's name above its knobs, which are added to `knobs`."""
         head = Label(group, objectName="group")
         theme.fix_size(head, height=HEAD_HEIGHT)
         row = filled(QHBoxLayout(), spacing=0)

@@ -25,13 +25,13 @@ class TakesMenu(QMenu):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Takes", parent)
         self.meter = Meter()
-        self._takes: list[QMenu] = []
-        self._below = self.addSeparator()
+        self._takes: list[QMenu] = []  # a submenu for each take
+        self._below = self.addSeparator()  # under the takes, before which they are inserted
         self._metronome = self.addAction("Metronome")
         self._metronome.setCheckable(True)
         self._metronome.triggered.connect(lambda on: self.choose({"metronome": on}))
         self._tempo = self.addAction("", self._ask_tempo)
-        self._choices: dict[tuple[str, int], QAction] = {}
+        self._choices: dict[tuple[str, int], QAction] = {}  # field of `Meter` and its value -> the entry for it
         for title, field, entries in CHOICES:
             menu = self.addMenu(title)
             for value, text in entries.items():
@@ -42,7 +42,7 @@ class TakesMenu(QMenu):
         self.choose({})
 
     def show_takes(self, rows: Sequence[TakeRow]) -> None:
-        """Show the takes, in this order."""
+        """Show a submenu for each take, in this order; one that is disabled where there are none."""
         for menu in self._takes:
             self.removeAction(menu.menuAction())
             menu.deleteLater()
@@ -56,7 +56,7 @@ class TakesMenu(QMenu):
             self._takes.append(menu)
 
     def choose(self, changes: Mapping[str, object]) -> None:
-        """Change fields of `meter`."""
+        """Change fields of `meter`, by their names, and check the entries of its values."""
         self.meter = Meter.model_validate({**dict(self.meter), **changes})
         self._metronome.setChecked(self.meter.metronome)
         self._tempo.setText(f"Tempo: {self.meter.tempo_bpm} beats a minute …")

@@ -11,7 +11,7 @@ from PySide6.QtGui import QFontMetrics
 from app.views import theme
 
 LETTER_PIXELS = 12
-AIR = 8  # of a label, at its ends together
+AIR = 8  # pixels of a label, at its ends together
 TICK_PIXELS = 14  # the least distance of numbers on a vertical axis
 LOWEST_HZ = 50.0  # of a logarithmic axis of frequencies
 MOST_STEPS = 6  # of an axis that shows less than two octaves
@@ -35,6 +35,7 @@ class UprightLabel:
             self._fit()
 
     def _fit(self) -> None:
+        """Show the longest wording that the height has room for; none where even the shortest is too long."""
         metrics = QFontMetrics(theme.small_font(LETTER_PIXELS))
         height = self._box.boundingRect().height()
         text = next((words for words in self._wordings if metrics.horizontalAdvance(words) + AIR <= height), "")
@@ -49,18 +50,22 @@ class UprightTicks:
 
     def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
         self._axis, self._box = axis, box
-        self._ticks: tuple[tuple[float, str], ...] | None = None
-        self._between: list[tuple[float, str]] = []
+        self._ticks: tuple[tuple[float, str], ...] | None = None  # as of `set`
+        self._between: list[tuple[float, str]] = []  # (place, "")
         box.sigResized.connect(self._fit)
         box.sigYRangeChanged.connect(self._fit)
 
     def set(self, ticks: Iterable[tuple[float, str]] | None, between: Iterable[float] = ()) -> None:
-        """Places and texts, in rising order, and ticks without numbers. None: the axis chooses."""
+        """Set the ticks with numbers, (place on the axis, text), rising; None: the axis chooses.
+
+        `between`: places of ticks without numbers.
+        """
         self._ticks = None if ticks is None else tuple(ticks)
         self._between = [(place, "") for place in between]
         self._fit()
 
     def _fit(self) -> None:
+        """Set the ticks in view that are TICK_PIXELS apart at least; without a list leave them to the axis."""
         if self._ticks is None:
             self._axis.setTicks(None)
             return
@@ -71,7 +76,10 @@ class UprightTicks:
 
 
 def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float, str]]:
-    """Select the `ticks` that are at least `room` apart, the first and the last before the others."""
+    """Select the `ticks`, (place, text), that are at least `room` apart, the first and the last before the others.
+
+    `room`: in the unit of the places.
+    """
     sparse_ticks: list[tuple[float, str]] = []
     for tick in (*ticks[:1], *ticks[:0:-1][:1], *ticks[1:-1]):
         if all(abs(tick[0] - other) >= room for other, _ in sparse_ticks):

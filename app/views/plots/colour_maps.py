@@ -49,7 +49,7 @@ def _shift_to_ground(name: str, ground_at: float, panel: str) -> pg.ColorMap:
     """The pyqtgraph map, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
     places = np.linspace(0, 1, _COLOURS)
     source = pg.colormap.get(name)
-    colours = np.asarray(source.map(places, mode="float"))[:, :3]
+    colours = np.asarray(source.map(places, mode="float"))[:, :3]  # (places, red green blue), 0 … 1
     ground = np.array(QColor(panel).getRgbF()[:3])  # type: ignore[index]
     dark = np.asarray(source.map(ground_at, mode="float"))[:3]
     nearness = 1 - np.abs(places - ground_at) / max(ground_at, 1 - ground_at)

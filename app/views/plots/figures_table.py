@@ -24,7 +24,7 @@ from app.views.controls.plain import plain_tip
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
-NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260
+NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260  # of a column
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class FiguresTable(QTableWidget):
     def __init__(self, name: str, columns: Sequence[FigureColumn], parent: QWidget | None = None) -> None:
         super().__init__(0, len(columns), parent)
         self.setAccessibleName(name)
-        self._columns, self._dimmed = columns, False
+        self._columns, self._dimmed = columns, False  # dimmed: all rows are grey
         for place, column in enumerate(columns):
             heading = QTableWidgetItem(column.title)
             heading.setToolTip(f"{column.tip}\nClick to sort")
@@ -100,6 +100,7 @@ class FiguresTable(QTableWidget):
         self.choose(key)
 
     def _fill(self, rows: Sequence[TableRow]) -> None:
+        """Replace all cells by those of rows, sorted as the heading says; the selection may be lost."""
         self.setSortingEnabled(False)
         self.setRowCount(len(rows))
         for place, row in enumerate(rows):
@@ -184,6 +185,7 @@ class _Cell(QTableWidgetItem):
         self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else column_colour))
 
     def __lt__(self, other: QTableWidgetItem) -> bool:
+        """Compare by value for Qt's sorting; None is last in either order."""
         one, another = self._value, cast("_Cell", other)._value
         if one is None or another is None:
             descending = self.tableWidget().horizontalHeader().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder

@@ -19,11 +19,11 @@ class KeptPlot(Plot):
     """
 
     def __init__(self, name: str, tip: str, foot: str = "") -> None:
-        self._picture: QPixmap | None = None
+        self._picture: QPixmap | None = None  # the plot without its line; None: it has changed since
         self._moved = QRegion()  # strips of the line that changed since the last painting
-        self._line_at = 0.0
-        self._strip = QRect()  # where it was drawn last
-        self._next_strip = QRect()  # and where it is to be
+        self._line_at = 0.0  # on the horizontal axis
+        self._strip = QRect()  # of the viewport, where the line was drawn last; empty: out of view
+        self._next_strip = QRect()  # and where it is to be drawn next
         super().__init__(name, tip, foot)
 
     @property
@@ -32,6 +32,7 @@ class KeptPlot(Plot):
         return self._line_at
 
     def move_line(self, at: float) -> None:
+        """Put the line at a place on the horizontal axis, and repaint the strips where it was and is."""
         self._line_at = at
         self._next_strip = strip = self._line_strip()
         if strip == self._strip:
@@ -41,6 +42,7 @@ class KeptPlot(Plot):
             self.viewport().update(changed)
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint from the cached picture where only strips of the line have changed, else all; then paint the line."""
         strips, self._moved = self._moved, QRegion()
         if not event.region().subtracted(strips).isEmpty():
             self._picture = None

@@ -13,15 +13,18 @@ from PySide6.QtWidgets import QWidget
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 
-STROKE = 16  # the length of a sample of colour
-FAINT_ALPHA = 185
-HEIGHT = 20
+STROKE = 16  # pixels: the length of a sample of colour
+FAINT_ALPHA = 185  # of 255: of sources that are not heard
+HEIGHT = 20  # pixels
 SHARE = 0.92  # of the plot's width, at most
-_GAP, _BETWEEN = 6, 18
+_GAP, _BETWEEN = 6, 18  # pixels: from a sample to its text, and from one source to the next
 
 
 def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, middle: float, right: float) -> float:
-    """Paint a row from `x` to `right` at most, in pixels; cut titles that do not fit. Return the row's end."""
+    """Paint a row from `x` to `right` at most; cut titles that do not fit. Return the row's end; all in pixels.
+
+    `middle`: the height of the row's middle.
+    """
     painter.setFont(theme.small_font(12, bold=True))
     metrics = painter.fontMetrics()
     for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):
@@ -43,7 +46,7 @@ class Legend(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._sources: tuple[ShownSource, ...] = ()
-        self._part = ""
+        self._part = ""  # of the sound that the curves show; "": all of it
         self.show_sources(DEFAULT_SOURCES)
         plot.getPlotItem().vb.sigResized.connect(self._place)
 
@@ -60,6 +63,7 @@ class Legend(QWidget):
         self.update()
 
     def _place(self) -> None:
+        """Place the legend in the upper right corner of the axes, as wide as its cut texts need."""
         area = self._plot.mapFromScene(self._plot.getPlotItem().vb.sceneBoundingRect()).boundingRect()
         room = int(SHARE * area.width())
         metrics = QFontMetrics(theme.small_font(12, bold=True))
@@ -89,10 +93,14 @@ def _caption(source: ShownSource) -> str:
 
 
 def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
-    """The text of each: whole; where too wide without “heard”, which the colour shows; then with cut titles."""
+    """The text of each source, so that all fit in `room` pixels.
+
+    Texts are whole; where these are too wide, without “heard”, which the colour shows; then with cut titles.
+    """
     for wording in (sources, [replace(source, heard=False) for source in sources]):
         if _width(texts := [_caption(source) for source in wording], metrics) <= room:
             return texts
+    # pixels that are left for titles, shared from the shortest to the longest
     titles = room - _width([_caption(replace(source, title="")) for source in wording], metrics)
     needed = [metrics.horizontalAdvance(source.title) for source in wording]
     for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
@@ -113,7 +121,10 @@ def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
 def set_curves(
     plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
 ) -> None:
-    """Add curves that `curves` lacks, remove those of other sources, and set the pen and the order of all."""
+    """Add curves that `curves`, by source, lacks, remove those of other sources; set the pen and order of all.
+
+    `faint_alpha`: 0 … 255, of sources that are not heard; the heard one is opaque and in front.
+    """
     names = {source.source for source in sources}
     for gone in [name for name in curves if name not in names]:
         plot.removeItem(curves.pop(gone))

@@ -86,6 +86,7 @@ class Plot(pg.PlotWidget):
         self._hover(event.position())
 
     def _hover(self, at: QPointF) -> None:
+        """Emit the values of both axes at a point of the widget, in pixels; NaN outside the axes."""
         inside = self.getPlotItem().vb.sceneBoundingRect().contains(self.mapToScene(at.toPoint()))
         place = self.place_at(at) if inside else QPointF(math.nan, math.nan)
         self.hovered.emit(place.x(), place.y())

@@ -63,6 +63,7 @@ class _Swap:
 
 
 def _recolour_item(item: Any, swap: _Swap) -> None:
+    """Exchange the pens and brushes of one item of a plot; parts of a PlotDataItem follow that."""
     match item:
         case pg.PlotDataItem():
             item.setPen(swap.pen(item.opts["pen"]))

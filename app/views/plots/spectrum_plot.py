@@ -19,7 +19,7 @@ TIP = (
 class SpectrumPlot(ZoomPlot):
     """A plot with a cursor, the line of `KeptPlot`, at the log₁₀ of a frequency in Hz; NaN: there is none."""
 
-    SHORTEST_VIEW = 0.005  # a third of a semitone
+    SHORTEST_VIEW = 0.005  # of log₁₀ of the frequency: a fifth of a semitone
     PAN_BUTTONS: ClassVar = ZoomPlot.PAN_BUTTONS | Qt.MouseButton.LeftButton
 
     def __init__(self) -> None:

@@ -18,8 +18,8 @@ from app.views.plots.zoom_plot import ZoomPlot
 class TimePlot(ZoomPlot):
     """The owner draws the curves; the line of `KeptPlot` is the playhead, in s."""
 
-    SHORTEST_VIEW = 0.002
-    LONGEST_STEP = 0.1
+    SHORTEST_VIEW = 0.002  # s
+    LONGEST_STEP = 0.1  # s
     pointed = Signal(float, float)  # a press with Shift: time in s, place on the vertical axis
 
     def __init__(self, name: str, tip: str, *, shaded: bool = True) -> None:
@@ -72,7 +72,7 @@ class TimePlot(ZoomPlot):
         return self.view_range
 
     def frames_in_view(self, rate_hz: float, ready: int) -> range:
-        """The frames in view, of the first `ready` at a rate."""
+        """The numbers of the frames (samples) in view, of the first `ready`, which are rendered, at a rate."""
         low_s, high_s = self.times_s
         first = math.ceil(low_s * rate_hz)
         return range(first, max(first, min(math.floor(high_s * rate_hz) + 1, ready)))

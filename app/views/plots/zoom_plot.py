@@ -15,13 +15,13 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from app.views.plots.kept_plot import KeptPlot
 
 ZOOM_STEP = 1.25
-LINE_STEP = 0.05  # of the view
+LINE_STEP = 0.05  # of the line by an arrow key, as a share of the view
 
 
 class ZoomPlot(KeptPlot):
     """A plot whose view, the part of the axis that is shown, is zoomed and moved."""
 
-    SHORTEST_VIEW: ClassVar[float]
+    SHORTEST_VIEW: ClassVar[float]  # in the unit of the axis, as the next
     LONGEST_STEP: ClassVar[float] = math.inf  # of the line, by a key
     PAN_BUTTONS: ClassVar = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
 
@@ -29,8 +29,8 @@ class ZoomPlot(KeptPlot):
 
     def __init__(self, name: str, tip: str, foot: str = "") -> None:
         super().__init__(name, tip, foot)
-        self._ends = 0.0, 1.0
-        self._pan_from: float | None = None  # in pixels
+        self._ends = 0.0, 1.0  # of the axis, between which the view is moved
+        self._pan_from: float | None = None  # x of the mouse at its last move, in pixels; None: it does not pan
 
     def set_ends(self, low: float, high: float) -> None:
         """Set the ends of the axis; the view is kept where they are the same."""
@@ -96,6 +96,7 @@ class ZoomPlot(KeptPlot):
         self.show_all()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Ask for another place of the line by arrows and Home; zoom by + and −, show all by 0."""
         low, high = self.view_range
         here = self.line_at if math.isfinite(self.line_at) else low
         step = min(self.LONGEST_STEP, LINE_STEP * (high - low))
@@ -116,4 +117,5 @@ class ZoomPlot(KeptPlot):
                 super().keyPressEvent(event)
 
     def _seek(self, at: float) -> None:
+        """Ask for a place of the line, limited to the ends of the axis."""
         self.seek_asked.emit(min(max(at, self._ends[0]), self._ends[1]))

@@ -70,6 +70,7 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:
+    """Darken and hatch an area, in pixels."""
     set_ink(painter, fill=theme.SHADE)
     painter.drawRect(area)
     painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
@@ -79,6 +80,7 @@ def _shade(painter: QPainter, area: QRectF) -> None:
 def _paint_untrained_positions(
     painter: QPainter, axes: StringAxes, trained: tuple[float, float], words: bool
 ) -> None:
+    """Hatch both ends of the string, outside the trained positions (lowest, highest); `words`: say so there."""
     low, high = trained
     height = axes.bottom - axes.top
     font = theme.small_font(11)
@@ -97,6 +99,10 @@ def _paint_untrained_positions(
 
 
 def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int) -> None:
+    """Hatch amplitudes below and above the trained ones, with words at the end of the string that `pluck` is not at.
+
+    `pluck`: the end that the pluck is nearer to: 0, left, or 1.
+    """
     assert trained.amplitude_mm is not None
     low_mm, high_mm = trained.amplitude_mm
     left, right = trained.position or (0.0, 1.0)  # beside them it is shaded already

@@ -17,7 +17,7 @@ from app.views.painting import set_ink, write
 from app.views.string.axes import StringAxes
 from app.views.string.ground import paint_grid
 
-HANDLE_RADIUS = 7.0
+HANDLE_RADIUS = 7.0  # pixels
 DASH = 4  # pixels
 PIECE, EVERY = 9, 24  # pixels: length and spacing of the pieces of a hidden line that are drawn above the other
 MERGED = 2.0  # pixels: of two lines that are nearer, one hides the other
@@ -25,11 +25,14 @@ MERGED = 2.0  # pixels: of two lines that are nearer, one hides the other
 
 @dataclass(frozen=True)
 class ShownPluck:
-    """The pluck as chosen. shape_mm (points,); `label`: its shape and width in words."""
+    """The pluck as chosen: position 0 … 1 along the string, amplitude and displacement in mm.
+
+    `label`: its shape and width in words.
+    """
 
     position: float
     amplitude_mm: float
-    shape_mm: NDArray[np.float64]
+    shape_mm: NDArray[np.float64]  # (points,), evenly from end to end
     label: str = ""
 
 
@@ -37,7 +40,9 @@ GLOW = ((4.0, 0.25), (2.4, 0.5), (1.2, 0.8))  # pixels from the string on both s
 
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, front: str, glows: bool = False) -> None:
-    """Paint the sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
+    """Paint a string for each source, `front` above the others, and above it pieces of those it hides.
+
+    `front`: the name of the source that sounds. `glows`: with light around the strings, without the grid.
 
     Opaque fills and thin pens only: this is drawn sixty times a second.
     """
@@ -94,7 +99,10 @@ def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str,
 
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
-    """Paint an opaque area with thin edges, which show its extent where another band covers it in part."""
+    """Paint the area between two lines of displacement, in a source's colour mixed with the ground.
+
+    `strength`: the share of the colour, 0 … 1. Thin edges show its extent where another band covers it in part.
+    """
     colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     set_ink(painter, fill=theme.blended(colour, theme.PANEL, strength))
@@ -125,7 +133,10 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """Paint the handle: `full` on a string at rest, else a ring; with its values where it is full or grabbed."""
+    """Paint the handle: `full` on a string at rest, else a ring; with its values where it is full or grabbed.
+
+    `at`, `right`: its middle, and the end of the string that words keep within, in pixels.
+    """
     if grabbed:
         set_ink(painter, fill=theme.translucent(theme.TEXT, 50))
         painter.drawEllipse(at, 2 * HANDLE_RADIUS, 2 * HANDLE_RADIUS)

@@ -60,17 +60,17 @@ class StringView(StageView):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._frame: StringFrame | None = None
+        self._frame: StringFrame | None = None  # the moment of the motion; None: the pluck is drawn
         self._pluck = ShownPluck(0.35, 4.0, np.zeros(2))
-        self._trained = TrainedPlucks()
-        self._span_mm = 5.0
+        self._trained = TrainedPlucks()  # beyond this the picture is hatched
+        self._span_mm = 5.0  # half the height of the picture, one of SPANS_MM
         self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
-        self._pressed_at = QPointF()
+        self._pressed_at = QPointF()  # of the mouse, where the drag began
         self._on_bare_string = False  # the press was not on the handle
         self._far = False  # the drag has gone too far from the press to be a click
-        self._amplitude_mm = 0.0  # at its beginning
+        self._amplitude_mm = 0.0  # of the pluck as the drag began
         self._on_handle_first = False  # the last press was the first of a series, and on the handle
-        self._last_press_ms = -10_000
+        self._last_press_ms = -10_000  # on Qt's clock of events; long ago
         self._turned = 0.0  # notches of the wheel towards the next shape
         self._swung: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
         self._add_toggle(
@@ -144,6 +144,7 @@ class StringView(StageView):
             self.pluck_drawn.emit(self._dragged[0], self._amplitude_mm)  # a click does no more
 
     def _drag_on(self, at: QPointF, by: QPointF) -> None:
+        """Draw the pluck where the drag has come to; on the bare string only once it is too far for a click."""
         axes = self.axes
         position = self._dragged[0] + by.x() / axes.length
         displacement_mm = self._dragged[1] - by.y() / axes.half_height * axes.span_mm
@@ -159,6 +160,7 @@ class StringView(StageView):
             self.pluck_released.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
+        """Set the pluck's width by the wheel over its handle, or with Shift its shape, in whole notches."""
         if self._part_at(event.position()) != "pluck":
             event.ignore()
             return
@@ -173,6 +175,7 @@ class StringView(StageView):
         event.accept()
 
     def _take_key(self, key: Qt.Key, across: int, up: int, modifiers: Qt.KeyboardModifier) -> bool:
+        """Move the pluck by arrows, 0.01 along or 0.5 mm up; with Ctrl set shape or width; reset it by Delete."""
         position, amplitude_mm = self._pluck.position, self._pluck.amplitude_mm
         if across and modifiers & _Control:
             self.shape_stepped.emit(across)
@@ -203,7 +206,7 @@ class StringView(StageView):
         return self.axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
-        """Set the span from the pluck at rest, or from the motion; while a pluck is dragged it only grows."""
+        """Fit the span, half the picture's height in mm, to the pluck or the motion; in a drag it only grows."""
         if self._drag == "pluck":
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         elif self._frame is None:
@@ -266,7 +269,7 @@ class StringView(StageView):
 
     @property
     def _pluck_end(self) -> int | None:
-        """The side on which words would be in the way of the pluck, with the words at its handle."""
+        """The end of the string, 0 or 1, where words would be in the way of the pluck; None while motion is shown."""
         return int(self._pluck.position > 0.4) if self._shown_motion is None else None
 
     def _paint_ground(self, painter: QPainter) -> None:
