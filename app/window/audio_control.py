@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from app.playing.notes import Notes
     from app.rendering import Take
 
-FREQUENT, FREQUENT_WITHIN_S = 3, 10.0  # gaps that are worth a word
+FREQUENT, FREQUENT_WITHIN_S = 3, 10.0  # so many gaps within so long are worth a notice
 FREQUENT_GAPS = (
     "The sound has gaps. A longer buffer prevents them: Audio …, or Ctrl+comma. So does closing other programs."
 )
@@ -43,16 +43,16 @@ class AudioControl(QObject):
     ) -> None:
         super().__init__(window)
         self.device, self.sound = device, sound
-        self._wish = (device, sound)
+        self._wish = (device, sound)  # what is to play; a device of None: the system's default
         self._window = window
         self.output = make_output(self._reported.emit)
         self._reported.connect(self.report)
-        self._changes = 0
-        self._notice = ""
-        self._latencies_s: tuple[float, ...] = ()
-        self._measured_with: object = None  # device and buffer of these
-        self._listed: list[DeviceChoice] | None = None
-        self._moments = 0
+        self._changes = 0  # calls of `open` so far
+        self._notice = ""  # the notice about the sound that is shown; "": none
+        self._latencies_s: tuple[float, ...] = ()  # from gestures to sound, the latest last
+        self._measured_with: object = None  # device and its latency, of these; None: not measured
+        self._listed: list[DeviceChoice] | None = None  # in the dialog; None: not listed, or not known
+        self._moments = 0  # calls of `show` while the dialog was open
         self._advised = False  # of frequent gaps, with this buffer
         self._dialog: AudioDialog | None = None
 
@@ -77,7 +77,12 @@ class AudioControl(QObject):
         self._window.notices.report(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
-        """Show the present state; to be called ten times a second."""
+        """Show the present state; to be called ten times a second.
+
+        Args:
+            notes: whose latencies are shown, and forgotten where device or buffer have changed.
+            take: the shown motion, whose model's rate is in the header; None: none.
+        """
         if status.problem is None:
             if self._notice:
                 self._window.notices.withdraw(self._notice)  # the sound is back
@@ -106,6 +111,7 @@ class AudioControl(QObject):
                 self._window.notices.inform(FREQUENT_GAPS)
 
     def show_dialog(self) -> None:
+        """Open the dialog of the sound output, which does not block the window, or bring it to the front."""
         if self._dialog is None:
             self._dialog = dialog = AudioDialog(self._window)
             dialog.choice_made.connect(self._choose)
@@ -137,6 +143,7 @@ class AudioControl(QObject):
         self._listed = choices
 
     def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
+        """Show in the header the model's rate and, where it differs, the output's; or that there is no sound."""
         rate, fault = rate_word(model_rate_hz), status.device is None
         converted = "" if status.rate_hz == model_rate_hz else f" → {rate_word(status.rate_hz)}"
         text = "no sound" if fault else f"{rate}{converted}"

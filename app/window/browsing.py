@@ -20,7 +20,9 @@ from engine.folders import user_folder
 
 
 class BrowserDesk(QObject):
-    """A desk that lives in the window's thread, as long as the window.
+    """A desk: the controller of a browser and of the bar that opens it, for presets or instruments.
+
+    It lives in the window's thread, as long as the window. A row is a preset or an instrument, by its name.
 
     Attributes:
         favourites: names of rows, also of those whose files are missing at present.
@@ -76,9 +78,9 @@ class BrowserDesk(QObject):
             self.browser.show_over()
 
     def step(self, step: int) -> None:
-        """Step to the next or previous one of the filtered list, going round.
+        """Load the next row of the filtered list (1) or the previous (-1); the first follows the last.
 
-        A step from outside leads to its first or last.
+        Where the loaded row is not in the list, load its first or last.
         """
         names, name = self.browser.listed, self.chosen
         if names:
@@ -90,6 +92,7 @@ class BrowserDesk(QObject):
         self.show_rows()
 
     def _open_folder(self) -> None:
+        """Open the folder of the user's own files in the file manager; make it where it is not there."""
         folder = self._folder()
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -110,7 +113,7 @@ class PresetDesk(BrowserDesk):
         self._session = session
         self._library = library
         self._bar = window.presets
-        self._known = set(library.names)
+        self._known = set(library.names)  # at the last change, to find what was added
         library.changed.connect(self._library_changed)
         self.show_rows()
 

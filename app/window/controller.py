@@ -61,10 +61,10 @@ from engine.presets import SHIPPED, PresetError
 if TYPE_CHECKING:
     from app.player.learned import Kept
 
-LOOK_MS = 8  # between two pictures: string, left deck, string, right deck, so that each painting is short: keys wait
+LOOK_MS = 8  # between two pictures of TURNS: each painting is short, as keys that are played wait for it
 IDLE_LOOK_MS = 50  # while nothing moves
-TURNS: tuple[Location, ...] = ("stage", "left", "stage", "right")
-KEYS_EVERY_S, FACTS_EVERY_S, JUDGED_EVERY_S = 0.04, 0.1, 0.15
+TURNS: tuple[Location, ...] = ("stage", "left", "stage", "right")  # the panels that a tick shows, in turn
+KEYS_EVERY_S, FACTS_EVERY_S, JUDGED_EVERY_S = 0.04, 0.1, 0.15  # sounding keys; output's state; training's words
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
@@ -79,11 +79,14 @@ class Duty:
 
     every_s: float
     do: Callable[[], object]
-    due_s: float = 0.0
+    due_s: float = 0.0  # when it is next done, as of `time.monotonic`
 
 
 class Controller(QObject):
-    """A controller that lives as long as the window."""
+    """A controller that lives as long as the window.
+
+    The stage is the picture of string or drum; below it are the decks, left and right, with the views of the Lab.
+    """
 
     def __init__(
         self, window: MainWindow, settings: Settings, settings_path: Path, make_sound: MakeSound = Sound
@@ -106,13 +109,13 @@ class Controller(QObject):
         window.places.choices = settings.files
         self._timer = QTimer(self, interval=LOOK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
-        self._lively_until_s = 0.0
-        self._ticks = 0
-        self._shown_s = dict.fromkeys(TURNS, time.monotonic())
-        self._peak_db = METER_FLOOR_DB
+        self._lively_until_s = 0.0  # then the timer is slower, as of `time.monotonic`
+        self._ticks = 0  # of the timer so far
+        self._shown_s = dict.fromkeys(TURNS, time.monotonic())  # when each place was last shown
+        self._peak_db = METER_FLOOR_DB  # that the meter shows
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
-        self._help: HelpDialog | None = None
-        self._learning: LearnDialog | None = None
+        self._help: HelpDialog | None = None  # made when it is first opened
+        self._learning: LearnDialog | None = None  # asks what a dropped sound is; None: not open
         problems = self.library.refresh()
         self.presets = PresetDesk(window, self.session, self.library, settings.favourites)
         self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
@@ -252,6 +255,7 @@ class Controller(QObject):
             window.action[name].triggered.connect(lambda _=False, do=do: do())
 
     def _connect_undo(self) -> None:
+        """Show undo's steps in the menu, and make each drag of a knob or in a picture one step."""
         window, session = self.window, self.session
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(session.undo_words, session.redo_words))
         draggable: tuple[StageView | Knob, ...] = (self.string.view, self.drum.view, *window.findChildren(Knob))
@@ -260,6 +264,7 @@ class Controller(QObject):
             dragged.drag_ended.connect(session.release)
 
     def _change(self, field: str, value: object) -> None:
+        """Give a field of `Choices` a control's value; where that is out of bounds, set the control back."""
         try:
             self.session.update(**{field: value})
         except ValueError as error:
@@ -323,6 +328,7 @@ class Controller(QObject):
         self.exports.open("models")
 
     def play_or_stop(self) -> None:
+        """Stop all that sounds; where nothing does, pluck. Do nothing while the listening test is open."""
         if self._abx is None:
             was_playing = self.instruments.playing
             self.instruments.stop()
@@ -353,6 +359,7 @@ class Controller(QObject):
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
+        """Let the app sound as before the listening test, and keep the test's choices for the settings."""
         dialog, self._abx = self._abx, None
         self.performance.notes.set_blind_test(False)
         self.sound.set_volume_db(self.session.choices.volume_db)
@@ -361,6 +368,7 @@ class Controller(QObject):
         dialog.deleteLater()
 
     def show_help(self, topic: str = "") -> None:
+        """Open the help at the tab of a title; "": the one that was shown last."""
         if self._help is None:
             self._fill_decks()
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
@@ -385,6 +393,7 @@ class Controller(QObject):
         self._take(file, dropped)
 
     def _take(self, file: Path, dropped: Dropped) -> None:
+        """Apply what a dropped file brings: new choices, a body for the instrument, a notice."""
         notice = dropped.notice
         try:
             self.session.update(**dropped.choices)
@@ -396,7 +405,10 @@ class Controller(QObject):
             self.window.notices.report(notice)
 
     def _ask_what_it_is(self, file: Path) -> None:
-        """String or body? One dialog at a time: a further file takes its place."""
+        """Open the dialog that asks whether a sound is a string or a body, in place of one that is open.
+
+        Where that one may not be closed now, a notice asks to open the file again later.
+        """
         if self._learning is not None:
             if not self._learning.may_close():
                 self.window.notices.report(f"{file.name}: open it again once the other recording is done with.")
@@ -466,6 +478,7 @@ class Controller(QObject):
     # Session → everything
 
     def _stage_changed(self, names: frozenset[str]) -> None:
+        """Show what has changed in the session; `names`: fields of `Choices` and of `Stage`."""
         if not names.isdisjoint(OBSERVED):
             self.inputs.choices_changed(names)
             self._choices_shown(names)
@@ -474,6 +487,7 @@ class Controller(QObject):
             self.exports.refresh()
 
     def _choices_shown(self, names: frozenset[str]) -> None:
+        """Show the choices in window, panels, desks and exports; `names`: the fields that have other values."""
         choices, window = self.session.choices, self.window
         window.transport.show_choices(choices)
         if "preset" in names:
@@ -528,7 +542,7 @@ class Controller(QObject):
     # A hundred and twenty times a second
 
     def _tick(self) -> None:
-        """Show the string and, between two of its frames, the left or the right deck."""
+        """Show the panels of the next place of TURNS: the string and, between two of its frames, a deck."""
         now_s = time.monotonic()
         location = TURNS[self._ticks % len(TURNS)]
         self._ticks += 1
@@ -564,6 +578,7 @@ class Controller(QObject):
         self.audio.show(self.sound.status(), performance.notes, performance.take)
 
     def _show_level(self, elapsed_s: float) -> None:
+        """Show the peak of the output in dBFS, which falls slowly; nothing in a listening test."""
         mixer = self.sound.mixer
         peak, reduction_db = mixer.take_peak(), mixer.take_reduction_db()
         fallen_db = self._peak_db - METER_FALL_DB_PER_S * elapsed_s

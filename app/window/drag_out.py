@@ -33,7 +33,7 @@ class DragOut(QObject):
         self._handle = handle = window.transport.handle
         self._folders: list[Path] = []  # temporary ones, each of one rendering, which a program may still read
         self._latest: tuple[object, list[Path]] = (None, [])  # the sound that was asked for last, and its files
-        self._way: Way = "prepare"
+        self._way: Way = "prepare"  # what is done with the files once they are rendered, as asked for last
         self._background = background = Background("files", self, expected=EXPECTED)
         background.progressed.connect(lambda share, *_: handle.show_share(share))
         for ended in (background.finished, background.failed):
@@ -46,7 +46,13 @@ class DragOut(QObject):
         )
 
     def ask(self, handed: Handed, way: Way) -> None:
-        """Give the files once they are rendered, unless they are there already."""
+        """Render the files where they are not there yet, then give them.
+
+        Args:
+            handed: the note, its difference (model − truth), or the last recording.
+            way: "prepare" only renders, and no recording; "drag" begins a drag; "copy" puts the files on the
+                clipboard.
+        """
         if way == "prepare" and (handed == "recording" or self._background.busy):  # which may be long
             return
         kind: Kind = "performance" if handed == "recording" else "note"
@@ -73,7 +79,13 @@ class DragOut(QObject):
             shutil.rmtree(folder, ignore_errors=True)
 
     def _render(self, export: Callable[[Path], ExportJob], job: Job) -> list[Path]:
-        """The files of an export, which are sounds. What killed processes have left is removed."""
+        """Render an export into a temporary folder of its own; return its sound files. Called in the background.
+
+        Before, the oldest folders are removed while all hold more than LARGEST_BYTES, and those of killed processes.
+
+        Raises:
+            WriteError: the folder cannot be made.
+        """
         parent = Path(tempfile.gettempdir())
         try:
             while sum(file.stat().st_size for folder in self._folders for file in folder.glob("*")) > LARGEST_BYTES:

@@ -84,6 +84,7 @@ def receive_body(file: Path) -> Dropped:
 
 
 def _preset(file: Path, library: Library) -> Dropped:
+    """Copy a preset into the user's folder, unless its bytes are in the library already, and choose it."""
     path, was_there = install_preset(file, user_folder(), [entry.path for entry in library.entries])
     library.refresh()
     entry = library.find(name_text(path.stem))
@@ -95,6 +96,10 @@ def _preset(file: Path, library: Library) -> Dropped:
 
 
 def _drop_recipe(file: Path, library: Library) -> Dropped:
+    """The choices of the recipe in an exported sound: how it was played and heard.
+
+    The notice names what is not the same here: preset, instrument, or a duration out of range.
+    """
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
@@ -114,7 +119,7 @@ def _drop_recipe(file: Path, library: Library) -> Dropped:
 
 
 def restored_choices(recipe: SoundRecipe) -> dict[str, Any]:
-    """The fields of `Choices` that a recipe sets, without the instrument. Of a key, no pluck and no pick-up.
+    """The fields of `Choices` that a recipe sets, without the instrument. A recipe of a key sets no pluck or pick-up.
 
     Of a single string, the instrument that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.

@@ -30,9 +30,12 @@ HEARD_FIELDS = {"ear", *Monitor.model_fields} - {"level_match"}
 
 
 class Exports(QObject):
-    """The exports, which live as long as the window."""
+    """The exports, which live as long as the window.
 
-    ended = Signal(bool)  # an export, well or not; or its dialog was closed
+    A subject is what a page of the dialog exports: a note, compared models, a recording, or an instrument.
+    """
+
+    ended = Signal(bool)  # True: an export was written; False: it was not, or the dialog was closed
 
     def __init__(
         self,
@@ -134,6 +137,9 @@ def heard_note(choices: Choices, library: Library, struck: Struck | None = None)
     """The chosen pluck as it is heard, of another preset where that is heard; or an instrument's key.
 
     None: there is no preset.
+
+    Args:
+        struck: the instrument's key; None: the string is plucked alone.
     """
     source, another = choices.source_heard, None
     if struck is None and (another := library.find(other_preset(source) or "")) is not None:

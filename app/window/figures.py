@@ -32,7 +32,7 @@ class Figures(QObject):
         super().__init__(window)
         self._window, self._session, self._library = window, session, library
         self._menus: dict[QObject, QMenu] = {}  # by what the pointer or the keyboard is on
-        self._pressed = QPointF()
+        self._pressed = QPointF()  # where the right button went down, in pixels
 
     def add(self, panel: Panel) -> None:
         """Offer what a panel shows."""
@@ -76,7 +76,13 @@ class Figures(QObject):
         self._window.say_briefly("Picture copied")
 
     def _content(self, panel: Panel, suffix: str) -> tuple[bytes, str]:
-        """The file of a picture or of the data, and what is left out of it; b"": there is nothing."""
+        """The bytes of a picture or of the data, and words for what is left out of it, "" for nothing.
+
+        Where there are no data, a notice reports it and the bytes are b"".
+
+        Args:
+            suffix: ".png", ".svg", or ".csv" for the data.
+        """
         if suffix != ".csv":
             return picture(panel.figure, suffix), ""
         columns = panel.columns()

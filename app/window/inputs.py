@@ -19,7 +19,7 @@ from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
 from app.window.performance import Performance
 
-HIGHEST_KEY = 127
+HIGHEST_KEY = 127  # of MIDI
 
 
 class Inputs(QObject):
@@ -40,7 +40,7 @@ class Inputs(QObject):
         self._session = session
         self._library = library
         self._performance, self._notes = performance, performance.notes
-        self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
+        self._down: dict[KeyPress, int] = {}  # the computer's keys that are held, and the MIDI keys that they play
         self.begun.connect(self.look)  # at once, or from another thread in the window's
         self._chosen.connect(self._take_values)
         self._keys = PlayingKeys(window)
@@ -87,7 +87,11 @@ class Inputs(QObject):
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
-        """Play a note of MIDI that says where the string is plucked, or which preset. In the input's thread."""
+        """Pluck a single string by a note of MIDI; called in the input's thread.
+
+        Args:
+            mode: "position": the key sets the place along the string; otherwise it selects the preset.
+        """
         pluck, reach = self._session.choices.pluck, self.reach
         if mode == "position":
             pluck = reach.pluck(event.key, event.velocity, pluck)
@@ -104,6 +108,7 @@ class Inputs(QObject):
         self._session.play(**values)
 
     def _press(self, press: KeyPress) -> None:
+        """Play the instrument by a key of the computer; else pluck at one of ten places, or change the amplitude."""
         choices = self._session.choices
         if choices.plays_instrument:
             self._press_piano(press)
@@ -114,6 +119,7 @@ class Inputs(QObject):
             self._session.update(amplitude_mm=amplitude_mm)
 
     def _press_piano(self, press: KeyPress) -> None:
+        """Take a key of the computer as a key of a piano; other keys change octave and velocity."""
         choices, semitone = self._session.choices, semitone_of(press)
         if semitone is not None:
             key = LOWEST_C + 12 * choices.octave + semitone

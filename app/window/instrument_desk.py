@@ -62,7 +62,7 @@ from engine.plain_text import name_text, one_line
 from engine.schema import explained
 from engine.whole_file import WriteError
 
-AUDITION_VELOCITY, AUDITION_S = 90, 0.6
+AUDITION_VELOCITY, AUDITION_S = 90, 0.6  # of the note that lets an instrument be heard
 SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_INSTRUMENT = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
@@ -72,6 +72,8 @@ TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 class InstrumentDesk(BrowserDesk):
     """The controller of instruments: of their browser, their files, and the strip that plays one.
+
+    A `RecordedTake` is a recording of this session; a `Take` is the rendered motion of one note, for the views.
 
     Attributes:
         recordings: of what is played.
@@ -101,8 +103,9 @@ class InstrumentDesk(BrowserDesk):
         self._playback = Playback(self._play_event, performance.notes.sound, performance.notes.cancel)
         self._song = SongPlayer(self._playback, window.song)
         self._judged: object = None  # all that the words about the training depend on, as they are
-        self._waiting: tuple[Instrument, Callable[[], None]] | None = None  # begun as soon as it can be played
-        self._turned = False  # whether keys play the instrument as a knob was turned in the take
+        # an instrument, and what begins as soon as it can be played; None: nothing waits
+        self._waiting: tuple[Instrument, Callable[[], None]] | None = None
+        self._turned = False  # keys play the instrument as a knob was turned in the take, not the chosen one
         self.recordings = Recordings(window, session, performance.notes, library)
         self.reload()
         self._connect()
@@ -217,7 +220,12 @@ class InstrumentDesk(BrowserDesk):
         self._session.update(instrument=changed)
 
     def turn_to(self, field: str, figure: float) -> None:
-        """Turn a knob of the string to a figure of the shown string, or as near as it goes."""
+        """Turn a knob of the string until the shown string has a figure, or as near as it goes.
+
+        Args:
+            field: the knob's parameter.
+            figure: the wanted value, in the parameter's `figure_unit`.
+        """
         instrument = self.instrument
         if instrument is None:
             return
@@ -366,7 +374,10 @@ class InstrumentDesk(BrowserDesk):
             self._play_waiting()
 
     def _play_waiting(self) -> None:
-        """Begin the take or the note that waits; leave a knob that was turned in one that has ended."""
+        """Begin the take or the note that waits, once its instrument is loaded; drop it for another instrument.
+
+        Where nothing waits and a recording in which a knob was turned has ended, let keys play the chosen instrument.
+        """
         if self._waiting is not None:
             instrument, begin = self._waiting
             if self.instrument != instrument:
@@ -437,6 +448,7 @@ class InstrumentDesk(BrowserDesk):
     # What is shown
 
     def choices_changed(self, names: frozenset[str]) -> None:
+        """Show in the strip what has changed; `names`: the fields of `Choices` that have other values."""
         if names & {"instrument", "preset"}:
             self._show_instrument()
         if "instrument" in names:
@@ -477,9 +489,9 @@ class InstrumentDesk(BrowserDesk):
         self._panel.bar.say_octave(f"{end if by_user else 'Octave moved'}: {instrument.name} has {low} to {high}")
 
     def _show_source(self) -> None:
-        """Light keys in the colour of their source.
+        """Light keys in the colour of the source that is heard.
 
-        Say once that keys do not play another preset which a slot holds.
+        Where that is another preset's model, which keys do not play, a notice says so once.
         """
         choices, heard_source = self._session.choices, self._session.choices.source_heard
         other = heard_source if choices.plays_instrument and other_preset(heard_source) else ""
@@ -552,6 +564,7 @@ class InstrumentDesk(BrowserDesk):
         self.recordings.close()
 
     def _show_instrument(self) -> None:
+        """Show the instrument that is there in bar, knobs, keys and browser; where none is, that there is none."""
         instrument = self.instrument
         entry = self.entry
         panel = self._panel
@@ -596,6 +609,7 @@ class InstrumentDesk(BrowserDesk):
             self._session.update(instrument=self.instrument.turned(number, value))
 
     def _choose_body(self, name: str) -> None:
+        """Give the instrument another body; where its body was mixed to 0, all but its size is the default."""
         if self.instrument is not None:
             kept = dict(self.instrument.body) if self.instrument.body.mix > 0 else {"size": self.instrument.body.size}
             self._update(body=BodyChoice.model_validate({**kept, "name": name}))

@@ -25,8 +25,8 @@ class Leaving(QObject):
         self._window = window
         self._recordings = recordings
         self._exports = exports
-        self._waits = False  # for an export, to close then
-        self._asking = False
+        self._waits = False  # for an export or a recording to be saved, to close the window then
+        self._asking = False  # a question is open
         window.may_close = self.may_close
         exports.ended.connect(self._export_ended)
         recordings.written.connect(self._export_ended)
@@ -43,6 +43,7 @@ class Leaving(QObject):
             self._asking = False
 
     def _may_end_export(self) -> bool:
+        """Return True if no export is under way, or the user cancels it; where it is to finish first, wait."""
         if not self._exports.busy:
             return True
         question = "An export is under way. Closing the app ends it; only whole files are kept."
@@ -56,6 +57,7 @@ class Leaving(QObject):
         return not self._waits  # it has ended well or not while the question was open
 
     def _may_lose_recordings(self) -> bool:
+        """Return True if no recording is unsaved, or the user discards it; saving it closes the window later."""
         if not self._recordings.unsaved:
             return True
         question = "What was played is not saved. Save the recording before the app closes?"
@@ -72,7 +74,7 @@ class Leaving(QObject):
         return False
 
     def _export_ended(self, well: bool) -> None:
-        """An export has ended, or its dialog was closed."""
+        """Close the window if it waits for this, and the file was written (`well`)."""
         waited, self._waits = self._waits, False
         if waited and well:
             self._window.close()

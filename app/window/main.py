@@ -41,7 +41,7 @@ Alive = Callable[["Controller"], None]
 CANNOT_START = "The models cannot be loaded, so the program cannot be used."
 UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do not, restart the program."
 PATIENCE_S = 5.0  # for the sound device and the instrument's preset, before a file is taken
-LOOK_MS = 20
+LOOK_MS = 20  # between two looks whether a file can be taken
 
 
 def with_instrument(settings: Settings) -> Settings:
@@ -56,7 +56,17 @@ def with_instrument(settings: Settings) -> Settings:
 
 
 class _Start(QObject):
-    """The start: a thread loads the engine once the window is painted; then the controller is made."""
+    """The start: a thread loads the engine once the window is painted; then the controller is made.
+
+    Args:
+        path: of the settings' file.
+        notice: about the settings, to be shown; "": none.
+        alive: is called with the controller.
+        files: are taken then, as if they were dropped on the window.
+
+    Attributes:
+        failure: why the engine or the controller could not be made; None: they could, or not yet.
+    """
 
     _loaded = Signal()
 
@@ -96,6 +106,7 @@ class _Start(QObject):
         self._loaded.emit()
 
     def _begin(self) -> None:
+        """Make the controller, in the window's thread; show a failure of it or of the loading."""
         try:
             if self.failure is not None:
                 raise self.failure
@@ -116,7 +127,10 @@ class _Start(QObject):
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Take one file after another when keys would sound: of MIDI, all notes."""
+        """Take one file after another, each once keys would sound or PATIENCE_S have passed.
+
+        So the first notes of a MIDI file are heard. It looks again every LOOK_MS.
+        """
         controller = self._controller
         assert controller is not None
         if controller.performance.playable or time.monotonic() > self._patience_s:

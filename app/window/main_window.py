@@ -60,13 +60,14 @@ from engine.plain_text import one_line
 
 FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine, once: one to five minutes …"
-WIDE = 1100  # pixels: in a narrower window brand, keys and ABX button are hidden or in the overflow menu
-HIGH = 560  # pixels: in a lower one, so are the preset's facts
-WIDE_LAB = 1500  # pixels: in Lab a narrower one leaves the brand's room to the preset's name
-COMPACT_BELOW_PX, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
-ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
-KNOBS_HIGH, AIRY = 610, 780  # pixels: a lower one shows knobs in place of keys; parts stand closer
-FACTS_HEIGHT = 20
+# sizes of the window, in pixels at the usual size of text
+WIDE = 1100  # in a narrower one brand, keys and ABX button are hidden or in the overflow menu
+HIGH = 560  # in a lower one the preset's facts are in the overflow menu
+WIDE_LAB = 1500  # in the Lab a narrower one leaves the brand's room to the preset's name
+COMPACT_BELOW_PX, TIGHT = 1240, 900  # narrower: controls are compact; in the Lab symbols stand for words, too
+ALL_HIGH = 640  # a lower one shows the instrument instead of the views, while the keys are shown
+KNOBS_HIGH, AIRY = 610, 780  # lower than the first: knobs in place of keys; than the second: parts stand closer
+FACTS_HEIGHT = 20  # of the row with the preset's facts
 BRIEFLY_MS = 1_800  # a text over the window
 LONGEST_NAME = 60  # characters of a file
 FILE_FILTER = (
@@ -92,6 +93,7 @@ class MainWindow(QMainWindow):
     """The main window.
 
     Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`, `places`.
+    A face is one of two looks: Play, with instrument and string, and the Lab, with the views of `left` and `right`.
     """
 
     pluck_asked = Signal()
@@ -105,7 +107,7 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("Learned Strings")
         self.setMinimumSize(760, 480)
         self.resize(1280, 800)
-        self._painted = False
+        self._painted = False  # the first paint was seen
         self.places = FilePlaces()
         self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
         self.look = Look()
@@ -166,6 +168,7 @@ class MainWindow(QMainWindow):
             self.action[name].triggered.connect(lambda _=False, do=do: do())
 
     def _lay_out(self) -> None:
+        """Put the parts in place, from above: header, facts, stage with decks, song, controls, instrument."""
         self._brand = Label("LEARNED STRINGS")
         self._brand.setObjectName("brand")
         tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
@@ -278,6 +281,7 @@ class MainWindow(QMainWindow):
             self.pluck_asked.emit()
 
     def _set_alive(self, alive: bool) -> None:
+        """Enable the controls, or disable them while the models are loading."""
         for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
             part.setEnabled(alive)
         self._alive = alive
@@ -345,7 +349,8 @@ class MainWindow(QMainWindow):
     def _share_room(self) -> None:
         """Hide what has no room: in a low window the plots while the keys are shown, in a lower one the facts.
 
-        The header's controls and the preset's facts go to the overflow menu.
+        The header's controls and the preset's facts go to the overflow menu. The button of a soloed mode moves from
+        the row of facts to the header where that row is hidden.
         """
         width, height = self._size_px
         is_high, tests = height >= HIGH, self._shows("test")
@@ -370,7 +375,7 @@ class MainWindow(QMainWindow):
             self._solo.setVisible(solo_visible)
 
     def show_rate(self, text: str, tip: str, fault: bool) -> None:
-        """Show the sample rate, in the Lab; a fault of the sound output, in both faces."""
+        """Show the badge of the sample rate, in the Lab; with `fault`, that there is no sound, in both faces."""
         badge = self.rate_label
         if badge.text() == text:
             return
@@ -436,11 +441,12 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """A small window has narrower margins, and neither brand nor buttons for keys and listening test."""
+        """Fit the parts to the new size; see `_fit`."""
         super().resizeEvent(event)
         self._fit()
 
     def _fit(self) -> None:
+        """Fit parts, spaces and notices to the size of window and text; a small window has narrower margins."""
         self._share_room()
         width, height = self._size_px
         narrow, low = width < COMPACT_BELOW_PX, height < AIRY
@@ -452,7 +458,7 @@ class MainWindow(QMainWindow):
         self._place_notices()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """The header has another height, as text of another size has reached it."""
+        """Move the notices when the header may have another height, as after a change of the text's size."""
         if watched is self.centralWidget() and event.type() == QEvent.Type.LayoutRequest:
             self._place_notices()
         return super().eventFilter(watched, event)

@@ -46,9 +46,9 @@ class MidiControl(QObject):
         super().__init__(parent)
         self.choices = choices
         self._handle, self._play_note = handle, play_note
-        self._learning: str | None = None  # the field to which the next controller is assigned
+        self._learning: str | None = None  # the field that waits for a controller to be assigned; None: none
         self._dialog: MidiDialog | None = None
-        self._instrument: Instrument | None = None
+        self._instrument: Instrument | None = None  # that is played; None: none
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load, handle)
 
@@ -111,6 +111,7 @@ class MidiControl(QObject):
             self.performed.emit({"instrument": Instrument.model_validate({**dict(self._instrument), field: value})})
 
     def _choose_port(self, name: str) -> None:
+        """Open an input and remember it; "": close the present one. Show in the dialog why it cannot be opened."""
         assert self._dialog is not None
         problem = ""
         try:

@@ -36,7 +36,12 @@ GROWN = 3.0  # times the preset's own error, from which an error has grown
 
 
 class Performance(QObject):
-    """The owner of the notes and the render worker. Times are in s from the pluck or blow."""
+    """The owner of the notes and the render worker. Times are in s from the pluck or blow.
+
+    A note is what sounds; a take is the rendered motion and signals of one pluck or blow, which the views show.
+    The lead is the note whose time the playhead follows. A turn is one pass of a loop: a note of its own.
+    Each turn is handed to the mixer shortly before the one that rings ends.
+    """
 
     _reported = Signal(str, str)  # a notice and its details, from any thread
     _rendered = Signal(object, bool)  # from the worker's thread: a take, and whether all of it is; None: it failed
@@ -50,11 +55,11 @@ class Performance(QObject):
         self._library = library
         self._sound = sound
         self._panels = panels
-        self._turn: tuple[Note, Note] | None = None  # of a loop: what rings, and what waits for its end
-        self._waiting_words = self._error_words = ""
+        self._turn: tuple[Note, Note] | None = None  # the note that rings, the next turn; None: none handed over
+        self._waiting_words = self._error_words = ""  # of the header: a model still buffers; the shown error
         self._reported.connect(window.notices.report)
         self._rendered.connect(self._take_rendered)
-        self._sources = Sources()
+        self._sources = Sources()  # loaded presets: model and truth
         self.notes = Notes(sound, self._sources, library.find, self._reported.emit, sound.set_effects)
         self._worker = RenderWorker(
             self._hear_worker, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable
@@ -99,7 +104,7 @@ class Performance(QObject):
 
     @property
     def position_s(self) -> float:
-        """The playhead, as of `Stage.position_s`."""
+        """The playhead in s from the pluck or blow: the time in the motion that is heard now, or where it stands."""
         return self._session.stage.position_s(self._sound.mixer.output_latency_s)
 
     @property
@@ -115,7 +120,10 @@ class Performance(QObject):
 
     @property
     def match(self) -> Mapping[str, float] | None:
-        """The factor by source that brings what is chosen to the level of the truth; None: not known yet."""
+        """The factors by source that bring their levels to the truth's; None: not known yet.
+
+        They are of the latest note where it is a key of the played instrument, else of the chosen pluck.
+        """
         note = self._session.stage.note
         keys = isinstance(note, KeyNote) and self._session.choices.plays_instrument
         return note.match if note is not None and keys else self.notes.match
@@ -126,7 +134,7 @@ class Performance(QObject):
         return Moment(stage.take, self.position_s, stage.moving, elapsed_s, stage.audible)
 
     def catch_up(self, panel: Panel) -> None:
-        """Show a panel that was made late the motion that it has missed."""
+        """Give a panel that was made late the take that is shown, and its end where all of it is rendered."""
         take = self._session.stage.take
         if take is None or (panel.of_strings and self._plays_drums):
             return
@@ -143,7 +151,10 @@ class Performance(QObject):
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
-        """Move the playhead; while notes ring, one that begins there replaces them."""
+        """Move the playhead to a time in s, limited to the motion; while notes ring, one from there replaces them.
+
+        Of drums the playhead alone moves.
+        """
         if (take := self._session.stage.take) is None:
             return
         position_s = min(max(position_s, 0.0), take.seconds)
@@ -153,6 +164,10 @@ class Performance(QObject):
             self._take_turn(note)
 
     def stage_changed(self, names: frozenset[str]) -> None:
+        """Follow changes of the session; `names`: the fields of `Choices` and `Stage` that have other values.
+
+        Where another note than that of the loop leads, the turn that was handed over is dropped.
+        """
         if not names.isdisjoint(OBSERVED):
             self.choices_changed(names)
         if "request" in names:
@@ -161,7 +176,10 @@ class Performance(QObject):
             self._forget_turn()
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
+        """Apply changed fields of `Choices` to the notes; ask for another motion where another is to be shown.
+
+        The request names that motion: of the latest blow while drums are played, else of the chosen pluck.
+        """
         choices = self._session.choices
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
@@ -213,7 +231,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
-        """Forget notes that ended, continue with the loop, and update the header."""
+        """Forget notes that ended, hand over the next turn of the loop, and update the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._hand_over_turn()
@@ -232,7 +250,10 @@ class Performance(QObject):
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _hand_over_turn(self) -> None:
-        """Hand the next turn of the loop over before it begins: a note of its own, where the shown motion ends."""
+        """Hand the next turn of the loop to the mixer, ahead of time: it begins where the shown motion ends.
+
+        Where one is handed over already, wait until it sounds and make it the shown note.
+        """
         stage = self._session.stage
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
         note, take = stage.lead or stage.note, stage.take
@@ -249,6 +270,7 @@ class Performance(QObject):
             self._turn = None if next_turn is None else (note, next_turn)
 
     def _take_turn(self, note: Note) -> None:
+        """Make a note that the loop or a seek began the latest one, whose time the playhead follows."""
         self.notes.latest = note
         self._session.send(Turned(note))
 
@@ -262,7 +284,12 @@ class Performance(QObject):
             note.release_at(0)  # no frame: it is not to fade where the turn would have begun
 
     def _hear_worker(self, signal_name: str, *values: Any) -> None:
-        """Hear a signal of the render worker, in its thread."""
+        """Pass a message of the render worker to the window's thread; called in the worker's.
+
+        Args:
+            signal_name: "started" or "finished", with the take; "failed", with a message and its details;
+                "other_refused", with another preset's name and why its model cannot be rendered.
+        """
         if signal_name == "failed":
             self._rendered.emit(None, False)
             self._reported.emit(*values)
@@ -274,6 +301,7 @@ class Performance(QObject):
     # What has been rendered
 
     def _take_rendered(self, take: Take | BlowTake | None, complete: bool) -> None:
+        """Take a motion from the worker: its first block, or `complete`, all of it; None: rendering failed."""
         if take is None:
             self._show_error("")
         elif complete:
@@ -282,6 +310,7 @@ class Performance(QObject):
             self._begin(take)
 
     def _begin(self, take: Take | BlowTake) -> None:
+        """Show a take of which the first block is rendered: it grows while the panels draw it."""
         is_shown = take is self._session.stage.take
         self._session.send(Rendered(take))
         if not is_shown:
@@ -291,6 +320,10 @@ class Performance(QObject):
             self._show_error("Rendering …")
 
     def _finish(self, take: Take | BlowTake) -> None:
+        """Show the errors of the shown take, all of which is rendered now; ignore another take.
+
+        Of a drum the error is an RMSE relative to the truth, of a string a relative MAE.
+        """
         if take is not self._session.stage.take or self._session.stage.complete:
             return
         self._session.send(Rendered(take, complete=True))
@@ -309,7 +342,7 @@ class Performance(QObject):
     # Helpers
 
     def _show_error(self, words: str, growth: str = "") -> None:
-        """Show the error of the shown motion in the header, and that it grew, as far as they are known."""
+        """Show the error of the shown motion in the header; `growth`: as of `growth_words`, "" for no sign."""
         self._error_words = words
         self._show_words()
         self._window.show_growth(growth)
@@ -319,7 +352,7 @@ class Performance(QObject):
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
     def _is_of_chosen(self, take: Take | BlowTake) -> bool:
-        """Return True if a take is of the chosen pluck, or of the latest blow."""
+        """Return True if a take is of the pluck that is asked for, or of the latest blow; else it was overtaken."""
         request, entry = self._session.stage.request, self.entry
         if isinstance(take, BlowTake):
             return take.request.same_motion(request)
@@ -331,11 +364,14 @@ class Performance(QObject):
 
 
 def growth_words(errors: Sequence[float], validation_mae: float | None) -> str:
-    """The words for people that the error of a pluck has grown; "" where it has not.
+    """The sentence that reports how far the model's error on this pluck has grown; "" where it has not grown.
+
+    It has grown if the largest error is at least NOTICEABLE (1 %) and at least GROWN times `validation_mae`.
 
     Args:
-        errors: relative mean absolute errors within the training range and beyond, as far as there are.
-        validation_mae: that of the preset on validation data; None: not known.
+        errors: relative mean absolute errors (1: 100 %): within the time of training, then past its end. It may lack
+            the second, or both; NaN counts as none.
+        validation_mae: the preset's relative mean absolute error on validation data; None: not known.
     """
     largest = max((error for error in errors if not math.isnan(error)), default=0.0)
     if largest < max(NOTICEABLE, GROWN * (validation_mae or 0.0)):

@@ -54,15 +54,20 @@ class Journaling(QObject):
     def __init__(self, recorder: EventRecorder, parent: QObject) -> None:
         super().__init__(parent)
         self._recorder = recorder
-        self._journal: Journal | None = None
-        self._heard: tuple[PlayedSource, float] = ("model", 0.0)
-        self._written: tuple[PlayedSource, float] = self._heard
-        self._broken = False
+        self._journal: Journal | None = None  # None: nothing is recorded, or it could not be begun
+        self._heard: tuple[PlayedSource, float] = ("model", 0.0)  # the source now, and gain of the difference in dB
+        self._written: tuple[PlayedSource, float] = self._heard  # as the journal last had it
+        self._broken = False  # writing failed: no more is written
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
     def begin(self, recorded: datetime, meter: Meter | None) -> None:
-        """A recording has begun."""
+        """Begin the journal of a recording, and the thread that writes it.
+
+        Args:
+            recorded: when it begins.
+            meter: tempo and beats of the metronome; None: it is not counted.
+        """
         self._journal, self._broken = None, False
         self._written = ("model", 0.0)
         self._stop.clear()
@@ -75,7 +80,7 @@ class Journaling(QObject):
         self._thread.start()
 
     def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
-        """The source that is heard from now on."""
+        """Note the source that is heard from now on, and the gain of the difference in dB; the thread writes it."""
         self._heard = source, difference_gain_db
 
     def end(self) -> Journal | None:
@@ -94,6 +99,7 @@ class Journaling(QObject):
         return journal
 
     def _run(self) -> None:
+        """Write what is new every WRITE_EVERY_S, and once more at the end; the journal's thread runs this."""
         lower_priority(Rank.BACKGROUND)
         while not self._broken:
             stopped = self._stop.wait(WRITE_EVERY_S)
@@ -142,10 +148,10 @@ class Recordings(QObject):
         self._library = library
         self._notices = window.notices
         self._bar = bar = window.instrument.bar
-        self._began_s, self._began = 0.0, datetime.now().astimezone()
+        self._began_s, self._began = 0.0, datetime.now().astimezone()  # of its first beat or start; as a date
         self._metronome = Metronome(notes.sound)
         self._meter: Meter | None = None  # of the recording under way; None: it is not counted
-        self._takes: list[RecordedTake] = []
+        self._takes: list[RecordedTake] = []  # of this session, the latest last
         self._asked: RecordedTake | None = None  # for the export dialog
         self._place: tuple[Path, WavSettings] | None = None  # of the take that was saved last, its sound and format
         self._journaling = Journaling(self._keys.recorder, self)
@@ -258,7 +264,12 @@ class Recordings(QObject):
         self._reading.start(lambda job: _read_left(job.check))
 
     def _ask_about(self, journals: dict[Played, Journal], problems: list[str]) -> None:
-        """Ask about journals that were left; `problems`: why others cannot be read."""
+        """Ask whether to recover, discard or leave the recordings that an earlier run did not save.
+
+        Args:
+            journals: by recording; each is added to the takes, deleted, or closed until the next start.
+            problems: why others cannot be read, to be reported.
+        """
         for problem in problems:
             self._notices.report(problem)
         if not journals:
@@ -326,7 +337,7 @@ class Recordings(QObject):
         self.unsaved_changed.emit()
 
     def _deeds(self, take: RecordedTake) -> dict[str, Callable[[], None]]:
-        """The deeds that can be done with a take, by their words; one that is maybe being written is only played."""
+        """The commands of a take's menu, by their words; an unsaved take can only be played while one is written."""
         deeds: dict[str, Callable[[], None]] = {"Play": lambda: self.play_asked.emit(take)}
         if take.files:
             deeds["Show in folder"] = lambda: reveal(next(iter(take.files)), self._notices.report)

@@ -17,7 +17,9 @@ class SettingsSaver(QObject):
     Of two instances the one that writes last is remembered.
 
     Args:
-        current: what is to be remembered, as it is now.
+        path: of the settings' file.
+        read: the settings as they were read from it.
+        current: gives those that are to be remembered, as they are now.
     """
 
     failed = Signal(str)  # once: why the file cannot be written
@@ -25,9 +27,9 @@ class SettingsSaver(QObject):
     def __init__(self, path: Path, read: Settings, current: Callable[[], Settings], parent: QObject) -> None:
         super().__init__(parent)
         self._path, self._current = path, current
-        self._base = self._seen = read
+        self._base = self._seen = read  # as in the file; as at the last look
         self._background = Background("settings", self)
-        self._reported = False
+        self._reported = False  # `failed` was emitted
 
     def look(self) -> None:
         """Write, in the background, where the settings have changed, but not since the last look."""
@@ -44,6 +46,7 @@ class SettingsSaver(QObject):
             self._write(now)
 
     def _write(self, now: Settings) -> None:
+        """Write the settings; report a failure the first time, and try again later."""
         try:
             save_settings(self._path, now)
             self._base = now  # not where it failed: it is tried again

@@ -19,8 +19,8 @@ class SongPlayer(QObject):
         super().__init__(strip)
         self._playback, self._strip = playback, strip
         self._events: tuple[TimedEvent, ...] = ()
-        self._from_s, self._began_s = 0.0, 0.0  # where it began or stands, and when that was
-        self._plays = False
+        self._from_s, self._began_s = 0.0, 0.0  # time in the file where it began or stands; when, by `time.monotonic`
+        self._plays = False  # it was started, and has not been stopped or come to its end
         strip.play_asked.connect(self.play_or_stop)
         strip.seek_asked.connect(self.seek)
         strip.close_asked.connect(self.close)
@@ -46,6 +46,7 @@ class SongPlayer(QObject):
         self.play(0.0)
 
     def play(self, from_s: float) -> None:
+        """Play the file from a time on, in place of what was played."""
         self._from_s = from_s
         self._began_s = time.monotonic()
         self._plays = True

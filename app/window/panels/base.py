@@ -54,13 +54,13 @@ STAGE_FIELDS = {  # of `Choices`: what a picture above the decks depends on
 
 @dataclass(frozen=True)
 class Moment:
-    """The moment that is to be shown now.
+    """The moment that is to be shown now: the motion, and where in it the playhead is.
 
     Attributes:
         sounding: the pluck or the blow that is heard, or None before the first.
         position_s: the playhead, from the pluck on: the time that sounds now.
         playing: whether the playhead moves.
-        elapsed_s: since the last call of `show_moment`, by the clock.
+        elapsed_s: since the panels of the same place (stage, left or right) were shown the last moment.
         audible: whether the note of the motion rings.
     """
 
@@ -72,12 +72,12 @@ class Moment:
 
     @property
     def take(self) -> Take | None:
-        """The motion of a string."""
+        """The motion, if it is of a string; else None."""
         return self.sounding if isinstance(self.sounding, Take) else None
 
     @property
     def blow(self) -> BlowTake | None:
-        """The motion of a drum."""
+        """The motion, if it is of a drum; else None."""
         return self.sounding if isinstance(self.sounding, BlowTake) else None
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
@@ -95,7 +95,12 @@ class Moment:
 
 
 class Panel(QWidget):
-    """Subclasses set `key`, `title` and `help`, and override the methods that they need."""
+    """A view with its presenter. Subclasses set `key`, `title` and `help`, and override the methods that they need.
+
+    A take is the rendered motion and signals of one pluck (`Take`) or blow (`BlowTake`), which grows while it is
+    rendered. A source is the model, the truth, their difference or another preset's model. Slots A and B hold a
+    source each; one of them is heard.
+    """
 
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
@@ -123,11 +128,11 @@ class Panel(QWidget):
         self._cover.setWordWrap(True)
         self._cover.setAutoFillBackground(True)
         self._cover.hide()
-        self._seen_s = time.monotonic()
-        self._moments = 0
-        self._state: tuple[object, ...] = ()  # of which the picture is
-        self._growing: Take | BlowTake | None = None  # jobs rest while it is rendered
-        self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
+        self._seen_s = time.monotonic()  # of the last call of `look`
+        self._moments = 0  # shown so far
+        self._state: tuple[object, ...] = ()  # all that the drawn picture depends on; (): draw it again
+        self._growing: Take | BlowTake | None = None  # the latest take: jobs rest while it is rendered
+        self._grown = (-1, 0.0)  # frames ready of it when it last grew (-1: not looked at), and when, in s
 
     def cover(self, words: str) -> None:
         """Show these words instead of the view; "": the view again."""
@@ -149,7 +154,11 @@ class Panel(QWidget):
         raise NotImplementedError(f"{self.key}: a panel has columns(), the numbers that its menu saves")
 
     def by_heading(self, values: Mapping[str, V], unit: str) -> dict[str, V]:
-        """Values by source, by the headings that they have in files."""
+        """Copy `values`, which are by source, by the headings of columns in files; sources not shown are left out.
+
+        Args:
+            unit: of the values, as the heading has it.
+        """
         shown = shown_sources(self.session.choices, self.library)
         return {source.heading(unit): values[source.source] for source in shown if source.source in values}
 
@@ -165,7 +174,10 @@ class Panel(QWidget):
         """Take a motion when all of it is rendered, with its errors."""
 
     def show_moment(self, moment: Moment) -> None:
-        """Show a moment while the panel is visible. The string has 60 a second, the others 30, and fewer at rest."""
+        """Show a moment while the panel is visible; every `every`-th is drawn.
+
+        The panels of the stage get 60 a second, those of the decks 30, and all fewer at rest.
+        """
         self.look()
         self._moments += 1
         if self._moments % self.every == 0:
@@ -175,7 +187,7 @@ class Panel(QWidget):
         """Draw what has changed since the last moment."""
 
     def _is_new(self, *state: object) -> bool:
-        """Return True if what a picture depends on has changed since the last call."""
+        """Return True if `state`, all that the picture depends on, is not that of the last call; keep it."""
         before, self._state = self._state, state
         return state != before
 
@@ -187,7 +199,9 @@ class Panel(QWidget):
         """Start a long job in place of the one under way; `background` has its signals.
 
         Args:
-            models_of: presets whose models it runs; those of many strings need no torch.
+            work: is called with the job in the thread of `background`, and returns the result.
+            models_of: presets whose models it runs. Those of many strings need no torch. For any other it is
+                loaded, and kept to one core.
         """
 
         def on_one_core(job: Job) -> object:
@@ -211,7 +225,7 @@ class Panel(QWidget):
         self.session.update(solo=0 if mode == self.session.choices.solo else mode)
 
     def _rests(self) -> bool:
-        """Return True if jobs rest; called in their thread."""
+        """Return True if jobs rest: the panel is hidden, or a take is being rendered. Called in their thread."""
         now_s, take = time.monotonic(), self._growing
         if now_s - self._seen_s > UNSEEN_S:
             return True
@@ -223,13 +237,16 @@ class Panel(QWidget):
 
 
 class ComputedPanel(Panel):
-    """A line of words above a figure, which is computed once what it depends on has rested for `SETTLED_S`.
+    """A line of words above a figure, which is computed once what it depends on was the same for `SETTLED_S`.
 
     Attributes:
         progress: the share that is computed.
+
+    Args:
+        failed: the words where it cannot be computed; "": they stay as they are.
     """
 
-    SETTLED_S: ClassVar[float] = 0.0
+    SETTLED_S: ClassVar[float] = 0.0  # s
 
     def __init__(self, session: Session, library: Library, failed: str = "") -> None:
         super().__init__(session, library)
@@ -238,9 +255,9 @@ class ComputedPanel(Panel):
         self._words = Readout()
         self._words.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.progress = ProgressStrip(f"Progress of the {self.title.lower()}")
-        self._asked: object = None
-        self._begun = False
-        self._unchanged_s = 0.0
+        self._asked: object = None  # the latest value of `_wanted`; None: nothing is to be computed
+        self._begun = False  # computing what is asked for
+        self._unchanged_s = 0.0  # s for which it was the same, while the panel was shown
         if failed:
             self.background.failed.connect(lambda: self._say(failed))
 
@@ -253,7 +270,7 @@ class ComputedPanel(Panel):
         """All that the figure depends on; None: there is nothing to compute."""
 
     def _clear(self) -> None:
-        """Show that the figure is another one from now on."""
+        """Take the old figure away, or mark it: another one is asked for. Do nothing by default."""
 
     @abstractmethod
     def _begin(self) -> None:
@@ -268,7 +285,7 @@ class ComputedPanel(Panel):
         self._ask()
 
     def _ask(self) -> None:
-        """Ask for another figure where another is wanted."""
+        """Cancel the computation where another figure is wanted than was asked for; the new one begins later."""
         wanted = self._wanted()
         if wanted != self._asked:
             self._asked = wanted
@@ -304,10 +321,11 @@ class StagePanel(Panel):
         return tuple(source for source in sources if source.heard or self.session.choices.face != "play")
 
     def _warning(self) -> tuple[str, bool]:
-        """The reason why nothing is heard, or what is wrong with it; and True if that is a warning."""
+        """The reason why nothing is heard, "" for none; and True if it is a warning, not a remark."""
         return why_silent(self.session.choices, self.library), True
 
     def choices_changed(self, names: frozenset[str]) -> None:
+        """Show in the picture the sources, listening points and warning of the choices; `names`: as of `Panel`."""
         choices, view = self.session.choices, self.view
         if names & STAGE_FIELDS:
             view.set_plain(choices.face == "play")

@@ -71,7 +71,10 @@ COLUMNS = (
 
 
 class ComparePanel(ComputedPanel):
-    """The table, and a menu of the presets in it."""
+    """The table, and a menu of the presets in it.
+
+    A row is fresh if its figures are of the present pluck; figures of an earlier pluck are grey.
+    """
 
     SETTLED_S = 0.5  # a pluck that is still being moved is not computed
     key = "compare"
@@ -84,9 +87,9 @@ class ComparePanel(ComputedPanel):
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self._names: list[str] | None = None  # chosen by the user; None: those of the present string
-        self._rows: dict[str, ComparedRow] = {}
+        self._rows: dict[str, ComparedRow] = {}  # the latest figures, by preset
         self._menu = QMenu(self)
-        self._actions: dict[str, QAction] = {}
+        self._actions: dict[str, QAction] = {}  # of the menu, by preset
         presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
@@ -164,7 +167,7 @@ class ComparePanel(ComputedPanel):
 
     @property
     def _entries(self) -> list[PresetEntry]:
-        """The presets in the table."""
+        """The presets in the table: those that were chosen, else those of the present string."""
         if self._names is not None:
             return [entry for entry in self.library.entries if entry.name in self._names]
         present = self.library.find(self.session.choices.preset)
@@ -189,11 +192,13 @@ class ComparePanel(ComputedPanel):
         self._show()
 
     def _urgency(self, name: str) -> int:
+        """The place of a preset in the order of computing: 0 the chosen one, then those in slots A and B."""
         choices = self.session.choices
         presets_in_use = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
         return presets_in_use.index(name) if name in presets_in_use else len(presets_in_use)
 
     def _show_progress(self, share: float, _: str, row: ComparedRow | None) -> None:
+        """Show the share of the table that is done, 0 … 1, and a preset's row where one is complete, else None."""
         if row is not None:
             self._rows[row.name] = row
         self._set_computing(share)
@@ -212,6 +217,10 @@ class ComparePanel(ComputedPanel):
         )
 
     def _stop_or_go_on(self) -> None:
+        """Stop computing; or, where nothing is computed, continue with the rows that are missing.
+
+        Where none is missing, compute all again.
+        """
         if self.background.busy:
             self.background.cancel()
             self._set_computing(None)

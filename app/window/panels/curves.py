@@ -15,17 +15,17 @@ from app.window.panels.base import Panel
 
 
 class CurvesPanel(Panel):
-    """Curves in `plot` by source; drums have them too."""
+    """Curves in `plot`, one for each source that slot A or B holds; drums have them too."""
 
     of_strings = False
     every = 2
-    faint_alpha: ClassVar[int]  # of the curve that is not heard
+    faint_alpha: ClassVar[int]  # opacity of the curve that is not heard, 0 … 255
 
     def __init__(self, session: Session, library: Library, plot: Plot) -> None:
         super().__init__(session, library)
         self.plot = self.figure = plot
         self.legend = Legend(plot)
-        self._curves: dict[str, pg.PlotDataItem] = {}
+        self._curves: dict[str, pg.PlotDataItem] = {}  # by source
         plot.getPlotItem().showGrid(x=True, y=True, alpha=0.18)
         self.set_sources(DEFAULT_SOURCES)
 

@@ -20,11 +20,13 @@ from app.views.drum.ink import HeadFrame
 from app.views.drum.view import DrumView
 from app.window.panels.base import Moment, StagePanel
 
-HARDEST = 127
+HARDEST = 127  # velocity
 DRAWN = ("model", "truth", DIFFERENCE)
 
 
 class DrumPanel(StagePanel):
+    """The drum of a key. Places are (x, y) in half-lengths of the drum from its centre."""
+
     view: DrumView
     of_strings = False
     key = "drum"
@@ -40,9 +42,9 @@ class DrumPanel(StagePanel):
         self.view.struck.connect(self._strike)
         self.view.place_moved.connect(lambda x, y: self._aim((x, y)))
         self.view.place_reset.connect(self._reset_place)
-        self._key: int | None = None
-        self._shown: PlayedDrum | None = None  # whose place it is
-        self._place: Place = (0.0, 0.0)
+        self._key: int | None = None  # MIDI key of the shown drum; None: none is shown yet
+        self._shown: PlayedDrum | None = None  # the drum that `_place` is on
+        self._place: Place = (0.0, 0.0)  # where it is struck
 
     @property
     def place(self) -> Place:
@@ -65,7 +67,10 @@ class DrumPanel(StagePanel):
         return None if drums is None or self._key is None else drums.of_key(self._key)
 
     def show_key(self, key: int, place: Place | None = None) -> None:
-        """Show the drum of a key, struck at a place; None: at its own where it is another drum."""
+        """Show the drum of a MIDI key, with the mark of blows at `place`.
+
+        None: the mark stays on the same drum, and goes to the place of its own on another.
+        """
         self._key = key
         drum = self._drum
         if drum is None:
@@ -76,6 +81,7 @@ class DrumPanel(StagePanel):
         self._shown = drum
 
     def _frame(self, moment: Moment) -> HeadFrame | None:
+        """The displacement of the head now, by source; None: no blow, or one on a drum of another shape."""
         blow, choices = moment.blow, self.session.choices
         if blow is None or not self._looks_like(blow):
             return None

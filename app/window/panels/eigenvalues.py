@@ -44,8 +44,8 @@ class EigenvaluesPanel(ComputedPanel):
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library, "This preset cannot be read")
-        self._figure: PoleFigure | None = None
-        self._shown = np.zeros(0, np.int64)  # the learned points of the chosen layer
+        self._figure: PoleFigure | None = None  # None: not computed yet
+        self._shown = np.zeros(0, np.int64)  # indices of the learned points of the chosen layer
         axes, tip = [(text, key) for key, text in AXES.items()], "Frequency and decay time, or the complex plane"
         self._axes = combo_box("Axes", axes, tip=tip, picked=lambda _: self._draw())
         tip = "Which layer's eigenvalues are shown"
@@ -84,6 +84,7 @@ class EigenvaluesPanel(ComputedPanel):
             self.compute(lambda job: pole_figure(load_subject(subject)), [entry.info])
 
     def _show_figure(self, figure: PoleFigure) -> None:
+        """Show the eigenvalues that were computed, and a list of layers where there are several."""
         if self._layer.count() != figure.layers + 1:
             self._layer.clear()
             for layer in range(figure.layers):
@@ -114,6 +115,7 @@ class EigenvaluesPanel(ComputedPanel):
         return np.concatenate([self._figure.learned.mode[self._shown], self._figure.string.mode])
 
     def _draw(self, keep_view: bool = False) -> None:
+        """Draw the points of the chosen layer on the chosen axes; `keep_view`: without zooming to all of them."""
         figure, solo = self._figure, self.session.choices.solo
         if figure is None:
             self.plane.clear_points()
@@ -137,7 +139,11 @@ class EigenvaluesPanel(ComputedPanel):
         self._words.report(*(self._describe(figure, point) if figure is not None and point >= 0 else ("",)))
 
     def _describe(self, figure: PoleFigure, point: int) -> list[str]:
-        """The description of a point in several wordings, the longest first."""
+        """The description of a point in several wordings, the longest first.
+
+        Args:
+            point: index among all points that are shown, the learned ones first, as in `_modes`.
+        """
         count = len(self._shown)
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
@@ -197,10 +203,10 @@ class _Plane(Plot):
         self._ring = pg.ScatterPlotItem(symbol="o", size=21, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for layer in (self._learned, self._string, self._ring):
             item.addItem(layer)
-        self._places = np.empty((0, 2))
+        self._places = np.empty((0, 2))  # (points, 2) on the axes, the learned ones first
         self._learned_count = 0
-        self._at = -1
-        self._pressed: QPointF | None = None
+        self._at = -1  # the point that is pointed at; -1: none
+        self._pressed: QPointF | None = None  # where a mouse button went down, in pixels
 
     def clear_points(self) -> None:
         self._places, self._at = np.empty((0, 2)), -1
@@ -210,7 +216,14 @@ class _Plane(Plot):
     def show_points(
         self, learned: Array, first_layer: NDArray[np.bool_], string: Array, alone: NDArray[np.bool_] | None
     ) -> None:
-        """Places (points, 2) of both kinds; `alone`: which of all are of the soloed mode; None: no mode is soloed."""
+        """Draw the points.
+
+        Args:
+            learned, string: places on the axes, (points, 2) each.
+            first_layer: (learned points,): drawn in amber; the others are faint.
+            alone: (all points,), the learned ones first: of the soloed mode, others are dimmed. None: no mode is
+                soloed.
+        """
         self._places, self._at = np.concatenate([learned, string]), -1
         self._learned_count = len(learned)
         self._ring.setData([], [])
@@ -244,6 +257,7 @@ class _Plane(Plot):
         self.show_all()
 
     def show_all(self) -> None:
+        """Zoom so that all points are in view."""
         if not len(self._places):
             return
         item, places = self.getPlotItem(), self._places
@@ -261,6 +275,7 @@ class _Plane(Plot):
         super().mousePressEvent(event)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Take the point that was clicked; a press that moved by 4 pixels or more is a drag."""
         super().mouseReleaseEvent(event)
         pressed, self._pressed = self._pressed, None
         if event.button() == Qt.MouseButton.LeftButton and pressed is not None:
@@ -280,6 +295,7 @@ class _Plane(Plot):
             self.show_all()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Point at the next or the previous point by an arrow key; Enter takes it, Escape plays all modes."""
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))
         if step is not None and len(self._places):
             order = np.lexsort((self._places[:, 1], self._places[:, 0] if self._musical else -self._places[:, 0]))
@@ -294,7 +310,10 @@ class _Plane(Plot):
             super().keyPressEvent(event)
 
     def _nearest(self, here: QPointF) -> int:
-        """The point nearest to a place on the axes, a learned one where both lie there; -1: none is near."""
+        """The index of the point nearest to a place on the axes; -1: none is within NEAR_PIXELS.
+
+        A learned one goes before one of the string, unless that is CLOSER_PIXELS nearer.
+        """
         if not len(self._places) or math.isnan(here.x()):
             return -1
         wide, high = self.getPlotItem().vb.viewPixelSize()
@@ -303,6 +322,7 @@ class _Plane(Plot):
         return point if off[point] <= NEAR_PIXELS else -1
 
     def _point_at(self, point: int) -> None:
+        """Put the ring around a point, and report it; -1: around none."""
         if point != self._at:
             self._at = point
             at = self._places[point : point + 1] if point >= 0 else np.empty((0, 2))

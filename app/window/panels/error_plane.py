@@ -30,7 +30,7 @@ from app.window.panels.base import ComputedPanel, Moment
 from engine.pluck import Pluck
 from engine.presets import preset_digest
 
-FORM_FIELDS = frozenset({"preset", "string", "shape", "width"})  # other ones are another map
+FORM_FIELDS = frozenset({"preset", "string", "shape", "width"})  # where one of these changes, so does the map
 MOST_KEPT = 64  # planes of some 13 KB
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
 SMOOTHER = 4  # pixels of the picture to a step of the finest grid
@@ -59,8 +59,8 @@ class ErrorPlanePanel(ComputedPanel):
         self.map = self.figure = _Map()
         self.map.pointed.connect(self._show_values)
         self.map.taken.connect(self._audition)
-        self._picture: PlanePicture | None = None
-        self._moved = False  # the pluck's mark is of choices that have changed since
+        self._picture: PlanePicture | None = None  # errors so far; None: none
+        self._moved = False  # the pluck has moved since its ring was drawn
         self._planes = _Planes()
         self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(self._show_finished)
@@ -127,6 +127,7 @@ class ErrorPlanePanel(ComputedPanel):
         return Columns({"position": positions, "amplitude (mm)": amplitudes_mm, "MAE (of the truth)": error})
 
     def _show_values(self, position: float, amplitude_mm: float) -> None:
+        """Write the error at a pluck above the map; a position of NaN: nothing is pointed at."""
         if self._picture is None or math.isnan(position):
             self._words.report("")
             return
@@ -145,6 +146,10 @@ class _Planes:
         self._known: dict[tuple[object, ...], ErrorPlane] = {}
 
     def compute(self, subject: Subject, pluck: Pluck, job: Job) -> PlanePicture:
+        """Compute what the plane of a preset and a form of pluck still lacks; return all of its errors.
+
+        The latest MOST_KEPT planes are kept.
+        """
         preset = load_subject(subject)
         key = (preset_digest(preset.path), string_of(subject), *_pluck_form(pluck))
         plane = self._known.pop(key, None) or ErrorPlane()
@@ -155,15 +160,18 @@ class _Planes:
 
 
 def _pluck_form(pluck: Pluck) -> tuple[object, ...]:
-    """The properties that a plane belongs to beside its preset: shape and width, where there is one."""
+    """The form of a pluck, which a plane belongs to: its shape and its width; None: a triangle has no width."""
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
 
 
 class _Map(Plot):
-    """The picture with its colour bar, the trained range, the present pluck and a cursor."""
+    """The picture with its colour bar, the trained range, the present pluck and a cursor.
+
+    The axes are the pluck's position (0 … 1) and log₁₀ of its amplitude in mm; colours are log₁₀ of the error.
+    """
 
     pointed = Signal(float, float)  # position, amplitude in mm; NaN: nowhere
-    taken = Signal(float, float)
+    taken = Signal(float, float)  # the same, to be plucked
     KEPT_KEYS = (*ENTER_KEYS, Qt.Key.Key_Escape)
 
     def __init__(self) -> None:
@@ -203,14 +211,16 @@ class _Map(Plot):
         self._cursor = pg.ScatterPlotItem(symbol="+", size=15, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for thing in (self._pluck, self._cursor):
             item.addItem(thing)
+        # positions of the training, and the amplitudes in mm by position; None: not known yet
         self._trained: tuple[Range, Callable[[float], Range]] | None = None
-        self._present = (0.35, 4.0)
-        self.cursor: tuple[float, float] | None = None
+        self._present = (0.35, 4.0)  # the pluck that is chosen: position, amplitude in mm
+        self.cursor: tuple[float, float] | None = None  # position, amplitude in mm; None: nowhere
 
     def _take_theme(self) -> None:
         self._bar.setColorMap(share_map())
 
     def show_picture(self, picture: PlanePicture | None) -> None:
+        """Draw the errors, log₁₀ as colours; None: draw none."""
         if picture is None:
             self._image.clear()
             return
@@ -225,7 +235,12 @@ class _Map(Plot):
         self._pluck.setData([position], [math.log10(held_mm)])
 
     def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
-        """Set the training range: positions, None for a model trained on noise, and the amplitudes at each."""
+        """Set the training range, whose outline is drawn.
+
+        Args:
+            position: lowest and highest; None: a model trained on noise has none, so all are within.
+            amplitudes_mm: the least and the largest amplitude at a position.
+        """
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
         self._trained = ((left, right), amplitudes_mm)
         places = np.linspace(left, right, OUTLINE)
@@ -250,6 +265,7 @@ class _Map(Plot):
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move the cursor by a point of the grid with an arrow key; Enter plucks there, Escape hides the cursor."""
         step = {
             Qt.Key.Key_Left: (-1, 0),
             Qt.Key.Key_Right: (1, 0),
@@ -270,7 +286,7 @@ class _Map(Plot):
             super().keyPressEvent(event)
 
     def _pluck_at(self, at: QPointF) -> tuple[float, float] | None:
-        """The pluck that a place on the axes stands for, None beside the map."""
+        """The position and the amplitude in mm at a place on the axes; None: it is outside the map."""
         if math.isnan(at.x()) or not self._area.contains(at):  # which holds NaN, in Qt's arithmetic
             return None
         position = min(max(at.x(), float(POSITIONS[0])), float(POSITIONS[-1]))
@@ -278,6 +294,7 @@ class _Map(Plot):
         return position, amplitude_mm
 
     def _point_at(self, at: tuple[float, float] | None) -> None:
+        """Move the cursor to a position and an amplitude in mm; None: hide it."""
         self.cursor = at
         if at is None:
             self._cursor.setData([], [])

@@ -22,17 +22,20 @@ from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
 from engine.compare.relative import ErrorWindows
 
-LONG_S = 10.0
+LONG_S = 10.0  # that the button renders
 QUANTITIES = (
     ("relative", "MAE and RMSE", "Relative to the truth, over all of the string, in windows of two periods"),
     ("level", "Level", "Level of the model relative to the truth, in dB"),
 )
-LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # motions are kept in single precision, about 1e-7
+LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # log₁₀ of errors; motions are kept in single precision, about 1e-7
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
 class ErrorTimePanel(TimePanel[ErrorWindows]):
-    """The axis grows with the curves by decades."""
+    """Errors over time: relative ones as log₁₀, on an axis that grows by decades, or the model's level in dB.
+
+    Dotted lines are the preset's stored errors in validation, as far as the end of the trained time.
+    """
 
     of_strings = False
     key = "error_time"
@@ -61,9 +64,9 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         dotted = {name: pg.mkPen(colours[name], width=1, style=Qt.PenStyle.DotLine) for name in ("rmse", "mae")}
         self._stored = {name: item.plot(pen=pen) for name, pen in dotted.items()}
         self._legend = item.addLegend(offset=(-8, 4))
-        self._stored_errors: dict[str, float] = {}
+        self._stored_errors: dict[str, float] = {}  # relative, "rmse" and "mae" of validation, as far as known
         self._measured: tuple[str, ...] = ("rmse", "mae")  # of a drum there is no mean of absolute errors
-        self._range: tuple[float, float] | None = None
+        self._range: tuple[float, float] | None = None  # ends of the axis: log₁₀ of errors, or dB; None: not set
         theme.changes.theme_changed.connect(self._show_legend)
         self.quantities.chosen.connect(self._choose)
         self._lay_out(self.quantities, self.longer)
@@ -74,6 +77,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
             self.longer.setEnabled(self.session.choices.seconds < LONG_S)
 
     def take_started(self, take: Take | BlowTake) -> None:
+        """Clear the curves, and draw the preset's errors in validation as dotted lines; a drum has none."""
         super().take_started(take)
         self._measured = ("rmse",) if isinstance(take, BlowTake) else ("rmse", "mae")
         self._stored_errors = {}  # the model was validated on no drum
@@ -102,7 +106,12 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
             )
 
     def show_curves(self, time_s: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> None:
-        """Relative errors "rmse" and perhaps "mae", and "level_db", (windows,) each at `time_s`."""
+        """Draw the curves of the chosen quantity.
+
+        Args:
+            time_s: the middles of the windows, (windows,).
+            curves: (windows,) each: relative errors "rmse" and, of a string, "mae"; "level_db".
+        """
         if self._level:
             levels = {"level_db": curves["level_db"]}
         else:
@@ -134,6 +143,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         return self.quantities.key == "level"
 
     def _choose(self) -> None:
+        """Show the curves of the chosen quantity alone, on an axis of its own."""
         for name, curve in self._curves.items():
             curve.setVisible((name == "level_db") == self._level)
         for line in self._stored.values():
@@ -144,7 +154,13 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._show_legend()
 
     def _fit(self, curves: list[NDArray[np.float64]]) -> None:
-        """Widen the axis to whole decades, or a span in dB, around what is shown."""
+        """Widen the axis to whole decades, or a span in dB, around what is shown.
+
+        For one take and quantity it never becomes narrower.
+
+        Args:
+            curves: (windows,) each, in the axis's unit: log₁₀ of relative errors, or dB.
+        """
         finite = [values[np.isfinite(values)] for values in curves]
         values = np.concatenate([*finite, self._always_in_view()])
         if self._level:
@@ -162,12 +178,14 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
             self.plot.ticks.set(None if self._level else _decades(*limits), _between_decades(*limits))
 
     def _always_in_view(self) -> NDArray[np.float64]:
+        """The values that the axis always holds: 0 dB; or log₁₀ of 1 %, of 100 % and of the stored errors."""
         if self._level:
             return np.zeros(1)
         levels = [math.log10(value) for value in self._stored_errors.values() if value > 0]
         return np.array([-2.0, 0.0, *levels])
 
     def _show_legend(self) -> None:
+        """Name the curves of relative errors in the legend, and write the stored ones above the plot."""
         measured = () if self._level else self._measured
         self._legend.clear()
         self._legend.setLabelTextColor(theme.FAINT)
@@ -183,6 +201,7 @@ def percent(error: float) -> str:
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:
+    """The ticks of whole decades from `low` to `high`, log₁₀ of errors: each with its words in %."""
     return [(d, f"{100 * 10.0**d:.{max(0, -2 - d)}f} %") for d in range(math.ceil(low), math.floor(high) + 1)]
 
 

@@ -76,8 +76,8 @@ class PartialsPanel(ComputedPanel):
         self.table.row_clicked.connect(self._choose)
         self.table.row_entered.connect(self._choose)
         self.table.escaped.connect(lambda: self.solo(0))
-        self._complete: Take | None = None
-        self._rows: dict[str, list[PartialRow]] | None = None
+        self._complete: Take | None = None  # the present take, once all of it is rendered
+        self._rows: dict[str, list[PartialRow]] | None = None  # by window of time, of WINDOWS; None: not measured yet
         self.background.progressed.connect(self.progress.show_share)
         self.background.finished.connect(self._show_measured)
         lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
@@ -115,6 +115,7 @@ class PartialsPanel(ComputedPanel):
         self._show()
 
     def _show(self) -> None:
+        """Show the rows of the chosen window of time; grey rows could not be measured, and say why."""
         if self._rows is None:
             return
         window = str(self._window.currentData())

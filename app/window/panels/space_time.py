@@ -23,7 +23,7 @@ from app.window.panels.time_panel import TimePanel
 
 MM = 1000.0
 GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
-AUTO = 0  # the largest of them that keeps the typical displacement within the scale
+AUTO = 0  # stands for the largest gain that keeps the typical displacement within the scale
 QUANTITIES = (
     ("model", "Model", "Displacement of the model"),
     ("truth", "Truth", "Displacement of the truth"),
@@ -61,10 +61,10 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self.gains = combo_box("Gain of the colours", gains, AUTO, tip, self._choose_gain)
         self.gains.setMinimumContentsLength(12)
         self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
-        self._gain = {"displacement": AUTO, "error": AUTO}
-        self._typical_mm = 1.0
-        self._full_scale_mm = 1.0
-        self._picture: Picture | None = None
+        self._gain = {"displacement": AUTO, "error": AUTO}  # chosen: of GAINS, or AUTO
+        self._typical_mm = 1.0  # 1.5-fold median, over the times in view, of the string's peak
+        self._full_scale_mm = 1.0  # displacement at the end of the colours at a gain of 1: the pluck's amplitude
+        self._picture: Picture | None = None  # what is drawn; None: nothing
         item = self.plot.getPlotItem()
         item.setYRange(0, 1, padding=0)
         self.plot.label.set("position")
@@ -78,8 +78,8 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._bar.axis.enableAutoSIPrefix(False)
         self._bar.axis.setLabel("mm")
         self._bar.setImageItem(self._image, insert_in=item)
-        self._signed = True
-        self._map_shown = ("displacement", True)
+        self._signed = True  # colours have the sign; False: magnitudes
+        self._map_shown = ("displacement", True)  # the kind and sign that the colours are of
         theme.changes.theme_changed.connect(self._take_theme)
         self.quantities.chosen.connect(self._choose_quantity)
         self.plot.pointed.connect(lambda _, place: session.move_listening_point(min(max(place, 0.0), 1.0)))
@@ -110,6 +110,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         return figures
 
     def _draw(self, figures: Envelopes) -> None:
+        """Draw the times in view, where the view has changed or more is ready; show how fine the picture is."""
         quantity = self.quantities.key
         times_s = self.plot.times_s
         columns = self.plot.columns
@@ -144,17 +145,23 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         return [] if here_m is None else self._wordings(time_s, place, here_m)
 
     def _wordings(self, time_s: float, place: float, here_m: float) -> list[str]:
-        """The displacement that is drawn there, in the unit of the colour bar."""
+        """The time, the place and the displacement drawn there in the colour bar's unit; a long and a short wording.
+
+        Args:
+            place: share of the string's length, 0 … 1.
+        """
         factor, unit = readable_unit(self.scale_mm / MM, "displacement")
         value_words = f"{factor * here_m:+.4g} {unit}" if self._signed else f"peak {factor * here_m:.4g} {unit}"
         return [f"{time_s:.4f} s   position {place:.2f}   {value_words}", value_words]
 
     @property
     def _fitting_gain(self) -> int:
+        """The gain of AUTO: the largest with which the typical displacement is within the scale; at least 1."""
         return max((gain for gain in GAINS if gain * self._typical_mm <= self._full_scale_mm), default=GAINS[0])
 
     @property
     def _kind(self) -> str:
+        """The key of `_gain`: model and truth share the one of displacement."""
         return "error" if self.quantities.key == "error" else "displacement"
 
     def _take_theme(self) -> None:
@@ -169,6 +176,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._show_scale()
 
     def _show_scale(self) -> None:
+        """Fit colours, colour bar and the words of the automatic gain to the present scale."""
         if self._map_shown != (self._kind, self._signed):
             self._map_shown = (self._kind, self._signed)
             self._take_theme()
@@ -191,7 +199,7 @@ def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
 
 
 def _captions(image: Picture) -> list[str]:
-    """The caption of a column's content, in words and in fewer."""
+    """The caption that states what a column of the image holds, the longer wording first."""
     column_ms = 1000 * (image.stop_s - image.start_s) / image.displacement_m.shape[1]
     return {
         "frames": ["every frame"],

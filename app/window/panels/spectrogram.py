@@ -24,7 +24,7 @@ from app.views.plots.colour_maps import level_map
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
 
-ROWS = 320
+ROWS = 320  # of the picture, over frequency
 MOST_COLUMNS = 600  # drawn in one call, so that a panel that is opened late catches up in short steps
 QUANTITIES = (
     ("model", "Model", "Sound of the model"),
@@ -58,12 +58,12 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
             "Range of levels below full scale, the same for every source",
         )
         self.ranges = combo_box("Dynamic range", ranges, 90, tip, lambda _: self._choose_range())
-        self._rows: FrequencyRows | None = None
-        self._levels_db = np.zeros((0, ROWS), np.float32)  # of the columns drawn so far
-        self._pixels = np.zeros((0, ROWS), np.uint8)
-        self._drawn = 0  # columns
-        self._hop_s = 1.0
-        self._highest_hz = 8000.0
+        self._rows: FrequencyRows | None = None  # bins to rows; None: nothing is drawn yet
+        self._levels_db = np.zeros((0, ROWS), np.float32)  # (columns, rows); filled as far as drawn
+        self._pixels = np.zeros((0, ROWS), np.uint8)  # (columns, rows): 0 is the range's end, 255 is 0 dB
+        self._drawn = 0  # columns so far
+        self._hop_s = 1.0  # time from a column to the next
+        self._highest_hz = 8000.0  # top of the axis: half the take's rate
         item = self.plot.getPlotItem()
         self.plot.label.set("frequency (Hz)", "Hz")
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
@@ -86,7 +86,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         return int(self.ranges.currentData())
 
     def frequency_hz(self, height: float) -> float:
-        """The frequency at a place on the vertical axis."""
+        """The frequency at a place on the vertical axis: log₁₀ of Hz where it is logarithmic, else Hz."""
         return 10**height if self.logarithmic else height
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -109,6 +109,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         return figures.listened is take.listened
 
     def _draw(self, figures: Spectrogram) -> None:
+        """Draw the next MOST_COLUMNS at most; begin the picture again for another take, source or axis."""
         if figures.ready == 0:
             return  # the picture before stays until there is something new
         if self._is_new(figures, self.quantities.key, self.logarithmic):
@@ -130,13 +131,16 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._image.clear()
 
     def show_columns(self, levels_db: NDArray[np.float32]) -> None:
-        """Draw the next levels (columns, rows)."""
+        """Draw the next levels in dB, (columns, rows), to the right of those drawn."""
         first, self._drawn = self._drawn, self._drawn + len(levels_db)
         self._levels_db[first : self._drawn] = levels_db
         self._colour(first)
 
     def _colour(self, first: int) -> None:
-        """Colour the levels from a column on. A line says so where all are below the range, and nothing is seen."""
+        """Colour the levels from column `first` to the last drawn.
+
+        Where all drawn so far are below the range, so that nothing is seen, the readout reports it.
+        """
         share = self._levels_db[first : self._drawn] / self.range_db + 1
         self._pixels[first : self._drawn] = np.clip(share, 0, 1) * 255
         if self._drawn:
@@ -177,6 +181,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._colour(0)
 
     def _heights(self) -> tuple[float, float]:
+        """The ends of the vertical axis, lowest first: log₁₀ of Hz where it is logarithmic, else Hz."""
         if self.logarithmic:
             return math.log10(LOWEST_HZ), math.log10(self._highest_hz)
         return 0.0, self._highest_hz

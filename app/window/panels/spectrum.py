@@ -27,9 +27,9 @@ from app.views.plots.spectrum_plot import SpectrumPlot
 from app.window.panels.base import LEAST_HEIGHT, Moment
 from app.window.panels.curves import CurvesPanel
 
-FLOOR_DB, CEILING_DB = -130.0, 0.0
-WINDOW_S = 0.18
-COLUMNS = 480
+FLOOR_DB, CEILING_DB = -130.0, 0.0  # levels below the floor are drawn there; the top of the axis
+WINDOW_S = 0.18  # about the length of the analysed window
+COLUMNS = 480  # points of a curve
 PADDING = 4  # length of the transform, in windows
 AREA_STEP = 3  # columns to a point of the filled area
 
@@ -47,17 +47,18 @@ class Analyser:
 
     @property
     def window_frames(self) -> int:
-        """The power of two nearest to `WINDOW_S`."""
+        """The length of the window: about `WINDOW_S`, rounded to a power of two of frames."""
         return 2 ** round(math.log2(WINDOW_S * self.rate_hz))
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """The middles (COLUMNS,) of the columns."""
+        """The middles of the columns in Hz, (COLUMNS,), rising."""
         edges = np.geomspace(self.lowest_hz, min(self.highest_hz, self.rate_hz / 2), COLUMNS + 1)
         return np.sqrt(edges[1:] * edges[:-1])
 
     @cached_property
     def _window(self) -> NDArray[np.float32]:
+        """The Hann window, (window_frames,), scaled so that a full-scale sine has the magnitude 1."""
         window = np.hanning(self.window_frames)
         return (window * 2 / window.sum()).astype(np.float32)
 
@@ -67,7 +68,11 @@ class Analyser:
         return FrequencyRows(bins, bin_hz, COLUMNS, self.lowest_hz, True, self.highest_hz)
 
     def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
+        """Levels in dB, (COLUMNS,), of the first `window_frames` of a signal; a shorter one is padded with zeros.
+
+        Args:
+            signal: (frames,), in units of full scale.
+        """
         frames = self.window_frames
         block = np.zeros(frames, np.float32)
         block[: min(frames, len(signal))] = signal[:frames]
@@ -97,8 +102,9 @@ class SpectrumPanel(CurvesPanel):
     def __init__(self, session: Session, library: Library) -> None:
         # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
-        self._area_of: str | None = None
-        self._levels: dict[str, tuple[Analyser, NDArray[np.float32]]] = {}  # by source, each of a rate of its own
+        self._area_of: str | None = None  # slot B's source; None: nothing is filled
+        # by source, each of a rate of its own; levels in dB, (COLUMNS,)
+        self._levels: dict[str, tuple[Analyser, NDArray[np.float32]]] = {}
         super().__init__(session, library, SpectrumPlot())
         self.setMinimumHeight(LEAST_HEIGHT)
         tip = "How far below full scale the axis reaches, the same for every source"
@@ -111,7 +117,7 @@ class SpectrumPanel(CurvesPanel):
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
-        self._partials_hz = np.zeros(0)
+        self._partials_hz = np.zeros(0)  # (modes,), of the take at rest, rising
         self._rate_hz = 16_000  # the highest of what is drawn
         self._fit()
         self.plot.hovered.connect(lambda height, _: self.point_at(10**height))
@@ -129,6 +135,7 @@ class SpectrumPanel(CurvesPanel):
         self.plot.label.set(level_words(take.pickup), "dB")
 
     def _draw_moment(self, moment: Moment) -> None:
+        """Draw the spectra at the playhead of all sources in the slots; clear those not rendered or out of view."""
         take, choices = moment.sounding, self.session.choices
         if take is None or not self._is_new(*moment.standing(choices), self.plot.view_range):
             return
@@ -144,6 +151,11 @@ class SpectrumPanel(CurvesPanel):
         self._show_readout()
 
     def _draw(self, signal: HeardSignal, position_s: float, full_scale: float) -> None:
+        """Draw the spectrum of the window that begins at the playhead, or earlier where the signal ends.
+
+        Args:
+            full_scale: the signal's value at 0 dB, in its unit.
+        """
         analyser = analyser_at(signal.rate_hz, *self.plot.view_hz)
         last_window = signal.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
@@ -221,6 +233,7 @@ class SpectrumPanel(CurvesPanel):
         return wordings[0]
 
     def _fit(self) -> None:
+        """Set the axes: frequency as far as half the rate, levels as far down as the chosen range."""
         self.plot.set_ends(math.log10(LOWEST_HZ), math.log10(self._rate_hz / 2))
         self.plot.getPlotItem().setYRange(CEILING_DB - self.range_db, CEILING_DB, padding=0)
 
@@ -230,6 +243,6 @@ class SpectrumPanel(CurvesPanel):
 
 
 def note_words(frequency_hz: float) -> str:
-    """The nearest note of equal temperament, and the interval from it in cents."""
+    """The nearest note of equal temperament (A4 at 440 Hz), and the interval from it in cents."""
     key = 69 + 12 * math.log2(frequency_hz / 440)
     return f"{note_name(round(key))} {round(100 * (key - round(key))):+d} cents"

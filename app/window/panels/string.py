@@ -29,12 +29,14 @@ from engine.pluck import SHAPES, Pluck
 from engine.presets import outside_training
 
 MM = 1000.0
-WIDTH_STEP = 1.05  # of a wheel notch
+WIDTH_STEP = 1.05  # factor of the pluck's width for a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
 PLUCK_FIELDS = {"preset", "string", "pluck"}
 
 
 class StringPanel(StagePanel):
+    """The string and its pluck. Positions are shares of the string's length, 0 … 1; displacements are in mm."""
+
     view: StringView
     key = "string"
     title = "String"
@@ -52,8 +54,8 @@ class StringPanel(StagePanel):
         self.view.width_stepped.connect(self._step_width)
         self.view.shape_stepped.connect(self._step_shape)
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
-        self._envelope: Envelope | None = None
-        self._take: Take | None = None  # of this pluck, once it is complete
+        self._envelope: Envelope | None = None  # extremes within the last second of the take; None: no take yet
+        self._take: Take | None = None  # of this pluck, once all of it is rendered
         self._judged: Listened | None = None  # the signals for which the warning was last set
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -75,6 +77,7 @@ class StringPanel(StagePanel):
         super().show_moment(moment)
 
     def _frame(self, moment: Moment) -> StringFrame | None:
+        """The shapes of the string now, by source, in slow motion; None: nothing is rendered."""
         choices, take = self.session.choices, moment.take
         if take is None:
             return None
@@ -96,6 +99,7 @@ class StringPanel(StagePanel):
             self.view.set_warning(*self._warning())
 
     def _show_pluck(self) -> None:
+        """Draw the chosen pluck, and the range of plucks that its preset was trained on."""
         choices, pluck = self.session.choices, self.session.choices.pluck
         entry = self.library.find(choices.preset)
         shape_mm = pluck.displacement(SHAPE_POINTS) * MM
@@ -107,6 +111,10 @@ class StringPanel(StagePanel):
         self.view.set_trained(trained)
 
     def _warning(self) -> tuple[str, bool]:
+        """The reason why the pluck is silent, or how it lies outside the training; and True if it is a warning.
+
+        "" stands for neither.
+        """
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
         silent = super()._warning()[0]
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:

@@ -41,9 +41,12 @@ def keep_up(growing: Growing, job: Job) -> None:
 
 
 class TimePanel(Panel, Generic[G]):
-    """Small controls and a readout above a plot. What is computed is begun when the panel is visible."""
+    """Small controls and a readout above a plot over time. What is computed is begun when the panel is visible.
 
-    every = 3
+    `G` is the type of what a subclass computes from a take, its figures: numbers that are ready as far as rendered.
+    """
+
+    every = 3  # 10 pictures a second
 
     def __init__(self, session: Session, library: Library, plot: TimePlot) -> None:
         super().__init__(session, library)
@@ -51,7 +54,7 @@ class TimePanel(Panel, Generic[G]):
         self.readout = Readout()
         self.plot.seek_asked.connect(self.seek_asked)
         self.plot.hovered.connect(self._hover)
-        self._made: G | None = None
+        self._made: G | None = None  # the figures of the shown take; None: not begun
 
     def _lay_out(self, *controls: QWidget) -> None:
         lay_out_view(self, controls, self.readout, (), self.plot, gap=0)
@@ -66,14 +69,19 @@ class TimePanel(Panel, Generic[G]):
 
     @abstractmethod
     def _draw(self, figures: G) -> None:
-        """Show the figures as far as it is ready."""
+        """Draw the figures as far as they are ready."""
 
     @abstractmethod
     def _words(self, figures: G, time_s: float, place: float) -> Iterable[str]:
-        """The words for a point, in one or more wordings, the longest first; none where nothing is."""
+        """The words for a point of the plot, in one or more wordings, the longest first; none where nothing is.
+
+        Args:
+            time_s: from the pluck or blow.
+            place: on the vertical axis, in the plot's own units.
+        """
 
     def _is_of(self, figures: G, take: Sounding) -> bool:
-        """Return True if it shows the take as it is heard now."""
+        """Return True if figures are of the take as it is heard now; else they are begun again."""
         return True
 
     def take_started(self, take: Take | BlowTake) -> None:
@@ -88,6 +96,7 @@ class TimePanel(Panel, Generic[G]):
         super().show_moment(moment)
 
     def _draw_moment(self, moment: Moment) -> None:
+        """Draw the figures of the moment's take, begun here where there are none of it yet."""
         take = moment.take if self.of_strings else moment.sounding
         if take is None:
             return

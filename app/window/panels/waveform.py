@@ -30,11 +30,11 @@ class _Drawn:
     """A signal as far as it has been read."""
 
     origin: HeardSignal
-    ready: int = 0
-    peak: float = 0.0
+    ready: int = 0  # frames read so far
+    peak: float = 0.0  # largest magnitude of these, in m or m/s
 
     def catch_up(self) -> bool:
-        """Read on, MOST_FRAMES at most; whether there was something to read."""
+        """Read the next MOST_FRAMES at most; return True if there were any."""
         new = self.origin.read(self.ready, self.ready + MOST_FRAMES)
         self.ready += len(new)
         self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
@@ -59,10 +59,10 @@ class WaveformPanel(CurvesPanel):
         super().__init__(session, library, TimePlot("Waveform", tip))
         self.plot.seek_asked.connect(self.seek_asked)
         self.plot.horizon.label.setPosition(0.1)  # the legend has the upper edge
-        self._take: Sounding | None = None
-        self._period_s = 0.0  # of its string; 0: not known
-        self._drawn: dict[str, _Drawn] = {}
-        self._full = 0.0  # of the axis, in m or m/s
+        self._take: Sounding | None = None  # the shown take
+        self._period_s = 0.0  # of the take's fundamental; 0: no take yet
+        self._drawn: dict[str, _Drawn] = {}  # by source
+        self._full = 0.0  # the end of the vertical axis, in m or m/s; 0: not known yet
         self.set_scale(5.0, "displacement", "mm")
         lay_out_alone(self, self.plot)
 
@@ -81,6 +81,7 @@ class WaveformPanel(CurvesPanel):
         super().show_moment(moment)
 
     def _draw_moment(self, moment: Moment) -> None:
+        """Read on and draw, where more is rendered, or sources or view have changed."""
         take = self._take
         if take is None:
             return
@@ -90,9 +91,9 @@ class WaveformPanel(CurvesPanel):
             self._draw(take)
 
     def _follow(self, take: Sounding) -> bool:
-        """Read on what the slots hold; a signal that is new from its start.
+        """Read the next frames of the signals in the slots; of a new signal the first ones.
 
-        Whether there was anything to read: there may be more.
+        Return True if there were any: there may be more.
         """
         choices, has_grown = self.session.choices, False
         before, self._drawn = self._drawn, {}
@@ -109,6 +110,7 @@ class WaveformPanel(CurvesPanel):
         return has_grown
 
     def _draw(self, take: Sounding) -> None:
+        """Draw the frames that were read; the axis grows with the peak of what is drawn."""
         peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)
