@@ -23,7 +23,7 @@ from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 from training.heard_words import heard_sentence, heard_word
 
 Floats = NDArray[np.floating]
-_Truths = dict[tuple[object, ...], Floats]  # modal amplitudes, by string and rate
+_Truths = dict[tuple[object, ...], Floats]  # amplitudes (frames, modes) in m, by string, rate, modes and grid points
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
@@ -52,7 +52,8 @@ class ComparedRow:
     Attributes:
         mse, mae: relative, over the whole string and the trained horizon.
         past_mse, past_mae: of all that comes after it; infinite where the output ran away.
-        heard: at the first listening point, through the pick-up.
+        heard: the audible difference from the truth at the first listening point, through the pick-up; None also of a
+            pluck that is too short for it.
         null_db: null depth of the displacement at the listening point over the whole pluck: the level of model minus
             truth relative to the truth's.
         real_time: seconds of motion of the whole string that one core renders in a second.
@@ -137,23 +138,37 @@ def _true_amplitudes(truths: _Truths, plucked: NoteSound, info: PresetInfo, job:
 def _compare_one(
     entry: PresetEntry, plucked: NoteSound, truths: _Truths, before: float, share: float, job: Job
 ) -> ComparedRow:
+    """Render one preset's model, compare it with the truth, and return its row.
+
+    Where the model runs away, the frames from there on count as infinitely wrong, and a note gives the time.
+
+    Args:
+        entry: the preset, as the library lists it.
+        plucked: the pluck, on the string of this preset.
+        truths: the true motions computed so far; the one of this string is added where it is missing.
+        before: the share of the whole comparison, 0 … 1, that was done before this preset.
+        share: the share of the whole comparison that this preset takes.
+
+    Raises:
+        Cancelled: the job was cancelled.
+    """
     preset = plucked.load()
     info = preset.info
     source = ModelSource(preset)
-    share /= 2  # the other half is listening
+    share /= 2  # for the motion; `_audible` takes the other half
     job.check()
     true = _true_amplitudes(truths, plucked, info, job)
     synthesis = synthesis_matrix(info.grid_points, info.modes).astype(np.float32)
     ear = listening_weights(np.array(plucked.ear.points[:1]), info.grid_points).astype(np.float32)
     steps = len(true)
-    string, sound = ErrorSums(steps), ErrorSums(steps)
-    first = 0
-    work_s = 0.0
+    string, sound = ErrorSums(steps), ErrorSums(steps)  # of the whole string; of its first listening point
+    first = 0  # frames done
+    work_s = 0.0  # processor seconds that the model took for them
     note = ""
     try:
         source.advance(source.start(_initial(plucked, info)), WARM_UP_FRAMES)
         for predicted, spent_s in _frames(source, plucked, info, job):
-            block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
+            block = (true[first : first + predicted.shape[1]] @ synthesis)[None]  # the truth's, as `predicted`
             predicted = predicted.astype(np.float32)
             string.add(predicted, block, first)
             sound.add(predicted @ ear, block @ ear, first)
@@ -184,7 +199,11 @@ def _compare_one(
 
 
 def _audible(preset: Preset, plucked: NoteSound, before: float, share: float, job: Job) -> Audible | None:
-    """The difference that an ear finds; None of a pluck that is too short for it."""
+    """The audible difference of a preset's model from the truth; None where the pluck is too short to be judged.
+
+    Args:
+        before, share: of the whole comparison, 0 … 1: what was done before, and what this takes.
+    """
     from training.heard import listen_to  # and SciPy, 60 MB which a window need not have
 
     with suppress(ValueError):
@@ -196,7 +215,7 @@ def _audible(preset: Preset, plucked: NoteSound, before: float, share: float, jo
 
 
 def _frames(source: StringSource, plucked: NoteSound, info: PresetInfo, job: Job) -> Iterator[tuple[Floats, float]]:
-    """Blocks (1, frames, grid_points) in m, and the processor seconds that each took."""
+    """Blocks of a pluck's motion, (1, frames, grid_points) in m, and the processor seconds that each took."""
     state = source.start(_initial(plucked, info))
     steps = max(1, round(plucked.seconds * info.rate_hz))
     for first in range(0, steps, FRAMES_AT_ONCE):
@@ -207,4 +226,5 @@ def _frames(source: StringSource, plucked: NoteSound, info: PresetInfo, job: Job
 
 
 def _initial(plucked: NoteSound, info: PresetInfo) -> NDArray[np.float64]:
+    """The displacement at the release, (1, grid_points) in m, made of the preset's modes alone."""
     return project(plucked.pluck.displacement(info.grid_points), info.modes)[None]

@@ -24,8 +24,8 @@ from engine.sources import TruthSource, array_model
 SMALLEST_AMPLITUDE_MM = 0.5
 STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
 FINEST = (49, 33)  # positions, amplitudes: each a multiple of the coarsest stride plus one
-PLUCKS_AT_ONCE = 4
-FRAMES_AT_ONCE = 1000
+PLUCKS_AT_ONCE = 4  # computed together, as one batch
+FRAMES_AT_ONCE = 1000  # of a batch, between two looks at whether the job is cancelled
 SUBSTEP_DIVISOR = (
     4  # the truth takes a quarter of its default sub-steps: an error of 1e-5, far below any that is shown
 )
@@ -82,6 +82,7 @@ class ErrorPlane:
 
     @property
     def _share(self) -> float:
+        """The share of the finest grid's points that are known, 0 … 1."""
         return float((~np.isnan(self.error)).mean())
 
     def compute(self, preset: Preset, pluck: Pluck, job: Job) -> PlanePicture:
@@ -122,10 +123,12 @@ def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
     truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // SUBSTEP_DIVISOR))
 
     def errors(plucks: list[Pluck], job: Job) -> Array:
+        """Relative MAEs (plucks,) of the model; the job's cancelling ends it."""
+        # (plucks, grid_points) in m
         initial = project(np.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
         state = model.encode((initial / info.scale_m).astype(np.float32))
         true_state = truth.start(initial)
-        sums, first = ErrorSums(info.horizon_steps), 0
+        sums, first = ErrorSums(info.horizon_steps), 0  # first: frames done
         while first < info.horizon_steps:
             steps = min(FRAMES_AT_ONCE, info.horizon_steps - first)
             predicted, state = model.advance(state, steps)
@@ -143,9 +146,9 @@ def refine(coarse: Array, factor: int) -> Array:
     fine = coarse
     for axis in (0, 1):
         rows = np.moveaxis(fine, axis, 0)
-        places = np.arange((len(rows) - 1) * factor + 1) / factor
-        before = np.minimum(places.astype(int), max(len(rows) - 2, 0))
-        share = (places - before)[:, None]
+        places = np.arange((len(rows) - 1) * factor + 1) / factor  # of the fine points, in coarse steps
+        before = np.minimum(places.astype(int), max(len(rows) - 2, 0))  # coarse point below each of them
+        share = (places - before)[:, None]  # of the coarse point above
         after = np.minimum(before + 1, len(rows) - 1)
         # ∞ · 0 is not a number: beside an infinite error a known point keeps its own value
         with np.errstate(invalid="ignore"):

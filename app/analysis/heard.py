@@ -20,7 +20,12 @@ from app.shared.vocabulary import DIFFERENCE
 
 @dataclass(frozen=True)
 class _Heard:
-    """A source of a take, times `gain`."""
+    """A source of a take, times `gain`, as its frames (frames, places).
+
+    Attributes:
+        by_source: the rendered frames by source.
+        source: "model", "truth", "difference" (model minus truth), or another preset's.
+    """
 
     by_source: Mapping[str, FrameSeries]
     source: str
@@ -90,6 +95,7 @@ def _parts(source: str) -> tuple[str, ...]:
 
 
 def _subtract_parts(parts: list[NDArray[np.float32]], gain: float) -> NDArray[np.float32]:
+    """The first of one or two arrays of one shape, less the second, times `gain`."""
     values, *subtracted = parts
     if subtracted:
         values = values - subtracted[0]

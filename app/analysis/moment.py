@@ -14,7 +14,7 @@ from app.rendering import Take
 
 BLUR_S = 1 / 60  # exposure of the blur: one picture of the screen
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
-ENVELOPE_BLOCK_S = 0.1
+ENVELOPE_BLOCK_S = 0.1  # the range is kept for each block of this length
 MM = np.float32(1000)
 
 
@@ -47,8 +47,8 @@ class Envelope:
     """The range of motion within the last second of a take, kept by blocks: each frame is read only once."""
 
     def __init__(self) -> None:
-        self._ranges: dict[str, _Range] = {}
-        self._bands: dict[str, Band] = {}
+        self._ranges: dict[str, _Range] = {}  # by source
+        self._bands: dict[str, Band] = {}  # by source, as `before` returned them last
 
     def before(self, position_s: float, motions: Iterable[HeardMotion]) -> dict[str, Band]:
         """Lowest and highest displacement (points,) in mm by source, over the whole blocks before the playhead.
@@ -72,15 +72,16 @@ class _Range:
 
     def __init__(self, motion: HeardMotion) -> None:
         self.motion = motion
-        self._block = math.ceil(ENVELOPE_BLOCK_S * motion.rate_hz)
+        self._block = math.ceil(ENVELOPE_BLOCK_S * motion.rate_hz)  # frames
         blocks, points = motion.frames // self._block + 1, motion.grid_points
         self._lowest_mm = np.zeros((blocks, points), np.float32)
         self._highest_mm = np.zeros((blocks, points), np.float32)
-        self._known = np.zeros(blocks, bool)
-        self._blocks_shown = (0, 0)
-        self._band: Band | None = None
+        self._known = np.zeros(blocks, bool)  # blocks whose range has been computed
+        self._blocks_shown = (0, 0)  # first and stop of those that `_band` is of
+        self._band: Band | None = None  # as `before` returned it last; None: not yet
 
     def before(self, position_s: float) -> Band | None:
+        """Lowest and highest displacement (points,) in mm of the second before a time; None: no block is whole."""
         last = min(int(position_s * self.motion.rate_hz), self.motion.ready) // self._block
         first = max(0, last - round(ENVELOPE_S / ENVELOPE_BLOCK_S))
         if last == first:
@@ -93,6 +94,7 @@ class _Range:
         return self._band
 
     def _look_at(self, block: int) -> None:
+        """Read the frames of a block, by its number, and keep their range in mm."""
         frames = self.motion.read_all(block * self._block, (block + 1) * self._block)
         self._lowest_mm[block] = frames.min(axis=0) * MM
         self._highest_mm[block] = frames.max(axis=0) * MM
@@ -102,12 +104,12 @@ class _Range:
 def frame_at(
     take: Take, motions: Iterable[HeardMotion], position_s: float, speed: float, envelope: Envelope | None = None
 ) -> StringFrame:
-    """The string of each motion at the playhead, as slow motion shows it.
-
-    It comes with its blur and, if given, its envelope.
+    """The string of each motion at the playhead, as slow motion shows it, with its blur.
 
     Args:
+        motions: the sources that are shown; those of which nothing is rendered yet are left out.
         position_s: the playhead.
+        envelope: gives the range of the last second too; None: without.
         speed: of slow motion; 1 is real time.
     """
     rendered = [motion for motion in motions if motion.there]

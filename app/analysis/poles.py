@@ -23,7 +23,7 @@ BELIEVABLE_S = (1e-3, 100.0)  # decay times are clipped to this range
 DECAY_WEIGHT = 0.25  # an octave of decay time counts as this share of the fundamental's frequency
 
 QUIET = "of a quiet string: louder, its network shifts them"
-_NOTES = {
+_NOTES = {  # by kind of model: a remark on its eigenvalues
     "koopman_integrated": QUIET,
     "koopman_var": "before the multiplier, which changes phases and levels with the energy",
     "lru": "layers follow one another: only the first one's need be the string's",
@@ -82,6 +82,11 @@ def pole_figure(preset: Preset) -> PoleFigure:
 
 
 def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
+    """The poles of eigenvalues, each assigned to the nearest of the string's modes.
+
+    Args:
+        layers: log λ per sample, (eigenvalues,) of each layer.
+    """
     kept = [_upper_half(log[log.real > math.log(VANISHED)]) for log in layers]
     log = np.concatenate([*kept, np.empty(0, complex)])
     layer = np.repeat(np.arange(len(kept)), [len(poles) for poles in kept])
@@ -98,7 +103,7 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
 
 
 def _upper_half(log: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Select one of each pair λ, λ̄."""
+    """Select one of each pair λ, λ̄, with its angle in 0 … π; `log`: log λ per sample, (eigenvalues,)."""
     angles = np.angle(np.exp(1j * log.imag))
     upper = log.real + 1j * np.abs(angles)
     lower = angles < 0
@@ -114,9 +119,11 @@ def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int, octaves_off: Array
     """Index of the nearest mode, and which of ±f + k · rate is nearest to it, (eigenvalues,) each.
 
     Args:
+        folded_hz: f, (eigenvalues,).
+        modes_hz: frequencies of the string's modes, (modes,).
         octaves_off: (eigenvalues, modes), the ratio of decay times in octaves.
     """
-    candidates = []
+    candidates = []  # for +f and -f: the frequency nearest to each mode, (eigenvalues, modes) in Hz
     for signed in (folded_hz, -folded_hz):
         turns = np.round((modes_hz[None] - signed[:, None]) / rate_hz)
         candidates.append(signed[:, None] + turns * rate_hz)

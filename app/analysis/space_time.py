@@ -60,23 +60,27 @@ def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.fl
 
 
 class Envelopes:
-    """The largest magnitude of each place in each millisecond of a take. A `Growing`."""
+    """The largest magnitude of each place in each millisecond (a column) of a take, for each of QUANTITIES.
+
+    A `Growing`: one thread calls `advance`, and any thread reads the columns that are ready.
+    """
 
     def __init__(self, take: Take) -> None:
         self.take = take
         self.stride = max(round(STRIDE_S * take.frames_hz), 1)  # pictures
-        self.ready = 0
+        self.ready = 0  # columns so far
         columns = take.frames // self.stride  # the rest at the end, below a millisecond, is left out
         self._largest_m = {name: np.empty((columns, take.info.grid_points), np.float32) for name in QUANTITIES}
         self._peaks_m = {name: np.empty(columns, np.float32) for name in QUANTITIES}  # of all places
-        self._columns = columns
+        self._columns = columns  # when complete
 
     @property
     def complete(self) -> bool:
         return self.ready == self._columns
 
     def advance(self) -> bool:
-        most = max(BLOCK_FRAMES // self.stride, 1)
+        """Compute the next columns; return False where the take has none yet, or all are ready."""
+        most = max(BLOCK_FRAMES // self.stride, 1)  # columns
         count = min(self.take.ready_frames // self.stride - self.ready, self._columns - self.ready, most)
         if count <= 0:
             return False
@@ -102,11 +106,17 @@ class Envelopes:
 
 
 def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], columns: int) -> Picture | None:
-    """The image of `times_s` as far as it is ready, in about `columns` columns; None where nothing is."""
+    """The image of a part of a take, as far as it is ready; None where nothing is.
+
+    Args:
+        quantity: one of QUANTITIES.
+        times_s: begin and end of the part.
+        columns: about how many the image has: its width in pixels.
+    """
     take = envelopes.take
     rate_hz = take.frames_hz
     detail = detail_for(take, times_s, columns)
-    stride = envelopes.stride if detail == "envelope" else 1
+    stride = envelopes.stride if detail == "envelope" else 1  # pictures; all below is counted in strides
     ready = envelopes.ready if detail == "envelope" else take.ready_frames
     first = int(times_s[0] * rate_hz) // stride
     last = int(np.ceil(times_s[1] * rate_hz / stride)) + 1

@@ -11,18 +11,21 @@ from app.analysis.heard import HeardSignal
 from app.rendering import SOURCES, Sounding
 from app.rendering.take import Listened
 
-FLOOR_DB = -150.0
+FLOOR_DB = -150.0  # lower levels are shown as this
 WINDOW_PERIODS = 7.0  # of the fundamental: a little more than a Hann window needs to separate partials
 OVERLAP = 8  # windows over any one time
-COLUMNS_AT_A_TIME = 32
+COLUMNS_AT_A_TIME = 32  # in a call of `advance`
 
 
 class Spectrogram:
-    """Spectrograms of model, truth and error in dB, a few columns at a time. A `Growing`.
+    """Spectrograms of model, truth and error in dB, a few columns at a time.
+
+    A `Growing`: one thread calls `advance`, and any thread reads the columns that are ready.
 
     A sine at the pick-up's full scale is 0 dB. Column k is of the window centred at k·hop_s; the last one ends with
-    the take. Before its start the take is mirrored, as the motion of a string released from rest would be. A drum or
-    a velocity has the other sign. A sudden start would show as a click that is not heard.
+    the take. Before its start the signal is mirrored, as the motion of a string released from rest would be. The
+    velocity of a string and the pressure of a drum are mirrored with the other sign. Without that, the sudden start
+    would show as a click that is not heard.
 
     Attributes:
         ready: columns so far.
@@ -31,15 +34,15 @@ class Spectrogram:
 
     def __init__(self, take: Sounding, listened: Listened) -> None:
         self.take, self.listened = take, listened
-        self._heard = {name: HeardSignal(listened.signals, name) for name in SOURCES}
+        self._heard = {name: HeardSignal(listened.signals, name) for name in SOURCES}  # by source
         rate_hz = take.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
-        self.hop = self.window_frames // OVERLAP
+        self.hop = self.window_frames // OVERLAP  # frames from one column to the next
         self.ready = 0
         self._mirror_sign = -1 if take.pickup in ("velocity", "pressure") else 1  # of what is mirrored at the start
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
         self._window *= np.float32(2 / self._window.sum() / take.full_scale)
-        self.columns = self._columns_of(self._heard["truth"].frames)
+        self.columns = self._columns_of(self._heard["truth"].frames)  # when complete
         shape = (self.columns, self.window_frames // 2 + 1)
         self.levels_db = {name: np.empty(shape, np.float32) for name in ("model", "truth", "error")}
 
@@ -57,6 +60,7 @@ class Spectrogram:
         return self.take.rate_hz / self.window_frames
 
     def advance(self) -> bool:
+        """Compute the next columns; return False where the take has none yet, or all are ready."""
         rendered = self._columns_of(min(signal.ready for signal in self._heard.values()))
         count = min(rendered - self.ready, COLUMNS_AT_A_TIME)
         if count <= 0:
@@ -100,12 +104,12 @@ class FrequencyRows:
         space = np.geomspace if logarithmic else np.linspace
         edges = space(lowest_hz, min(highest_hz, half_rate_hz), rows + 1) / bin_hz
         middle = np.sqrt(edges[1:] * edges[:-1]) if logarithmic else (edges[1:] + edges[:-1]) / 2
-        self._below = np.minimum(middle.astype(int), bins - 2)
-        self._share = (middle - self._below).astype(np.float32)
+        self._below = np.minimum(middle.astype(int), bins - 2)  # (rows,), the bin below each row's middle
+        self._share = (middle - self._below).astype(np.float32)  # (rows,), the weight of the bin above
         starts = np.ceil(edges[:-1] - 0.5).astype(int).clip(0, bins - 1)
-        self._starts = starts
+        self._starts = starts  # (rows,), the first bin of each row
         self._stop = bins if highest_hz >= half_rate_hz else max(math.ceil(edges[-1] - 0.5), int(starts[-1]) + 1)
-        self._wide = np.diff(starts, append=self._stop) > 1
+        self._wide = np.diff(starts, append=self._stop) > 1  # (rows,), where a row has several bins
 
     def of(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the levels by row, (columns, bins) → (columns, rows)."""

@@ -25,7 +25,7 @@ from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, project, to_modes
 
 FRAMES_AT_ONCE = 2000
-WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
+WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}  # parts of a take, with their words
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,11 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     info = take.info
     last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)
     modes_hz = info.resonator.eigenvalues().imag / (2 * math.pi)
-    length = segment_frames(info.rate_hz, modes_hz[0])
+    length = segment_frames(info.rate_hz, modes_hz[0])  # frames of a segment
     if last < length:
         return {}
     block = max(1, FRAMES_AT_ONCE // length) * length
-    tracks, first = [], 0
+    tracks, first = [], 0  # of each block; frames done
     true = true_phasors(info.resonator, _initial(take.pluck, info.grid_points, info.modes), info.rate_hz, last, block)
     for truth, model in zip(true, _model_modes(take, last, block), strict=True):
         tracks.append(track_partials(model, truth, length))
@@ -104,6 +104,10 @@ def _model_modes(take: Take, steps: int, block: int) -> Iterator[Array]:
 
 
 def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow:
+    """The row of a mode, counted from 1, in a window of `errors`, counted from 0.
+
+    `note`: of `_note`; where it is "", a mode that is hardly heard gets a note here.
+    """
     truth_hz, level_db, cents, t60_s, t60_error_percent = (
         _figure(values[0, window, mode - 1])
         for values in (errors.frequency_hz, errors.level_db, errors.cents, errors.t60_s, errors.t60_error_percent)
@@ -118,6 +122,10 @@ def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow
 
 
 def _note(mode_hz: float, rate_hz: int, similar: bool) -> str:
+    """The reason why a mode cannot be compared at its own frequency; "": there is none.
+
+    `similar`: the truth's phasor of this mode keeps its phase up to the sign, as at half the sample rate.
+    """
     if similar:
         return "not resolved: at half the sample rate"
     if mode_hz > rate_hz / 2:
@@ -127,6 +135,7 @@ def _note(mode_hz: float, rate_hz: int, similar: bool) -> str:
 
 
 def _initial(pluck: Pluck, grid_points: int, modes: int) -> Array:
+    """Modal amplitudes at the release, (1, modes) in m."""
     return to_modes(project(pluck.displacement(grid_points), modes)[None], modes)
 
 

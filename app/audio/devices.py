@@ -19,7 +19,7 @@ from app.audio.choices import DeviceChoice
 from app.audio.problems import ProblemKind, problem, refused
 from engine.voices.mixer import Mixer
 
-SMALLEST_BLOCK = 64  # frames
+SMALLEST_BLOCK = 64  # frames that a device asks for at a time, at least
 PERIODS = 4  # in a buffer: the device asks for a quarter of it at a time, so that a pluck waits for less
 
 
@@ -139,6 +139,7 @@ _streams: set[Any] = set()  # open ones: while there are any, PortAudio must not
 
 
 def _sounddevice() -> ModuleType:
+    """The module `sounddevice`, imported at the first call. Raises AudioProblem: PortAudio is missing or fails."""
     try:
         import sounddevice
     except (ImportError, OSError) as error:

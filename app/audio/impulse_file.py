@@ -34,7 +34,7 @@ def read_impulse(path: Path) -> Impulse:
     """
     samples, rate_hz = _read(path)
     samples = samples[_onset(samples, rate_hz) :]
-    most = int(bounds.LONGEST_IMPULSE_S * rate_hz)
+    most = int(bounds.LONGEST_IMPULSE_S * rate_hz)  # frames
     try:
         from engine.effects.responses import faded  # brings the compiler
 
@@ -55,6 +55,7 @@ def cut_words(path: Path) -> str:
 
 
 def _read(path: Path) -> tuple[NDArray[np.float64], int]:
+    """All samples of a file, (frames, channels), and its rate in Hz. Raises ImpulseError, as `read_impulse`."""
     try:
         with open_sound(path, bounds.LARGEST_IMPULSE_BYTES) as file:
             if file.format not in FORMATS:

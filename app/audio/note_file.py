@@ -16,7 +16,7 @@ RATES_HZ = (8_000, 384_000)
 NOTE_LENGTHS_S = SHORTEST_S, LONGEST_S = 0.15, 60.0
 MOST_CHANNELS = 8
 MOST_NUMBERS = 50_000_000  # of all channels: 400 MB; a minute of two channels at 384 kHz
-LARGEST_BYTES = 512 * 2**20
+LARGEST_BYTES = 512 * 2**20  # of a file
 LARGEST_SAMPLE = 2.0**15  # in full scales: of whole numbers of 16 bits in a file of floating point
 
 

@@ -63,18 +63,18 @@ class DeviceOutput(Output):
         self.device = device
         self.rate_hz = device.default_rate_hz
         self._mixer = mixer
-        self._closing = threading.Lock()
+        self._closing = threading.Lock()  # held while the stream's time is read, and while `_closed` is set
         self._closed = False
-        threads = native_threads()
+        threads = native_threads()  # those that come with the stream are the device's
         self._stream = open_device(device, buffer_s, mixer)
         self.latency_s = possible_s(self._stream.latency) or buffer_s
-        self._calls, self._called_s = mixer.calls, time.monotonic()
+        self._calls, self._called_s = mixer.calls, time.monotonic()  # the device's calls, and when one was last seen
         try:
             self._stream.start()
         except Exception as error:
             self.close()
             raise refused(error, device.name, self.rate_hz) from error
-        self.real_time = put_first(native_threads() - threads)
+        self.real_time = put_first(native_threads() - threads)  # whether the system has granted it
 
     def now_s(self) -> float:
         with self._closing:  # called from any thread: PortAudio must not be given a stream that was freed
@@ -116,7 +116,7 @@ class ClockOutput(Output):
     def __init__(self, mixer: Mixer) -> None:
         self.rate_hz = mixer.rate_hz
         self._mixer = mixer
-        self._closing = threading.Event()
+        self._closing = threading.Event()  # set: the thread is to end
         self._thread = threading.Thread(target=self._run, name="sound-clock", daemon=True)
         self._thread.start()
 
@@ -129,6 +129,7 @@ class ClockOutput(Output):
             self._thread.join(2)
 
     def _run(self) -> None:
+        """Take CLOCK_FRAMES from the mixer at the pace of real time and drop them; the clock's thread."""
         next_s, block_s = time.monotonic(), CLOCK_FRAMES / self.rate_hz
         while not self._closing.wait(max(0.0, next_s - time.monotonic())):
             with contextlib.suppress(MemoryError):

@@ -34,8 +34,8 @@ JOIN_TIMEOUT_S = 5.0
 # of a device that is not there yet
 MAY_COME = (ProblemKind.VANISHED, ProblemKind.NOT_STARTED, ProblemKind.NOT_OPENED, ProblemKind.UNEXPECTED)
 
-LookUp = Callable[[DeviceChoice | None, bool], AudioDevice]
-Open = Callable[[AudioDevice, float, Mixer], Output]
+LookUp = Callable[[DeviceChoice | None, bool], AudioDevice]  # `devices.find`: the choice, and whether to rescan
+Open = Callable[[AudioDevice, float, Mixer], Output]  # `DeviceOutput`: device, length of its buffer in s, mixer
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class SoundStatus:
 
 @dataclass(frozen=True)
 class _Wish:
-    """The arguments of a call of `Sound.open`."""
+    """A wish: the arguments of a call of `Sound.open`. `device`: None for the system's default."""
 
     device: DeviceChoice | None = None
     sound: SoundChoice = field(default_factory=SoundChoice)
@@ -71,7 +71,9 @@ class _Wish:
 
 
 class Sound:
-    """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
+    """The sound of the app: it owns the mixer, the output, and the caretaker thread that supervises the output.
+
+    Public methods may be called from any thread; all but `set_effects` and `close` return at once.
 
     Args:
         on_problem: called once for each fault of a device or of the supervision, from the caretaker thread.
@@ -93,18 +95,18 @@ class Sound:
         self._output: Output = ClockOutput(self.mixer)
         self._volume_db = 0.0
         self._effects: Effects | None = None
-        self._wish = _Wish()
-        self._wishes: SimpleQueue[_Wish] = SimpleQueue()
-        self._woken = threading.Event()
-        self._closing = threading.Event()
+        self._wish = _Wish()  # with which the last device was opened
+        self._wishes: SimpleQueue[_Wish] = SimpleQueue()  # not yet carried out
+        self._woken = threading.Event()  # set: the caretaker is not to wait
+        self._closing = threading.Event()  # set: the caretaker is to end
         self._lost: _Wish | None = None  # its device vanished while it was in use: opened again when it is back
-        self._try_again_s = 0.0
+        self._try_again_s = 0.0  # when to look for a lost device again, by `time.monotonic`
         self._stalled = False  # whether a stall has been reported
-        self._calls_before = 0  # of the mixer, by other outputs
+        self._calls_before = 0  # of the mixer, until the present output was opened
         self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
         self._status = SoundStatus(rate_hz=rate_hz)
-        self._changes_done = self._failed_looks = 0
-        self._faults: set[str] = set()
+        self._changes_done = self._failed_looks = 0  # wishes done; looks at the output that failed, in a row
+        self._faults: set[str] = set()  # stack traces of internal faults that were reported
         self._caretaker = threading.Thread(target=self._supervise, name="sound-caretaker", daemon=True)
         self._caretaker.start()
 
@@ -183,6 +185,7 @@ class Sound:
     # All below runs in the caretaker's thread.
 
     def _supervise(self) -> None:
+        """Carry out wishes and look at the output, every LOOK_EVERY_S or when woken, until `close`."""
         try:
             while not self._closing.is_set():
                 self._woken.wait(LOOK_EVERY_S)
@@ -235,8 +238,13 @@ class Sound:
                 self._changes_done += 1  # published with the device and the rate that came of it
 
     def _change(self, wish: _Wish) -> None:
-        before = self._wish if self._output.device is not None else None
-        present = self._output.device
+        """Open the device of a wish.
+
+        Where that fails, the present device is opened again as it was. Where none was open, and the wished one may
+        come yet, it counts as lost. Either way the fault is reported.
+        """
+        before = self._wish if self._output.device is not None else None  # how the present device was opened
+        present = self._output.device  # None: the clock
         self._lost = None
         try:
             if wish.rescan or present is None:
@@ -305,6 +313,7 @@ class Sound:
             self._lose(wish)
 
     def _be_silent(self) -> None:
+        """Close the device, if one plays; the clock takes the frames from then on."""
         if self._output.device is not None:
             self._close()
             self._output = ClockOutput(self.mixer)
@@ -313,6 +322,7 @@ class Sound:
         faultless(self._output.close, "while the sound output was closed")()
 
     def _look_at_output(self) -> None:
+        """Resume or give up a lost device, report a stall and its end, and look for a device that was given up."""
         output = self._output
         if output.device is not None and output.lost():
             if not self._resume(output.device):
@@ -334,7 +344,10 @@ class Sound:
                 pass
 
     def _resume(self, device: AudioDevice) -> bool:
-        """Open a device at once that has played and stands: a driver gives up under load, too. Whether it could."""
+        """Open a device again that was lost after it had played; return True if that succeeded.
+
+        A driver may also give up under load, and then works again at once.
+        """
         began_s, mixer = time.monotonic(), self.mixer
         if mixer.calls == self._calls_before:
             return False
@@ -355,6 +368,7 @@ class Sound:
         self._on_problem(problem)
 
     def _publish(self) -> None:
+        """Replace the status that `status` returns by the present one; its problem stays."""
         output = self._output
         self._status = replace(
             self._status,

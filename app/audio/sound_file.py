@@ -65,13 +65,13 @@ def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfi
 
 
 class _Spliced:
-    """A file for libsndfile: bytes of our own, then a part of another file."""
+    """A file for libsndfile: bytes of our own (`head`), then `length` bytes of another file, from `start` on."""
 
     def __init__(self, head: bytes, file: BinaryIO, start: int, length: int) -> None:
         self._head = head
         self._file = file
         self._start = start
-        self._length, self._at = len(head) + length, 0
+        self._length, self._at = len(head) + length, 0  # bytes in all, and where the next are read
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length}[whence]
@@ -90,7 +90,12 @@ class _Spliced:
 
 
 def _splice(file: BinaryIO, end: int) -> _Spliced:
-    start = 0
+    """The file as libsndfile is to read it; `end`: its size in bytes.
+
+    Raises:
+        UnreadableSound: it is of another kind, or damaged.
+    """
+    start = 0  # of the sound file, behind tags
     head = _bytes_at(file, 0, 12)
     if head[:3] == b"ID3" and len(head) >= 10:  # tags that players of MP3 put before any file
         start = 10 + sum((byte & 127) << shift for byte, shift in zip(head[6:10], (21, 14, 7, 0), strict=True))
@@ -143,7 +148,12 @@ def _codes_agree(one: int, other: int) -> bool:
 
 
 def _end_of_flac_block(data: bytes, block_frames: int) -> int:
-    """The number of frames up to the end of a block, by its header; 0: it is none."""
+    """The number of frames from the file's beginning to the end of a FLAC block; 0: there is no block.
+
+    Args:
+        data: the bytes from the block's header on, 16 of them.
+        block_frames: frames of each block, where all have as many.
+    """
     more = 8 - (~data[4] & 255).bit_length()  # bytes of its number, written as those of UTF-8
     number = data[4] & (127 >> more)
     for byte in data[5 : 4 + max(more, 1)]:
@@ -166,7 +176,10 @@ def _end_of_flac_block(data: bytes, block_frames: int) -> int:
 
 
 def _wave_parts(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
-    """A header, the file, and place and length of its samples."""
+    """A header of our own for a WAV file, the file, and place and length of its samples in bytes.
+
+    `start` and `end`: of the WAV file within `file`, in bytes.
+    """
     byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
     chunks: dict[bytes, bytes] = {}
     samples, ds64_length = (0, 0), 0  # place and length; the length that ds64 states

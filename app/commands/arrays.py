@@ -68,7 +68,7 @@ def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report:
         As `write_array`.
     """
     batch, points = initial.shape
-    rows = max(1, BYTES_AT_ONCE // (8 * (steps + 1) * points))
+    rows = max(1, BYTES_AT_ONCE // (8 * (steps + 1) * points))  # trajectories at a time
 
     def blocks() -> Iterator[Array]:
         for few in np.split(initial, range(rows, batch, rows)):
@@ -105,6 +105,7 @@ def blocks_of(advance: Callable[[Any, int], tuple[Array, Any]], state: Any, step
 
 
 def _load(path: Path) -> np.ndarray:
+    """The array in a NumPy file, of any shape and type, mapped and not yet read. Raises Failure: there is none."""
     if path.exists() and not path.is_file():  # reading a pipe would block
         raise Failure(f"{path}: not an ordinary file; give a NumPy .npy file")
     try:

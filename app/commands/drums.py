@@ -241,7 +241,16 @@ class _Blow:
 def _blow_of(
     drum: str, key: int | None, velocity: int, place: tuple[float, float] | None, preset: str | None = None
 ) -> _Blow:
-    """Raise typer.BadParameter: the place is not on the drum."""
+    """The blow that the options of a command describe.
+
+    Args:
+        drum, key: see `drum_of`.
+        place: from the centre in half-lengths; None: the drum's own.
+        preset: plays in place of the instrument's; None: that one.
+
+    Raises:
+        typer.BadParameter: the place is not on the drum.
+    """
     import numpy as np
 
     from engine.strike import Strike
@@ -299,6 +308,7 @@ def _with_file(path: Path) -> Instrument:
 
 
 def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressReport) -> Blocks:
+    """Solve a drum's motion by the slow reference; each call of the result gives the next frames, (frames, modes)."""
     import torch
 
     from engine.truth import solve_dop853
@@ -309,6 +319,10 @@ def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: ProgressR
 
 def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, report: ProgressReport) -> None:
     """Write the displacement (steps + 1, rows, columns) in m, from the blow on.
+
+    Args:
+        motion: each call gives the next frames of the modes' amplitudes, (frames, modes) in m.
+        points: of the grid, along the longer side.
 
     Raises:
         Failure: the file or the modes' shapes on the grid would be too large.

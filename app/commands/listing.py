@@ -104,6 +104,7 @@ def _show(rows: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> N
 
 
 def _facts(path: Path, records_by_digest: dict[str, Heard]) -> dict[str, Any]:
+    """The row of a preset; `records_by_digest`: audible errors by the digest of the file. Raises PresetError."""
     from engine.presets import described_parameters, preset_digest, read_info
     from training.heard_words import heard_word
 

@@ -189,6 +189,7 @@ def compare(
 
 
 def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
+    """The facts that `compare` prints: choices, relative errors over `steps` frames and by window, and warnings."""
     from engine.presets import outside_training
 
     info = preset.info
@@ -217,6 +218,7 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
 
 
 def _error_sums(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
+    """The sums of the model's errors over the first `steps` frames after a pluck, with progress printed."""
     from app.commands import arrays
     from engine.compare.relative import ErrorSums
     from engine.resonators.sine_transform import project
@@ -250,6 +252,7 @@ def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
 
 
 def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
+    """The motion by the fast solver, in blocks; `substeps`: per sample, None for `default_substeps`."""
     from app.commands.arrays import blocks_of
     from engine.truth import ModalState, SplittingSolver
 
@@ -267,11 +270,13 @@ def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps
 def _dop853_motion(
     resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: ProgressReport
 ) -> Motion:
+    """The motion by the slow reference solver, in one block; `trajectories`: in all calls together, for progress."""
     from engine.truth import ModalState, solve_dop853
 
-    solved = 0
+    solved = 0  # trajectories so far
 
     def motion(initial: Array) -> Iterator[Array]:
+        """See `Motion`."""
         nonlocal solved
         before, solved = solved, solved + len(initial)
         starts = ModalState.at_rest(resonator.to_modes(initial))
@@ -288,6 +293,7 @@ def _dop853_motion(
 
 
 def _predicted_motion(preset: Preset, steps: int) -> Motion:
+    """The motion by a preset's model, in blocks, from the displacement that its modes can have."""
     from app.commands.arrays import blocks_of
     from engine.resonators.sine_transform import project
     from engine.sources import ModelSource

@@ -146,12 +146,14 @@ def _check_alone(context: typer.Context) -> None:
 
 
 def _require(name: str, value: Value | None) -> Value:
+    """Return an option's value. Raises typer.BadParameter: it is not given."""
     if value is None:
         raise typer.BadParameter("is missing (only --recipe goes without it)", param_hint=name)
     return value
 
 
 def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
+    """Write the recorded note of a preset, as the preset plays it. Raises Failure: it has no recording."""
     from app.export.wav import WavSettings, form_of, write_wav
     from engine.folders import usable_files
     from engine.presets import find_preset, read_info
@@ -169,6 +171,7 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
 
 
 def _render_again(file: Path, out: Path | None) -> None:
+    """Render the recipe in a sound file; `out`: None for a new file in this folder, named after the recipe."""
     from app.export.note import default_file_name
     from app.export.recipe import changed_notices, preset_of, read_recipe
     from app.shared.version import program_version

@@ -89,6 +89,7 @@ def sampled(
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:
+    """The lowest and highest MIDI key of a text such as E2-E5 or 60; None for None. Raises typer.BadParameter."""
     if text is None:
         return None
     parts = [(text, text), *((text[:place], text[place + 1 :]) for place, sign in enumerate(text) if sign == "-")]

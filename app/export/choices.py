@@ -50,6 +50,7 @@ class ExportChoices(BaseModel):
 
     @property
     def wav(self) -> WavSettings:
+        """The settings of the files that these choices ask for."""
         return WavSettings(
             bits=cast(Bits, self.format.split()[1]),
             rate_hz=self.rate_hz or None,

@@ -48,7 +48,12 @@ class Columns:
 
 
 def aligned(heading: str, curves: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]) -> Columns:
-    """Columns of curves, by heading, on all of their places; empty where a curve has no value."""
+    """Columns of curves, with a row for each place that any of them has; empty where a curve has no value.
+
+    Args:
+        heading: of the column of places, the first.
+        curves: places, ascending, and values, (n,) each, by the heading of the curve.
+    """
     rows = np.unique(np.concatenate([np.empty(0), *(places for places, _ in curves.values())]))
     columns: dict[str, Values] = {heading: rows}
     for name, (places, values) in curves.items():

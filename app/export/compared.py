@@ -56,6 +56,7 @@ class ComparedExport:
         return cls(models, folder, replace(choices.wav, decay_db=None, difference_gain_db=0.0), choices.ending)
 
     def run(self, progress: Progress) -> str:
+        """Write the folder, which must not exist yet; see `ExportJob`. A model that ran away has no files."""
         check_new(self.file)
         table = []
         try:
@@ -101,6 +102,7 @@ def models_word(count: int) -> str:
 
 
 def _part(progress: Progress, before: float, of: float, text: str, share: float, *_: object) -> None:
+    """Report the share of a part as one of the whole, in which it begins at `before` and takes `of`."""
     progress(before + of * share, text)
 
 

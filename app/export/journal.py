@@ -126,6 +126,7 @@ class Journal:
         return read.played()
 
     def _line(self, entry: TimedEvent) -> dict[str, Any]:
+        """The JSON object of an event, `t` in s; of an instrument after the first only the fields that changed."""
         event, line = entry.event, {"t": entry.time_s}
         if isinstance(event, InstrumentTurned):
             before, now = self._instrument, event.instrument.model_dump(mode="json")
@@ -135,6 +136,7 @@ class Journal:
         return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
 
     def _append(self, lines: list[dict[str, Any]]) -> None:
+        """Append JSON objects, a line each, and return when they are on the disk. Raises OSError."""
         if not lines:
             return
         with self.path.open("ab") as file:
@@ -170,7 +172,13 @@ def _changes(before: Any, after: Any, *path: str) -> Iterator[tuple[list[str], A
 
 @dataclass
 class _Read:
-    """The content of the lines so far. Each is checked, as of any file."""
+    """The content of the lines so far. Each is checked, as of any file.
+
+    Attributes:
+        where: the path of the file, for messages.
+        recorded: when the recording began; None: the first line has not been read.
+        end_s: when it ended, from its beginning; None: no line says so.
+    """
 
     where: str
     recorded: datetime | None = None
@@ -179,7 +187,7 @@ class _Read:
     difference_gain_db: float = 0.0
     end_s: float | None = None
     meter: Meter | None = None
-    _instrument: dict[str, Any] | None = None
+    _instrument: dict[str, Any] | None = None  # the fields of the present one; None: no line has had one yet
 
     def take(self, line: bytes) -> bool:
         """Take a line; return False where it is damaged or fills the recording: nothing after it counts.
@@ -225,6 +233,10 @@ class _Read:
         return _CHECKED[kind].validate_python(value)
 
     def _turn_instrument(self, kind: str, value: Any) -> dict[str, Any]:
+        """The instrument's fields after a line of this kind.
+
+        `value`: all fields for "instrument"; for "turned" the changed ones, each a path of keys with its new value.
+        """
         if kind == "instrument":
             self._instrument = dict(value)
             return self._instrument

@@ -113,6 +113,7 @@ def _digits(value: float, least: int) -> str:
 
 
 def _tags(title: str, recipe: SoundRecipe) -> dict[str, str]:
+    """The tags of a file by soundfile's names, with the recipe as JSON; an empty one is left out."""
     tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": recipe.model_dump_json()}
     return {name: text for name, text in tags.items() if text}
 
@@ -143,6 +144,7 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
         title: of the instrument; words after a comma or a dash are left out.
         first_hz: frequency of the first partial, which gives the note.
         softest_mm, hardest_mm: the range of plucks, of which soft and hard are the outer thirds of its logarithm.
+        amplitude_mm: of the pluck that is named.
     """
     key = round(69 + 12 * math.log2(first_hz / 440))
     note = note_name(key) if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
@@ -157,7 +159,10 @@ def struck_name(struck: Struck) -> str:
 
 
 def _file_stem(title: str, note: str, share: float) -> str:
-    """The name of a file without its ending: short title, note and loudness."""
+    """The name of a file without its ending: short title, note and loudness.
+
+    `share`: of the way from the softest pluck, 0, to the hardest, 1.
+    """
     short = re.split(r"[,—]| - ", title)[0]
     plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
     note = note.replace("♯", "#")
@@ -229,6 +234,7 @@ class NoteExport:
         return next(iter(self.paths.values()))
 
     def run(self, progress: Progress) -> str:
+        """Render the note and write its files; see `ExportJob`."""
         choices, settings = self.choices, self.choices.wav
         sound = self.sound.alone if choices.alone else self.sound
         sound = replace(sound, seconds=choices.longest_s if choices.until_decayed else choices.seconds)

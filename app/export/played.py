@@ -58,8 +58,8 @@ def write_played(
     """Write a sound file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
-        parts: what sounds together, of one source, and the presets that play it. Where it exceeds full scale that
-            one alone does not, all is made softer.
+        parts: performances that sound together, of one source, each with the preset that plays it. Where several
+            together exceed full scale, the file is normalised.
         midi: the name of the MIDI file with the events.
         seconds: its length; None: until all has decayed.
         progress: is called with the share that is done, at most 0.99; may raise, to end it.

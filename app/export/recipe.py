@@ -175,7 +175,7 @@ class SoundRecipe(Origin):
         return _composed(data) if isinstance(data, dict) and data.get("format") == 1 else data
 
     def find_instrument(self) -> tuple[Instrument, bool]:
-        """The instrument of that name, and whether it is the same to the last value.
+        """The instrument named by this recipe, and True if it has not changed since, to the last value.
 
         Raises:
             ValueError: there is none.
@@ -272,7 +272,7 @@ def _unusable_error(path: Path, why: str) -> RecipeError:
 
 
 def preset_of(recipe: SoundRecipe | InstrumentSound, presets: Iterable[Path]) -> tuple[Path, bool]:
-    """The preset file of a sound, found by content, else by name, and whether its content is the same.
+    """The preset file of a sound, found by content, else by name; and True if it was found by content.
 
     Raises:
         RecipeError: there is none.

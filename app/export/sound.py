@@ -46,7 +46,8 @@ class Voices:
 
     Attributes:
         ended: False where the sound was to end by its decay but reached its longest duration first.
-        match: the factor of the model.
+        match: the factor of the model's samples that brings it to the level of the truth. 1 where levels are not to
+            be matched, where they differ by more than 40 dB, and where one of the two is silent.
     """
 
     sounds: Mapping[Voice, SoundSamples]
@@ -66,6 +67,7 @@ class Mixed:
         return min(len(self.voices.sounds[name]) for name in voices_of(self.source))
 
     def __getitem__(self, frames: slice) -> Samples:
+        """The samples of a slice, (frames, channels); of "both" the model's channels come first."""
         names = voices_of(self.source)
         parts = [self._gain(name) * self.voices.sounds[name][frames].astype(np.float64) for name in names]
         if self.source == "both":
@@ -75,6 +77,7 @@ class Mixed:
         return parts[0]
 
     def _gain(self, voice: Voice) -> float:
+        """The factor of a voice's samples: see `Voices.match`."""
         return self.voices.match if voice == "model" else 1.0
 
 
@@ -125,7 +128,7 @@ def render_voices(
     decay_db, rate_hz = settings.decay_db, settings.rate_hz or preset.info.rate_hz
     both = settings.normalise or settings.level_match or decay_db is not None
     voices = [voice for voice in VOICES if voice in needed or both]
-    until_db = None if decay_db is None else decay_db + DECAYED_FOR_SURE_DB
+    until_db = None if decay_db is None else decay_db + DECAYED_FOR_SURE_DB  # None: to the longest duration
     sounds: dict[Voice, Recording] = {}
     for place, voice in enumerate(voices):
 
@@ -142,7 +145,7 @@ def render_voices(
             for block in rendered:
                 recording.append(block)
             sounds[voice] = recording
-    match = 1.0
+    match = 1.0  # where no level is to be matched, or the model ran away
     if settings.level_match and len(sounds) == len(VOICES):
         match = match_gain(*(_level(sounds[voice], rate_hz) for voice in VOICES))
     if decay_db is None:
@@ -195,7 +198,12 @@ def _plucked_blocks(
     part: Part,
     until_db: float | None,
 ) -> Iterator[NDArray[np.float32]]:
-    """Blocks (frames, points) of the voice that a device would play, with all modes."""
+    """Blocks (frames, points) of the voice that a device would play, with all modes.
+
+    Args:
+        part: is called with the share of the voice that is done.
+        until_db: the voice ends when the whole string is so far below its loudest; None: after the note's seconds.
+    """
     info, ear = preset.info, replace(sound.ear, solo=0)
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
     source = ModelSource(preset) if program.rendered else None
@@ -211,10 +219,19 @@ def _struck_blocks(
     until_db: float | None,
     dry: bool,
 ) -> Iterator[NDArray[np.float32]]:
-    """Blocks (frames, channels) of a key, until it has been quiet for QUIET_FOR_S where it may end by its decay."""
+    """Blocks (frames, channels) of a key.
+
+    Args:
+        part: is called with the share of the sound that is done.
+        until_db: it ends when it has been so far below its peak for QUIET_FOR_S; None: after the note's seconds.
+        dry: without amplifier, body and room.
+
+    Raises:
+        Runaway: a sample is not finite.
+    """
     struck, seconds = sound.struck, sound.seconds
     assert struck is not None
-    peak, quiet, done = 0.0, 0, 0
+    peak, quiet, done = 0.0, 0, 0  # the largest sample so far; frames that it has been quiet for; frames in all
     for block in render_events(
         struck.instrument,
         preset,

@@ -22,7 +22,7 @@ class RecordedTake:
     Attributes:
         journal: None: it is saved, or could not be begun.
         name: of its files, without their endings.
-        files: its sound and its MIDI file, each with its mark; none until it is saved.
+        files: its sound and its MIDI file, each with its mark: size and time of change. None until it is saved.
     """
 
     played: Played
@@ -79,6 +79,6 @@ def free_path(path: Path) -> Path:
 
 
 def _mark(file: Path) -> tuple[int, int]:
-    """Numbers that another file of the same name does not have, nor one that was changed."""
+    """The mark of a file, which changes with it: its size in bytes and its time of change in ns; zeros: no file."""
     there = file.stat() if file.exists() else None
     return (there.st_size, there.st_mtime_ns) if there else (0, 0)

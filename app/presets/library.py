@@ -120,6 +120,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     """
     folders = folders or (SHIPPED, user_folder())
     tables = [read_heard(folder) for folder in folders]
+    # audible errors that were measured, by the digest of the preset's file
     records = {digest: by_digest for table, _ in tables for digest, by_digest in table.items()}
     problems = [problem for _, table_problems in tables for problem in table_problems]
 

@@ -49,7 +49,7 @@ def faults_logged(report: Callable[[str], None]) -> Iterator[None]:
     """
     handler = _open(log_file())
     before = sys.excepthook, threading.excepthook
-    known: set[str] = set()
+    known: set[str] = set()  # texts that are in the log already
 
     def note(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None, where: str) -> None:
         text = f"{where}\n{''.join(traceback.format_exception(kind, error, trace))}"
@@ -122,6 +122,7 @@ def faultless(work: Callable[P, object], where: str) -> Callable[P, None]:
 
 
 def _open(path: Path) -> logging.Handler | None:
+    """Open the log, write a line of versions, and return the log's handler; None: it cannot be opened."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handler = RotatingFileHandler(

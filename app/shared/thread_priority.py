@@ -61,9 +61,9 @@ def native_threads() -> set[int]:
 
 
 def put_first(threads: set[int]) -> bool:
-    """Schedule threads, the device's own, in real time; whether Linux has granted it to at least one.
+    """Schedule threads of a sound device in real time; return True if Linux has granted it to at least one.
 
-    Other systems do so by themselves.
+    Other systems do so by themselves; there it returns False.
     """
     granted = False
     for thread in threads if sys.platform == "linux" else ():

@@ -40,8 +40,8 @@ class Job:
 
     def __init__(self, say: Callable[..., None] = lambda *_: None, rests: Callable[[], bool] = lambda: False) -> None:
         self._say, self._rests = say, rests
-        self._stop = threading.Event()
-        self._reported_s = 0.0
+        self._stop = threading.Event()  # set: cancelled
+        self._reported_s = 0.0  # when progress was last reported, by `time.monotonic`; 0: never
 
     def cancel(self) -> None:
         """Ask the work to end at its next call; return at once."""
@@ -84,6 +84,10 @@ class Job:
         self._report(share, text, left_s)
 
     def _report(self, share: float, text: str, more: object, at_once: bool = False) -> None:
+        """Say "progressed", but not more often than every REPORT_EVERY_S unless `at_once`.
+
+        `more`: the third argument of that signal, a result so far or the seconds left.
+        """
         self.check()
         now_s = time.monotonic()
         if at_once or now_s - self._reported_s >= REPORT_EVERY_S:
@@ -123,8 +127,8 @@ class Worker:
         self._rests = rests
         self._rank = rank
         self._doing = doing
-        self._mailbox = threading.Condition()
-        self._next: tuple[Job, Work] | None = None
+        self._mailbox = threading.Condition()  # guards `_next` and `_closing`
+        self._next: tuple[Job, Work] | None = None  # not yet begun; None: nothing waits
         self._job: Job | None = None  # the latest
         self._closing = False
         self._thread: threading.Thread | None = None
@@ -160,6 +164,7 @@ class Worker:
             self._thread.join(seconds)
 
     def _run(self) -> None:
+        """Do the jobs of the mailbox, one after the other, until `close`; the worker's thread."""
         lower_priority(self._rank)
         while True:
             with self._mailbox:

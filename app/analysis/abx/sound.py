@@ -60,7 +60,7 @@ def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume
     gains = [min(rms) / level for level in rms]
     peak = max(gain * float(np.abs(samples).max()) for gain, samples in zip(gains, (a, b), strict=True))
     peak *= 10 ** (volume_db / 20)
-    room = min(1.0, LARGEST_PEAK / peak)
+    room = min(1.0, LARGEST_PEAK / peak)  # the factor that keeps both below the limiter
     gains = [gain * room for gain in gains]
     fade = min(round(END_S * rate_hz), len(a))
     falling = (0.5 + 0.5 * np.cos(np.pi * (np.arange(fade) + 0.5) / fade))[:, None]

@@ -68,6 +68,7 @@ class ListeningTest:
     """A test under way: a value that each step replaces.
 
     Attributes:
+        seed: of the order of X, see `draw_order`.
         planned: number of trials, fixed before the start.
         trials: those that are answered.
         x_heard: whether X has been heard in the present trial; only then can it be answered.

@@ -159,7 +159,12 @@ def _linked(
     kernels: Sequence[Path],
     waiting: Callable[[], None],
 ) -> Path:
-    """The library, linked in a working folder."""
+    """The path of the library, linked in a working folder. Raises PluginError, or OSError where the disk is full.
+
+    Args:
+        kernels: object files, see `objects_of`.
+        waiting: is called a few times a second while the linker runs; may raise, to end it.
+    """
     waiting()
     with naming(folder.parent):
         for source in files("app.export.plugin").joinpath("shell").iterdir():

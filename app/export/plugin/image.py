@@ -38,7 +38,7 @@ PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
 MOST_NOTES = 40
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
-NOISE_BYTES = 8  # of a frame
+NOISE_BYTES = 8  # of a frame of the rooms' noise
 SOURCE = Parameter("source", "Source", (0.0, 2.0), 0.0, PLACE, words=SOURCES)
 
 
@@ -93,6 +93,7 @@ def image_of(instrument: Instrument, preset: Preset) -> Image:
     whole = bytearray(header.tobytes())
 
     def put(content: bytes) -> int:
+        """Append bytes at a multiple of 8; return the place of the first."""
         whole.extend(b"\0" * (-len(whole) % 8))
         first = len(whole)
         whole.extend(content)
@@ -149,13 +150,22 @@ def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
 
 
 def _bytes(text: str, most: int) -> bytes:
+    """A text as UTF-8, cut after a whole character to so many bytes."""
     return text.encode()[:most].decode(errors="ignore").encode()
 
 
 def _record(
     kind: str, index: int, value: float, parameter: Parameter, module: str = "", label: str = ""
 ) -> tuple[str, np.void]:
-    """The identifier of a parameter, and its record for the shell."""
+    """The identifier of a parameter, and its record for the shell.
+
+    Args:
+        kind: one of `layout.KINDS`.
+        index: of the parameter among those of its kind.
+        value: its standard value, the instrument's own.
+        module: the group in which hosts list it; "": none.
+        label: its name for hosts; "": the table's.
+    """
     low, high = parameter.limits
     words = [parameter.shown(low + step) for step in range(round(high - low) + 1)] if parameter.whole else []
     record = np.zeros(1, PARAMETER)[0]
@@ -175,6 +185,7 @@ def _record(
 
 
 def _parameters(instrument: Instrument) -> Iterable[tuple[str, np.void]]:
+    """Identifier and record of each parameter that hosts see, in the shell's order: see `_record`."""
     for number, macro in enumerate(instrument.macros):
         yield _record("macro", number, macro.value, MACROS[f"macros.{number}"], "Macros", macro.name)
     yield _record("source", 0, 0.0, SOURCE)

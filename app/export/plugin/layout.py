@@ -93,7 +93,10 @@ _COUNTS = (
 
 
 def layout_header(version: str) -> str:
-    """The C header with records and constants of the image and of the kernels' memory, and the kernels' entries."""
+    """The C header with records and constants of the image and of the kernels' memory, and the kernels' entries.
+
+    `version`: the program's, as text.
+    """
     none = voice_bytes(0) // 8
     constants: dict[str, float] = {
         **{name: getattr(of, name) for name in _COUNTS.split()},
@@ -132,6 +135,7 @@ def _structure(kind: Record) -> str:
 
 
 def _fields(kind: Record) -> Iterator[str]:
+    """The C declaration of each field of a record, such as "double low;"."""
     structures = {record: name for name, record in STRUCTURES.items()}
     for name in kind.names or ():
         part, shape = kind[name].subdtype or (kind[name], ())

@@ -150,6 +150,7 @@ def run_waiting(
 
 
 def _environment() -> dict[str, str]:
+    """The environment of processes whose Numba optimises nothing, for a generic processor."""
     environment = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
     processor = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
     return {**environment, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
@@ -191,6 +192,7 @@ def _compiled(text: str, target: System, number: int) -> bytes:
 
 
 def _step() -> None:
+    """Print a dot, which `_make` counts as progress."""
     print(".", end="", flush=True)
 
 

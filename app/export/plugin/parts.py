@@ -35,11 +35,12 @@ def body_of(instrument: Instrument) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Kit:
-    """Drums as `engine.kernels.kit` reads them.
+    """Drums as `engine.kernels.kit` reads them. A slot is 8 bytes.
 
     Attributes:
+        memory: the record `KIT` and all that it points to, float64 (slots,).
         room: slots behind the memory in which it works.
-        modes: of a key at any modulus.
+        modes: the most of a key at any modulus.
     """
 
     memory: Array
@@ -59,14 +60,15 @@ def kit_of(keys: DrumKeys) -> Kit:
     highest_hz = keys.drums.highest_hz
     most = kernel.LOW_MODES
     lowest = OF_INSTRUMENTS["knobs.modulus"].limits[0]
-    slack = DrumKeys(instrument.with_value("knobs.modulus", lowest), keys.ear, keys)
-    possible = [played.drum for played in drums]
+    slack = DrumKeys(instrument.with_value("knobs.modulus", lowest), keys.ear, keys)  # the softest
+    possible = [played.drum for played in drums]  # the instrument's own, then as keys tune them
     for variant, key in product((slack, keys), range(of.KEYS)):  # the softer, the more modes are below a frequency
         with contextlib.suppress(ValueError):
             if (drum_key := variant.of_key(key)) is not None:
                 possible.append(drum_key.modes.drum)
                 most = max(most, len(drum_key.modes))
-    around = dict[tuple[str, float], kernel.Around]()  # what is longest of each kind
+    # by shape and aspect: the longest list of modes, the largest table of the air, and up to which ka that goes
+    around = dict[tuple[str, float], kernel.Around]()
     for drum in possible:
         kind, (rows, air, reach) = (drum.shape, drum.aspect), around_of(drum, highest_hz, of.MOST_DRUM_MODES)
         longest, known_air, known_reach = around.get(kind, (rows, air, reach))
@@ -74,10 +76,11 @@ def kit_of(keys: DrumKeys) -> Kit:
             air, reach = known_air, known_reach
         around[kind] = max(rows, longest, key=np.size), air, reach
     memory = np.zeros(slots(KIT))
-    places_of = dict[int, int]()
+    places_of = dict[int, int]()  # slot of each drum's record, by its note
     furthest = 0.0
 
     def put(part: Array) -> int:
+        """Append slots to the memory; return the first of them."""
         nonlocal memory
         memory = np.append(memory, part)
         return len(memory) - part.size

@@ -65,8 +65,8 @@ def text(part: str) -> str:
             setattr(mixer, name, _external_entry(name))
     private = llvm.Linkage.internal, llvm.Linkage.private
     whole = llvm.parse_assembly("")
-    seen = set[int]()
-    defined = set[str]()
+    seen = set[int]()  # ids of libraries that are linked already
+    defined = set[str]()  # names of functions that have a body already
     for name in PARTS[part]:
         kernel, arguments = plugin.ENTRIES[name]
         entry = njit(types.void(*arguments), **compiled.COMPILED)(kernel.py_func)

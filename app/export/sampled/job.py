@@ -170,6 +170,7 @@ class SampledExport:
         return self.out
 
     def run(self, progress: Progress) -> str:
+        """Render the samples and write the instrument; see `ExportJob`."""
         progress(0.0, "Loading the model")
         plan = self.plan
         report = export_sampled(

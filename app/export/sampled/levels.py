@@ -33,8 +33,9 @@ def velocity_levels(instrument: Instrument, layers: list[Zone], stored: list[Sto
     if len(layers) < 2 or measured_db.min() <= INAUDIBLE_DBFS:
         return measured_db[-1] + plucks_db - plucks_db[rendered[-1]]
     # plucks of equal amplitude still differ in width, and so in level
+    # (128,), the axis along which levels are interpolated
     along = plucks_db if np.ptp(plucks_db) > 0 else np.array(velocities, np.float64)
-    places = along[rendered]
+    places = along[rendered]  # (layers,), where levels are known
     slopes = np.diff(measured_db) / np.diff(places)
     levels_db = np.interp(along, places, measured_db)
     softer, harder = along < places[0], along > places[-1]

@@ -137,11 +137,13 @@ class SampledPlan:
 
     @cached_property
     def _glides_cents(self) -> NDArray[np.float64]:
+        """Pitch glides by key and velocity, (128, 128) in cents; a row of NaN for a key without a string."""
         from app.player.glide import glides_cents  # brings torch
 
         return glides_cents(self.instrument)
 
     def _key_spans(self) -> list[tuple[int, int]]:
+        """The lowest and the highest key of each sample, from low to high; the tuning may leave keys out."""
         low, high = self.key_range
         spans = [(first, min(first + self.every - 1, high)) for first in range(low, high + 1, self.every)]
         if self.every > 1:  # of an equal tuning, which has all keys
@@ -150,5 +152,6 @@ class SampledPlan:
         return [span for span in spans if tuning.mapped(span[0])]
 
     def _layers(self) -> list[tuple[int, int]]:
+        """The softest and the hardest velocity of each layer, from soft to hard."""
         most = VELOCITIES[1]
         return [(1 + n * most // self.layers, (n + 1) * most // self.layers) for n in range(self.layers)]

@@ -65,7 +65,7 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> tuple[NDArray[np.
         silence = np.zeros((FEWEST_FRAMES, sound.shape[1]))
         return silence, StoredSample(len(silence), sound.shape[1], 0.0, INAUDIBLE_DBFS)
     audible_frames = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
-    end = audible_frames + round(END_FADE_S * rate_hz)
+    end = audible_frames + round(END_FADE_S * rate_hz)  # frames that are kept, where there are so many
     cut = end > len(sound)
     sound = sound[:end]
     fade = min(round(CUT_FADE_S * rate_hz), len(sound) // 4) if cut else round(END_FADE_S * rate_hz)

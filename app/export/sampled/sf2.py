@@ -63,9 +63,9 @@ class _Channel:
     name: str
     start: int  # in frames of the smpl chunk
     frames: int
-    kind: int
-    link: int
-    pan: int
+    kind: int  # MONO, LEFT or RIGHT
+    link: int  # the number of the other side's sample; 0 for mono
+    pan: int  # per mille, negative to the left
 
 
 def check_sf2(plan: SampledPlan) -> None:
@@ -99,13 +99,13 @@ def write_sf2(
     channels = _channels(samples)
     attenuations_cb = _attenuations_cb(plan.instrument, samples)
     tables = _tables(plan, channels, attenuations_cb)
-    size = 2 * sum(channel.frames + ZEROS_BEHIND for channel in channels)
+    size = 2 * sum(channel.frames + ZEROS_BEHIND for channel in channels)  # bytes of all samples
     info = _list(b"INFO", _information(plan))
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
     headrooms_db = headroom_db(plan.instrument, samples)
-    levels_db = {
+    levels_db = {  # by how much each stored sample is raised, before `gain_db`
         # its hardest velocity's attenuation is made up for
         zone: attenuations_cb[zone] / 10 * (1 - zone.velocities[1] / 128) + headrooms_db[zone] - stored.gain_db
         for zone, stored in samples.items()
@@ -224,7 +224,7 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
 
 
 def _preset(name: bytes, bag: int) -> bytes:
-    """Bank 0, program 0 (7.2)."""
+    """The row of a preset in bank 0, program 0 (7.2); `bag`: the number of its first zone."""
     return struct.pack("<20sHHHIII", name, 0, 0, bag, 0, 0, 0)
 
 
@@ -242,7 +242,7 @@ def _span(ends: tuple[int, int]) -> int:
 
 
 def _ascii(text: str) -> bytes:
-    """Accents go, each letter of other scripts becomes an underscore."""
+    """Encode a text in ASCII: accents are left out, each letter of other scripts becomes an underscore."""
     plain = (c for c in unicodedata.normalize("NFKD", one_line(text)) if not unicodedata.combining(c))
     return "".join(c if c.isascii() else "_" for c in plain).encode("ascii")
 

@@ -37,6 +37,7 @@ def release_s(instrument: Instrument) -> float:
 
 
 def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> Iterator[str]:
+    """The lines of the file, of the arguments of `sfz_text`: a group for each key, a region for each sample."""
     instrument, gain_db = plan.instrument, sfz_gain_db(plan.instrument, samples)
     headrooms_db = headroom_db(instrument, samples)
     yield f"// {one_line(instrument.name)}, by {PROGRAM} {program_version()}"
